@@ -1,0 +1,53 @@
+# Everything a developer or a user runs. Needs Python 3.11+, a Rust toolchain, make and a C compiler; the rest is fetched.
+PYTHON ?= python3
+UV = .tools/bin/uv
+RUN = $(UV) run --frozen
+UV_VERSION = 0.13.8
+
+.DEFAULT_GOAL := help
+.PHONY: all install demo test test-rust test-python lint format bench docs clean help
+
+all: lint test docs ## what CI runs, and the documentation
+
+$(UV):
+	$(PYTHON) -m venv .tools
+	.tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
+
+install: $(UV) ## build pomona and install it with its tools into .venv
+	$(UV) sync --frozen
+
+demo: install ## the main job in half a minute: two dates of a row, one map, one picture
+	$(RUN) pomona demo
+
+test: test-rust test-python ## all tests
+
+test-rust: ## the core's tests
+	cargo test --workspace --locked
+
+test-python: install ## the tests of the Python face and the command line
+	$(RUN) pytest
+
+lint: install ## formatting, clippy, ruff, mypy and the stubs of the extension
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	$(RUN) ruff check .
+	$(RUN) ruff format --check .
+	$(RUN) mypy
+	$(RUN) stubtest pomona._core --mypy-config-file pyproject.toml
+
+format: install ## rewrite the sources in the house's format
+	cargo fmt --all
+	$(RUN) ruff check --fix .
+	$(RUN) ruff format .
+
+bench: install ## accuracy and speed; writes benchmarks/results
+	$(RUN) python -m benchmarks
+
+docs: $(UV) ## the documentation site, into site/
+	$(UV) run --frozen --group docs mkdocs build --strict
+
+clean: ## remove what was built
+	rm -rf .venv .tools site target out
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)

@@ -1,0 +1,171 @@
+//! Rigid and similarity transforms and their least-squares fits.
+
+use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Vector3};
+
+/// `p -> scale * rotation * p + translation`; rigid where `scale` is 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Similarity {
+    /// Rotation.
+    pub rotation: Rotation3<f64>,
+    /// Translation, metres of the target.
+    pub translation: Vector3<f64>,
+    /// Length in the target over length in the source.
+    pub scale: f64,
+}
+
+impl Default for Similarity {
+    fn default() -> Self {
+        Self::identity()
+    }
+}
+
+impl Similarity {
+    /// The transform that moves nothing.
+    pub fn identity() -> Self {
+        Self { rotation: Rotation3::identity(), translation: Vector3::zeros(), scale: 1.0 }
+    }
+
+    /// A transform without change of scale.
+    pub fn rigid(rotation: Rotation3<f64>, translation: Vector3<f64>) -> Self {
+        Self { rotation, translation, scale: 1.0 }
+    }
+
+    /// The image of a point.
+    #[inline]
+    pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
+        Point3::from(self.rotation * point.coords * self.scale + self.translation)
+    }
+
+    /// The transform that undoes this one.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.inverse();
+        let scale = 1.0 / self.scale;
+        Self { rotation, translation: -(rotation * self.translation) * scale, scale }
+    }
+
+    /// `self` after `first`: `a_from_b.compose(&b_from_c)` is `a_from_c`.
+    #[must_use]
+    pub fn compose(&self, first: &Self) -> Self {
+        Self {
+            rotation: self.rotation * first.rotation,
+            translation: self.rotation * first.translation * self.scale + self.translation,
+            scale: self.scale * first.scale,
+        }
+    }
+
+    /// Homogeneous 4x4 matrix with the scale folded in.
+    pub fn to_matrix(&self) -> Matrix4<f64> {
+        let mut matrix = (self.rotation.matrix() * self.scale).to_homogeneous();
+        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.translation);
+        matrix
+    }
+}
+
+/// Whether a fit may change the scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Both clouds are in metres: rotation and translation only.
+    #[default]
+    Metric,
+    /// The ratio of the scales is unknown: similarity.
+    Free,
+}
+
+/// Least-squares `target_from_source` of weighted pairs (Procrustes; Umeyama 1991 where the scale is free).
+///
+/// `None` where the pairs do not fix a rotation: fewer than three, no weight, or all on one line (second singular
+/// value of the cross-covariance below 1e-12 of the first).
+pub fn fit(
+    source: &[Point3<f64>],
+    target: &[Point3<f64>],
+    weights: Option<&[f64]>,
+    scale: Scale,
+) -> Option<Similarity> {
+    let n = source.len().min(target.len());
+    let weight = |i: usize| weights.map_or(1.0, |w| w[i]);
+    let total: f64 = (0..n).map(weight).sum();
+    if n < 3 || total <= 0.0 {
+        return None;
+    }
+    let mean = |points: &[Point3<f64>]| {
+        points[..n].iter().enumerate().fold(Vector3::zeros(), |sum, (i, p)| sum + p.coords * weight(i)) / total
+    };
+    let (mean_source, mean_target) = (mean(source), mean(target));
+    let mut cross = Matrix3::zeros();
+    let mut spread_source = 0.0;
+    for i in 0..n {
+        let (s, t) = (source[i].coords - mean_source, target[i].coords - mean_target);
+        cross += t * s.transpose() * weight(i);
+        spread_source += s.norm_squared() * weight(i);
+    }
+    let svd = cross.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    if svd.singular_values[1] <= 1e-12 * svd.singular_values[0] || spread_source <= 0.0 {
+        return None;
+    }
+    // A reflection would fit a mirrored or noisy planar set better; the sign keeps the rotation proper.
+    let sign = (u.determinant() * v_t.determinant()).signum();
+    let signs = Vector3::new(1.0, 1.0, sign);
+    let rotation = Rotation3::from_matrix_unchecked(u * Matrix3::from_diagonal(&signs) * v_t);
+    let scale = match scale {
+        Scale::Metric => 1.0,
+        Scale::Free => svd.singular_values.dot(&signs) / spread_source,
+    };
+    if scale <= 0.0 || !scale.is_finite() {
+        return None;
+    }
+    Some(Similarity { rotation, translation: mean_target - rotation * mean_source * scale, scale })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn similarity() -> impl Strategy<Value = Similarity> {
+        (prop::array::uniform3(-3.0..3.0f64), prop::array::uniform3(-5.0..5.0f64), 0.2..5.0f64).prop_map(
+            |(r, t, scale)| Similarity {
+                rotation: Rotation3::new(Vector3::from(r)),
+                translation: Vector3::from(t),
+                scale,
+            },
+        )
+    }
+
+    fn points() -> impl Strategy<Value = Vec<Point3<f64>>> {
+        prop::collection::vec(prop::array::uniform3(-2.0..2.0f64).prop_map(Point3::from), 5..20)
+    }
+
+    proptest! {
+        #[test]
+        fn fit_recovers_the_transform(truth in similarity(), source in points()) {
+            let target: Vec<_> = source.iter().map(|p| truth.apply(p)).collect();
+            let found = fit(&source, &target, None, Scale::Free).expect("random points are not collinear");
+            prop_assert!((found.to_matrix() - truth.to_matrix()).norm() < 1e-8);
+        }
+
+        #[test]
+        fn inverse_undoes(transform in similarity(), source in points()) {
+            let round = transform.inverse().compose(&transform);
+            for p in &source {
+                prop_assert!((round.apply(p) - p).norm() < 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn collinear_points_fix_no_rotation() {
+        let line: Vec<_> = (0..5).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();
+        assert!(fit(&line, &line, None, Scale::Metric).is_none());
+    }
+
+    #[test]
+    fn a_mirror_is_not_fitted_by_a_reflection() {
+        let source = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]].map(Point3::from);
+        let target = source.map(|p| Point3::new(-p.x, p.y, p.z));
+        let found = fit(&source, &target, None, Scale::Metric).expect("the points span space");
+        assert!((found.rotation.matrix().determinant() - 1.0).abs() < 1e-12);
+    }
+}

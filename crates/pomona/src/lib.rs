@@ -1,0 +1,18 @@
+//! Finds the same fruits again.
+//!
+//! Two visits to one row of trees give two clouds of fruit centroids whose relative pose is unknown. This crate says
+//! which fruit is which, where the visit lies in the map, and when there is no answer. It is pure geometry: no files,
+//! no printing, the same output for the same input on any number of threads.
+//!
+//! Lengths are metres, angles radians, frames right-handed. A transform `map_from_query` takes points of the query
+//! into the map.
+
+pub mod cloud;
+pub mod error;
+pub mod geometry;
+pub mod matching;
+
+pub use cloud::{FruitCloud, Views};
+pub use error::{Error, Result};
+pub use geometry::{Scale, Similarity};
+pub use matching::{Match, Method, Pair, Registration, Request, Verdict};
