@@ -1,9 +1,12 @@
 """The command line: `pomona VERB`. One file per verb; each verb imports what it needs when it runs."""
 
 import sys
+import warnings
+from typing import NoReturn
 
 import typer
 
+from pomona import __version__
 from pomona.errors import PomonaError
 
 app = typer.Typer(
@@ -14,16 +17,53 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+# Typer does not export click's UsageError: it is what BadParameter derives from, whichever click typer carries.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
 
 @app.callback()
-def _pomona() -> None:
+def _pomona(
+    version: bool = typer.Option(False, "--version", help="Print the version.", callback=_print_version, is_eager=True),
+) -> None:
     """Find the same fruits again, visit after visit."""
 
 
 def main() -> None:
-    """Run the command line; wrong input is one line on stderr and exit code 2."""
+    """Run the command line; wrong input is one line on stderr and exit code 2, a bug is a trace."""
+    warnings.showwarning = _warn
     try:
-        app()
+        code = app(standalone_mode=False)
     except PomonaError as error:
-        sys.stderr.write(f"pomona: {error}\n")
-        sys.exit(2)
+        _refuse(str(error))
+    except _UsageError as error:
+        _refuse(_usage_line(error))
+    except OSError as error:
+        if error.filename is None:
+            raise
+        _refuse(f"{error.filename}: {error.strerror}")
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse(line: str) -> NoReturn:
+    sys.stderr.write(f"pomona: {line}\n")
+    sys.exit(2)
+
+
+def _usage_line(error: Exception) -> str:
+    """Say a usage error in one line, with where to read on."""
+    message: str = getattr(error, "format_message", error.__str__)()
+    context = getattr(error, "ctx", None)
+    if context is None or not message or "\n" in message:
+        return message or "no verb given, see `pomona --help`"
+    return f"{message.rstrip('.')}; see `{context.command_path} --help`"
+
+
+def _warn(message: Warning | str, *_about: object, **_more: object) -> None:
+    """Show a warning as one line on stderr."""
+    sys.stderr.write(f"pomona: warning: {message}\n")
