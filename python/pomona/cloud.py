@@ -1,0 +1,234 @@
+"""The fruits of one visit, and the files they live in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pomona.errors import PomonaError
+
+__all__ = ["FruitCloud", "Unit", "Views"]
+
+Unit = Literal["m", "cm", "mm", "free"]
+"""Unit of a file's coordinates; ``free`` keeps the numbers of a reconstruction whose scale nobody knows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Which frame saw which fruit, as pairs.
+
+    Attributes
+    ----------
+    frames : (V,) int64
+        Frame number of each sighting.
+    fruits : (V,) int64
+        Row of the fruit of each sighting.
+    """
+
+    frames: NDArray[np.int64]
+    fruits: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        frames = _array("views.frames", self.frames, np.int64, (None,))
+        fruits = _array("views.fruits", self.fruits, np.int64, (len(frames),))
+        object.__setattr__(self, "frames", frames)
+        object.__setattr__(self, "fruits", fruits)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+
+@dataclass(frozen=True, eq=False)
+class FruitCloud:
+    """Sparse landmarks of one visit, one row a fruit, in the session's own frame of reference.
+
+    Attributes
+    ----------
+    positions : (N, 3) float64
+        Centres of the fruits, metres.
+    ids : tuple of N str, optional
+        Names of the fruits, each used once.
+    diameters_m : (N,) float64, optional
+        Diameters in metres, NaN where unknown.
+    covariances : (N, 3, 3) float64, optional
+        Covariances of the centres, square metres.
+    n_views : (N,) int64, optional
+        Number of frames that saw the fruit.
+    views : Views, optional
+        Which frame saw which fruit.
+    extras : mapping of str to tuple of N str
+        Other columns of the file, kept as they were written.
+
+    Raises
+    ------
+    PomonaError
+        When an array has the wrong shape, a coordinate is not finite or an id is used twice.
+    """
+
+    positions: NDArray[np.float64]
+    ids: tuple[str, ...] | None = None
+    diameters_m: NDArray[np.float64] | None = None
+    covariances: NDArray[np.float64] | None = None
+    n_views: NDArray[np.int64] | None = None
+    views: Views | None = None
+    extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        positions = _array("positions", self.positions, np.float64, (None, 3))
+        n = len(positions)
+        _require_finite("positions", positions)
+        object.__setattr__(self, "positions", positions)
+        if self.diameters_m is not None:
+            object.__setattr__(self, "diameters_m", _diameters(self.diameters_m, n))
+        if self.covariances is not None:
+            covariances = _array("covariances", self.covariances, np.float64, (n, 3, 3))
+            _require_finite("covariances", covariances)
+            object.__setattr__(self, "covariances", covariances)
+        if self.n_views is not None:
+            object.__setattr__(self, "n_views", _array("n_views", self.n_views, np.int64, (n,)))
+        if self.ids is not None:
+            object.__setattr__(self, "ids", _column("ids", self.ids, n))
+            _require_unique(self.ids)
+        if self.views is not None and len(self.views) and not _within(self.views.fruits, n):
+            raise PomonaError(f"views.fruits: a sighting names a row outside 0..{n - 1}")
+        object.__setattr__(self, "extras", {name: _column(name, cells, n) for name, cells in self.extras.items()})
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @classmethod
+    def read(cls, path: str | Path, *, unit: Unit = "m") -> FruitCloud:
+        """Read a cloud from a .csv, .ply or .gpkg file.
+
+        Parameters
+        ----------
+        path : str or Path
+            CSV or PLY with ``x, y, z``, a session or an orchard map. Of a map: each fruit where it was last seen.
+        unit : {"m", "cm", "mm", "free"}
+            Unit of the coordinates in the file. They come back in metres, and a `PomonaWarning` tells when the
+            distances between neighbours cannot be those of fruits; ``free`` keeps the numbers and asks nothing.
+
+        Raises
+        ------
+        PomonaError
+            One line with the file, the line and column, what was found and what was expected.
+        """
+        from pomona.cloud_formats import read_cloud
+
+        return read_cloud(Path(path), unit)
+
+    def write(self, path: str | Path) -> None:
+        """Write a .csv or .ply file, in metres; the file appears whole or not at all.
+
+        A session (.gpkg) also has a name and a date: `pomona.orchard.write_session` writes it.
+        """
+        from pomona.cloud_formats import write_cloud
+
+        write_cloud(Path(path), self)
+
+    def select(self, rows: ArrayLike) -> FruitCloud:
+        """Return the fruits ``rows`` (row numbers, each once, or a mask) in that order, with their sightings."""
+        picked = np.arange(len(self))[np.asarray(rows)] if np.size(rows) else np.empty(0, np.int64)
+        if len(np.unique(picked)) != len(picked):
+            raise PomonaError("select: a row is named twice, expected each row once")
+
+        def text(column: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(column[row] for row in picked)
+
+        return FruitCloud(
+            positions=self.positions[picked],
+            ids=None if self.ids is None else text(self.ids),
+            diameters_m=None if self.diameters_m is None else self.diameters_m[picked],
+            covariances=None if self.covariances is None else self.covariances[picked],
+            n_views=None if self.n_views is None else self.n_views[picked],
+            views=None if self.views is None else _select_views(self.views, picked, len(self)),
+            extras={name: text(column) for name, column in self.extras.items()},
+        )
+
+    def transformed(self, map_from_query: ArrayLike) -> FruitCloud:
+        """Return the cloud in another frame.
+
+        Parameters
+        ----------
+        map_from_query : (4, 4) array_like
+            Rigid or similarity transform, homogeneous, scale folded in. A scale also scales diameters.
+        """
+        transform = _array("map_from_query", map_from_query, np.float64, (4, 4))
+        linear, translation_m = transform[:3, :3], transform[:3, 3]
+        scale = float(np.cbrt(np.linalg.det(linear)))
+        return replace(
+            self,
+            positions=self.positions @ linear.T + translation_m,
+            covariances=None if self.covariances is None else linear @ self.covariances @ linear.T,
+            diameters_m=None if self.diameters_m is None else self.diameters_m * scale,
+        )
+
+    def label(self, row: int) -> str:
+        """Return the id of a row, the row number where there are no ids."""
+        return str(int(row)) if self.ids is None else self.ids[row]
+
+
+def _array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """Return `values` as a contiguous array of `dtype`; None in `shape` takes any length."""
+    try:
+        array = np.ascontiguousarray(values, dtype=dtype)
+    except (TypeError, ValueError):
+        raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None
+    fits = array.ndim == len(shape) and all(
+        want is None or found == want for found, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        wanted = ", ".join("N" if want is None else str(want) for want in shape)
+        raise PomonaError(f"{name}: found shape {array.shape}, expected ({wanted})")
+    return array
+
+
+def _require_finite(name: str, array: NDArray[np.float64]) -> None:
+    finite = np.isfinite(array)
+    if not finite.all():
+        row = int(np.argmin(finite.reshape(len(array), -1).all(axis=1)))
+        raise PomonaError(f"{name}: row {row} is NaN or infinite, expected finite numbers")
+
+
+def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
+    diameters_m = _array("diameters_m", values, np.float64, (n,))
+    # NaN compares false and so stays allowed: the diameter of that fruit is unknown.
+    wrong = (diameters_m <= 0) | np.isinf(diameters_m)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise PomonaError(f"diameters_m: row {row} is {diameters_m[row]}, expected positive metres or NaN")
+    return diameters_m
+
+
+def _column(name: str, cells: Any, n: int) -> tuple[str, ...]:
+    column = tuple(str(cell) for cell in cells)
+    if len(column) != n:
+        raise PomonaError(f"{name}: found {len(column)} values, expected {n}, one a fruit")
+    return column
+
+
+def _require_unique(ids: tuple[str, ...]) -> None:
+    if len(set(ids)) == len(ids):
+        return
+    first_row: dict[str, int] = {}
+    for row, name in enumerate(ids):
+        if name in first_row:
+            raise PomonaError(f"ids: rows {first_row[name]} and {row} are both {name!r}, expected each id once")
+        first_row[name] = row
+
+
+def _within(rows: NDArray[np.int64], n: int) -> bool:
+    return bool(rows.min() >= 0 and rows.max() < n)
+
+
+def _select_views(views: Views, picked: NDArray[np.int64], n: int) -> Views:
+    new_row = np.full(n, -1, dtype=np.int64)
+    new_row[picked] = np.arange(len(picked))
+    fruits = new_row[views.fruits]
+    kept = fruits >= 0
+    return Views(frames=views.frames[kept], fruits=fruits[kept])
