@@ -7,6 +7,7 @@
 //! Lengths are metres, angles radians, frames right-handed. A transform `map_from_query` takes points of the query
 //! into the map.
 
+pub mod assignment;
 pub mod cloud;
 pub mod error;
 pub mod geometry;
