@@ -1,0 +1,1 @@
+"""Seeded orchards with known truth: fruit clouds of one row seen on two visits."""
