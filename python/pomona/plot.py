@@ -101,10 +101,12 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     view = view_from_above(map.positions, up_in_map)
     in_map = view.project(map.positions)
     in_query = _project_query(query.positions, match, view)
+    if match.map_from_query is None and len(map) and len(query):
+        in_query += in_map.mean(axis=0) - in_query.mean(axis=0)
     aside_m = _distance_aside(in_map, in_query)
     in_query[:, 1] += aside_m
 
-    figure = Figure(figsize=(11.0, 6.0), dpi=130, layout="constrained")
+    figure = Figure(figsize=(10.0, 5.6), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     _draw_pairs(figure, axes, in_query[match.pairs[:, 0]], in_map[match.pairs[:, 1]], match.probabilities)
     _draw_fruits(axes, in_map, match.pairs[:, 1], "map", "o", _MAP_COLOUR)
@@ -113,7 +115,7 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     axes.set_xlabel(f"{view.labels[0]} (m)")
     axes.set_ylabel(f"{view.labels[1]} (m)\nquery drawn {aside_m:.1f} m aside")
     axes.set_title(_title(match))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4, frameon=False)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     return figure
 
@@ -121,7 +123,7 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
 def _project_query(positions: NDArray[np.float64], match: Match, view: View) -> NDArray[np.float64]:
     if match.map_from_query is not None:
         return view.project(positions @ match.map_from_query[:3, :3].T + match.map_from_query[:3, 3])
-    return view_from_above(positions).project(positions - positions.mean(axis=0) if len(positions) else positions)
+    return view_from_above(positions).project(positions)
 
 
 def _distance_aside(in_map: NDArray[np.float64], in_query: NDArray[np.float64]) -> float:
@@ -151,6 +153,7 @@ def _draw_pairs(
         cmap=_COLOURS_OF_PROBABILITY,
         clim=(0.0, 1.0),
         linewidths=0.8,
+        alpha=0.7,
         zorder=1,
     )
     axes.add_collection(lines)
@@ -173,8 +176,10 @@ def _draw_fruits(
 
 
 def _title(match: Match) -> str:
-    found = f"{match.status.value}: {len(match.pairs)} of {match.n_query} fruits of the query"
-    return f"{found} in a map of {match.n_map} fruits, log-odds {match.log_odds:.0f}"
+    clouds = f"{match.n_query} fruits of the query, {match.n_map} of the map"
+    if match.map_from_query is None:
+        return f"{match.status.value}: {clouds}"
+    return f"{match.status.value}: {clouds}, {len(match.pairs)} found again, log-odds {match.log_odds:.0f}"
 
 
 def require_picture_name(path: Path) -> None:
