@@ -118,7 +118,7 @@ class FruitCloud:
         PomonaError
             One line with the file, the line and column, what was found and what was expected.
         """
-        from pomona.cloud_formats import read_cloud
+        from pomona.cloud.files import read_cloud
 
         return read_cloud(Path(path), unit)
 
@@ -127,7 +127,7 @@ class FruitCloud:
 
         A session (.gpkg) also has a name and a date: `pomona.orchard.write_session` writes it.
         """
-        from pomona.cloud_formats import write_cloud
+        from pomona.cloud.files import write_cloud
 
         write_cloud(Path(path), self)
 

@@ -1,0 +1,104 @@
+"""The columns of a fruit cloud's file, the same names in CSV and PLY."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud.fruit_cloud import FruitCloud
+from pomona.errors import PomonaError
+
+__all__ = ["BLANKABLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split"]
+
+POSITION = ("x", "y", "z")
+COVARIANCE = ("cxx", "cyy", "czz", "cxy", "cxz", "cyz")
+COVARIANCE_CELLS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+NUMBERS = frozenset({*POSITION, "diameter_m", *COVARIANCE, "n_views"})
+"""Columns that hold numbers; every other column is text."""
+
+WHOLE = frozenset({"n_views"})
+"""Columns that hold whole numbers."""
+
+BLANKABLE = frozenset({"diameter_m"})
+"""Columns in which an empty cell means unknown."""
+
+
+def check_names(names: Sequence[str], where: str) -> None:
+    """Refuse a header that lacks a coordinate, names a column twice or has only a part of the covariance."""
+    missing = [name for name in POSITION if name not in names]
+    if missing:
+        found = ",".join(names)
+        shown = found if len(found) <= 80 else found[:77] + "..."
+        raise PomonaError(f"{where}: found columns {shown!r} without {','.join(missing)}, expected at least x,y,z")
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise PomonaError(f"{where}: column {twice!r} is there twice, expected each name once")
+    lacking = [name for name in COVARIANCE if name not in names]
+    if 0 < len(lacking) < len(COVARIANCE):
+        raise PomonaError(f"{where}: found a covariance without {','.join(lacking)}, expected {','.join(COVARIANCE)}")
+
+
+def number(name: str, cell: str) -> float:
+    """Read one cell of a column of numbers.
+
+    Raises
+    ------
+    ValueError
+        With what was expected instead.
+    """
+    if name in BLANKABLE and cell.strip() in ("", "nan"):
+        return math.nan
+    try:
+        # Python reads 1_000 as a number, nobody else does.
+        value = float(cell) if "_" not in cell else math.nan
+    except ValueError:
+        raise ValueError("expected a number") from None
+    if not math.isfinite(value):
+        raise ValueError("expected a finite number")
+    if name in WHOLE and (not value.is_integer() or abs(value) > 2**53):
+        raise ValueError("expected a whole number")
+    if name == "diameter_m" and value <= 0:
+        raise ValueError("expected a positive number or nothing")
+    return value
+
+
+def assemble(columns: Mapping[str, Any]) -> FruitCloud:
+    """Put columns together as a cloud; numbers as arrays, text as sequences of str."""
+    covariances: NDArray[np.float64] | None = None
+    if COVARIANCE[0] in columns:
+        covariances = np.empty((len(columns["x"]), 3, 3))
+        for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
+            covariances[:, i, j] = covariances[:, j, i] = columns[name]
+    return FruitCloud(
+        positions=np.column_stack([columns[name] for name in POSITION]).astype(np.float64),
+        ids=tuple(columns["id"]) if "id" in columns else None,
+        diameters_m=columns.get("diameter_m"),
+        covariances=covariances,
+        n_views=np.asarray(columns["n_views"]).astype(np.int64) if "n_views" in columns else None,
+        extras={name: tuple(column) for name, column in columns.items() if name not in NUMBERS and name != "id"},
+    )
+
+
+def split(cloud: FruitCloud) -> dict[str, Any]:
+    """Take a cloud apart into the columns of its file, in order; the inverse of `assemble`."""
+    columns: dict[str, Any] = {}
+    if cloud.ids is not None:
+        columns["id"] = cloud.ids
+    columns.update(zip(POSITION, cloud.positions.T, strict=True))
+    if cloud.diameters_m is not None:
+        columns["diameter_m"] = cloud.diameters_m
+    if cloud.covariances is not None:
+        for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
+            columns[name] = cloud.covariances[:, i, j]
+    if cloud.n_views is not None:
+        columns["n_views"] = cloud.n_views
+    for name, column in cloud.extras.items():
+        if name in NUMBERS or name == "id":
+            raise PomonaError(f"extras: found the name {name!r}, expected one that no column of ours has")
+        columns[name] = column
+    return columns
