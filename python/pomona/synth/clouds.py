@@ -176,7 +176,10 @@ def _false_points(rng: np.random.Generator, fruits: NDArray[np.float64], count: 
 def _random_pose(
     rng: np.random.Generator, cell: Cell, units_per_metre: float, *, mirrored: bool
 ) -> NDArray[np.float64]:
-    """Draw a random `session_from_row`; a unit quaternion with normal components is a uniform rotation (Shoemake 1992)."""
+    """Draw a random `session_from_row`.
+
+    A unit quaternion with normal components is a uniform rotation (Marsaglia 1972; Shoemake 1992).
+    """
     w, x, y, z = rng.normal(size=4)
     if cell.upright:
         x = y = 0.0

@@ -1,0 +1,203 @@
+"""The seeded generator: what its cells promise."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from pomona.cli import main
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.synth.cells import ROWS
+from pomona.synth.clouds import CELLS, ScenePair, scene_pair
+from pomona.synth.row import RowShape, grow_row
+
+
+def common(pair: ScenePair) -> tuple[np.ndarray, np.ndarray]:
+    row_in_map = {name: row for row, name in enumerate(pair.map.ids)}
+    rows = [(row, row_in_map[name]) for row, name in enumerate(pair.query.ids) if name in row_in_map]
+    return np.array(rows, dtype=int).reshape(-1, 2).T
+
+
+def residuals(pair: ScenePair) -> np.ndarray:
+    query, map_ = common(pair)
+    in_map = pair.query.positions[query] @ pair.map_from_query[:3, :3].T + pair.map_from_query[:3, 3]
+    return in_map - pair.map.positions[map_]
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_the_same_seed_draws_the_same_pair(name: str) -> None:
+    first, again = scene_pair(name, 5), scene_pair(name, 5)
+    for side in ("query", "map"):
+        one, two = getattr(first, side), getattr(again, side)
+        assert one.ids == two.ids
+        np.testing.assert_array_equal(one.positions, two.positions)
+    assert first.map_from_query.tolist() == again.map_from_query.tolist()
+
+
+def test_another_seed_and_another_cell_draw_other_pairs() -> None:
+    poses = [scene_pair(name, seed).map_from_query.tolist() for name, seed in (("six", 0), ("six", 1), ("grid", 0))]
+    assert poses[0] != poses[1]
+    assert poses[0] != poses[2]
+
+
+@pytest.mark.parametrize("name", ["base", "o45s4", "o45s8", "part1", "sim3", "big5k", "plane", "mirror", "wall"])
+def test_common_fruits_lie_on_each_other_but_for_the_noise(name: str) -> None:
+    errors = np.concatenate([residuals(scene_pair(name, seed)) for seed in range(3)])
+    expected = CELLS[name].noise_m
+    assert errors.std() == pytest.approx(expected, rel=4.0 / np.sqrt(2 * errors.size))
+    assert np.abs(errors.mean(axis=0)).max() < 4.5 * expected / np.sqrt(len(errors))
+
+
+def test_sag_moves_common_fruits_down_and_only_in_its_cell() -> None:
+    up_in_map = []
+    for seed in range(4):
+        pair = scene_pair("sag8", seed)
+        shift = residuals(pair)
+        # The mean shift points down; its length is near 0.65 x 8 cm x E[t^2].
+        mean = shift.mean(axis=0)
+        up_in_map.append(np.linalg.norm(mean))
+        assert shift.std(axis=0).max() > 0.022
+    assert 0.010 < np.mean(up_in_map) < 0.035
+
+
+@pytest.mark.parametrize(("name", "trees"), [("base", 5), ("part45", 2), ("part1", 1), ("noov", 0), ("wide-noov", 0)])
+def test_visits_share_the_fruits_of_the_trees_they_share(name: str, trees: int) -> None:
+    cell = CELLS[name]
+    shared = [common(scene_pair(name, seed)).shape[1] for seed in range(6)]
+    expected = trees * 105 * (1 - cell.hidden) ** 2
+    assert np.mean(shared) == pytest.approx(expected, rel=0.25)
+
+
+@pytest.mark.parametrize("name", ["base", "o45s4", "big5k"])
+def test_a_visit_misses_fruits_and_adds_false_ones_at_the_stated_rates(name: str) -> None:
+    cell = CELLS[name]
+    pair = scene_pair(name, 1)
+    false = sum(not fruit.startswith("f") for fruit in pair.query.ids)
+    seen = len(pair.query) - false
+    assert false == round(cell.false_rate * seen)
+    assert seen == pytest.approx(cell.seen * 105 * (1 - cell.hidden), rel=0.35)
+    assert all(fruit[0] in "fq" for fruit in pair.query.ids)
+    assert all(fruit[0] in "fm" for fruit in pair.map.ids)
+
+
+def test_neither_order_nor_ids_tell_where_a_fruit_hangs() -> None:
+    pair = scene_pair("big5k", 0)
+    query, map_ = common(pair)
+    along_row = pair.map.positions[map_] @ np.linalg.svd(pair.map.positions - pair.map.positions.mean(0))[2][0]
+    numbers = np.array([int(pair.map.ids[row][1:]) for row in map_])
+    limit = 4.5 / np.sqrt(len(query))
+    for order in (query, map_, numbers):
+        assert abs(np.corrcoef(order, along_row)[0, 1]) < limit
+    assert abs(np.corrcoef(query, map_)[0, 1]) < limit
+
+
+def test_fruits_hang_in_clusters_and_keep_their_distance() -> None:
+    row = grow_row(np.random.default_rng(0), 12)
+    nearest = cKDTree(row.positions).query(row.positions, k=2)[0][:, 1]
+    assert nearest.min() >= 0.068
+    # Clusters hold 2 fruits on average and 40 % of them only one: 80 % of the fruits hang in company, some by chance.
+    assert 0.78 < (nearest < 0.10).mean() < 0.92
+    counts = np.bincount(row.tree)
+    assert counts.min() >= 60
+    assert counts.max() <= 150
+    # Branches start at 0.5-3.2 m and rise by up to 0.3 m; clusters scatter by 8-10 cm.
+    assert row.positions[:, 2].min() > 0.0
+    assert row.positions[:, 2].max() < 4.0
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_other_rows_have_the_statistics_they_are_named_for(name: str) -> None:
+    shape: RowShape = ROWS[name]
+    row = grow_row(np.random.default_rng(1), 4, shape)
+    counts = np.bincount(row.tree)
+    assert counts.min() >= shape.fruits_per_tree[0]
+    assert counts.max() <= shape.fruits_per_tree[1]
+    nearest = cKDTree(row.positions).query(row.positions, k=2)[0][:, 1]
+    assert nearest.min() >= shape.least_gap_m
+    if name == "single":
+        assert (nearest < 0.10).mean() < 0.5
+    if name == "wall":
+        assert row.positions[:, 1].std() < 0.08
+
+
+def test_a_free_scale_turns_the_query_into_other_units() -> None:
+    scales = [scene_pair("sim3", seed).scale for seed in range(20)]
+    assert 0.5 <= min(scales) < 0.8
+    assert 1.3 < max(scales) <= 2.0
+    pair = scene_pair("sim3", 0)
+    assert np.cbrt(np.linalg.det(pair.map_from_query[:3, :3])) == pytest.approx(pair.scale, rel=1e-12)
+
+
+def test_upright_visits_are_turned_about_the_vertical_and_else_the_same() -> None:
+    upright, turned = scene_pair("part1o45up", 2), scene_pair("part1o45", 2)
+    np.testing.assert_allclose(upright.map_from_query[:3, :3] @ upright.up, upright.up, atol=1e-12)
+    assert turned.up is None
+    assert upright.query.ids == turned.query.ids
+    np.testing.assert_allclose(residuals(upright).std(), residuals(turned).std(), rtol=0.2)
+
+
+def test_sizes_are_those_of_the_same_fruits_after_a_common_growth() -> None:
+    pair, blind = scene_pair("o45s4size", 0), scene_pair("o45s4", 0)
+    np.testing.assert_array_equal(pair.query.positions, blind.query.positions)
+    assert blind.query.diameters_m is None
+    query, map_ = common(pair)
+    growth = pair.query.diameters_m[query] - pair.map.diameters_m[map_]
+    assert growth.mean() == pytest.approx(0.012, abs=0.001)
+    assert growth.std() == pytest.approx(0.002 * np.sqrt(2), rel=0.3)
+    assert pair.map.diameters_m.std() == pytest.approx(0.006, rel=0.3)
+
+
+def test_a_mirrored_query_is_no_rotation_away() -> None:
+    assert np.linalg.det(scene_pair("mirror", 0).map_from_query[:3, :3]) == pytest.approx(-1.0)
+    assert np.linalg.det(scene_pair("base", 0).map_from_query[:3, :3]) == pytest.approx(1.0)
+
+
+def test_a_twin_stands_two_trees_from_its_original() -> None:
+    pair = scene_pair("twins", 0)
+    in_map = pair.query.positions @ pair.map_from_query[:3, :3].T + pair.map_from_query[:3, 3]
+    tree = cKDTree(pair.map.positions)
+    axis = np.linalg.svd(pair.map.positions - pair.map.positions.mean(axis=0))[2][0]
+    hits = {shift: (tree.query(in_map + shift * axis)[0] < 0.06).mean() for shift in (-2.4, -1.2, 0.0, 1.2, 2.4)}
+    twin = max(hits[-2.4], hits[2.4])
+    assert twin > 2.5 * max(hits[-1.2], hits[1.2])
+    assert hits[0.0] > 0.5
+
+
+def test_an_unknown_cell_is_told_with_the_ones_there_are() -> None:
+    with pytest.raises(PomonaError, match=r"'orange'.*expected one of base"):
+        scene_pair("orange", 0)
+    with pytest.raises(PomonaError, match="negative"):
+        scene_pair("base", -1)
+
+
+def run_pomona(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["pomona", *arguments])
+    with pytest.raises(SystemExit) as exit_:
+        main()
+    return exit_.value.code
+
+
+def test_the_command_writes_what_scene_pair_draws(tmp_path, monkeypatch) -> None:
+    assert run_pomona(monkeypatch, "synth", "clouds", "part45", "--seed", "3", "-o", str(tmp_path / "one")) == 0
+    pair = scene_pair("part45", 3)
+    truth = json.loads((tmp_path / "one" / "truth.json").read_text())
+    np.testing.assert_allclose(truth["map_from_query"], pair.map_from_query)
+    query = FruitCloud.read(tmp_path / "one" / "query.csv")
+    assert query.ids == pair.query.ids
+    np.testing.assert_allclose(query.positions, pair.query.positions, atol=1e-6)
+
+    assert run_pomona(monkeypatch, "synth", "clouds", "six", "--seeds", "4:6", "-o", str(tmp_path / "many")) == 0
+    assert sorted(path.name for path in (tmp_path / "many").iterdir()) == sorted(
+        f"{side}_{seed}{suffix}"
+        for side, suffix in (("query", ".csv"), ("map", ".csv"), ("truth", ".json"))
+        for seed in (4, 5)
+    )
+
+
+def test_the_command_refuses_an_empty_range_of_seeds(tmp_path, monkeypatch, capsys) -> None:
+    assert run_pomona(monkeypatch, "synth", "clouds", "base", "--seeds", "6:6", "-o", str(tmp_path / "none")) == 2
+    assert "'6:6', expected FIRST:END" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
