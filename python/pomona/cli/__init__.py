@@ -36,6 +36,11 @@ def _pomona(
     """Find the same fruits again, visit after visit."""
 
 
+# One line a verb, in the order of the work.
+app.add_typer(evaluate.app, name="evaluate")
+app.add_typer(synth.app, name="synth")
+
+
 def main() -> None:
     """Run the command line; wrong input is one line on stderr and exit code 2, a bug is a trace."""
     warnings.showwarning = _warn
