@@ -7,7 +7,7 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import synth
+from pomona.cli import evaluate, synth
 from pomona.errors import PomonaError
 
 app = typer.Typer(
@@ -17,7 +17,6 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.add_typer(synth.app, name="synth")
 
 # Typer does not export click's UsageError: it is what BadParameter derives from, whichever click typer carries.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
