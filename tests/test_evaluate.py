@@ -1,0 +1,110 @@
+"""Precision and recall against truth, from rows and from files."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.evaluate import PairScore, score_pairs
+from pomona.pairs import read_pairs
+
+QUERY_TRUTH = ("a", "b", "c", "only-query")
+MAP_TRUTH = ("c", "only-map", "a", "b")
+
+
+def test_counts_true_false_and_missed() -> None:
+    # a is right, b got the partner of nobody, c got none.
+    score = score_pairs([(0, 2), (1, 1)], QUERY_TRUTH, MAP_TRUTH)
+    assert score == PairScore(true=1, false=1, missed=2)
+    assert score.common == 3
+    assert score.precision == 0.5
+    assert score.recall == pytest.approx(1 / 3)
+
+
+def test_nothing_found_has_no_precision_and_no_overlap_no_recall() -> None:
+    assert score_pairs([], QUERY_TRUTH, MAP_TRUTH).precision is None
+    assert score_pairs([], QUERY_TRUTH, MAP_TRUTH).recall == 0.0
+    assert score_pairs([(0, 0)], ("a",), ("b",)).recall is None
+
+
+def test_a_fruit_of_unknown_truth_counts_neither_way() -> None:
+    assert score_pairs([(0, 0), (1, 1)], ("", "b"), ("a", "b")) == PairScore(true=1, false=0, missed=0, unjudged=1)
+
+
+def test_refuses_a_repeated_id_and_a_row_that_is_not_there() -> None:
+    with pytest.raises(PomonaError, match="map: id 'a' names 2 fruits"):
+        score_pairs([], ("a",), ("a", "a"))
+    with pytest.raises(PomonaError, match="row 4 of the query, found 4 rows"):
+        score_pairs([(4, 0)], QUERY_TRUTH, MAP_TRUTH)
+
+
+@given(st.permutations(range(8)), st.integers(0, 8))
+def test_the_truth_scores_one_and_a_shift_scores_zero(order: list[int], found: int) -> None:
+    truth_in_query = tuple(map(str, range(8)))
+    truth_in_map = tuple(map(str, order))
+    right = [(row, order.index(row)) for row in range(found)]
+    wrong = [(row, order.index((row + 1) % 8)) for row in range(found)]
+    assert score_pairs(right, truth_in_query, truth_in_map) == PairScore(true=found, false=0, missed=8 - found)
+    assert score_pairs(wrong, truth_in_query, truth_in_map) == PairScore(true=0, false=found, missed=8)
+
+
+def test_scores_add_up() -> None:
+    assert PairScore(1, 2, 3, 4) + PairScore(10, 20, 30, 40) == PairScore(11, 22, 33, 44)
+
+
+@pytest.fixture
+def clouds() -> tuple[FruitCloud, FruitCloud]:
+    positions = np.arange(12.0).reshape(4, 3)
+    return FruitCloud(positions, ids=QUERY_TRUTH), FruitCloud(positions, ids=MAP_TRUTH)
+
+
+def test_reads_pairs_by_id_from_csv_and_from_json(tmp_path: Path, clouds: tuple[FruitCloud, FruitCloud]) -> None:
+    as_csv, as_json = tmp_path / "pairs.csv", tmp_path / "match.json"
+    as_csv.write_text("probability,map,query\n0.9,a,a\n0.8,only-map,b\n")
+    as_json.write_text(json.dumps({"matches": [{"query": "a", "map": "a"}, {"query": "b", "map": "only-map"}]}))
+    assert read_pairs(as_csv, *clouds) == read_pairs(as_json, *clouds) == [(0, 2), (1, 1)]
+
+
+def test_reads_rows_where_there_are_no_ids(tmp_path: Path) -> None:
+    cloud = FruitCloud(np.zeros((3, 3)))
+    (tmp_path / "pairs.csv").write_text("query,map\n2,0\n")
+    assert read_pairs(tmp_path / "pairs.csv", cloud, cloud) == [(2, 0)]
+
+
+def test_reads_the_standard_input(monkeypatch: pytest.MonkeyPatch, clouds: tuple[FruitCloud, FruitCloud]) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("query,map\na,a\n"))
+    assert read_pairs(Path("-"), *clouds) == [(0, 2)]
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        ("", "line 1: found nothing, expected a header with the columns query and map"),
+        ("x,y\n1,2\n", "line 1: found x,y, expected a header"),
+        ("query,map\na\n", "line 2: found 1 values, expected 2"),
+        ("query,map\na,a\nzzz,a\n", "line 3: query 'zzz' is no fruit of the query"),
+        ('{"matches": [{"query": "a"}]}', "expected the JSON of `pomona match --json`"),
+        ('{"matches": [{"query": "a", "map": "zzz"}]}', r"matches\[0\]: map 'zzz' is no fruit of the map"),
+        ("{broken", "expected the JSON of `pomona match --json`"),
+    ],
+)
+def test_refuses_what_are_no_pairs(
+    tmp_path: Path, clouds: tuple[FruitCloud, FruitCloud], content: str, complaint: str
+) -> None:
+    path = tmp_path / "pairs.csv"
+    path.write_text(content)
+    with pytest.raises(PomonaError, match=complaint) as caught:
+        read_pairs(path, *clouds)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_refuses_a_missing_file(tmp_path: Path, clouds: tuple[FruitCloud, FruitCloud]) -> None:
+    with pytest.raises(PomonaError, match="cannot be read: No such file"):
+        read_pairs(tmp_path / "none.csv", *clouds)
