@@ -66,8 +66,8 @@ def read(path: Path) -> FruitCloud:
         raise PomonaError(f"{path}: {error}") from None
 
 
-def write(path: Path, cloud: FruitCloud, *, binary: bool = True) -> None:
-    """Write a cloud in metres; coordinates as doubles, so that they read back the same."""
+def write(path: Path, cloud: FruitCloud) -> None:
+    """Write a cloud in metres, binary; coordinates as doubles, so that they read back the same."""
     arrays: dict[str, NDArray[Any]] = {}
     comments: list[str] = []
     for name, column in split(cloud).items():
@@ -83,7 +83,7 @@ def write(path: Path, cloud: FruitCloud, *, binary: bool = True) -> None:
         table[name] = array
     lines = [
         "ply",
-        f"format {'binary_little_endian' if binary else 'ascii'} 1.0",
+        "format binary_little_endian 1.0",
         "comment fruits written by pomona, metres",
         *comments,
         f"element vertex {len(table)}",
@@ -92,10 +92,7 @@ def write(path: Path, cloud: FruitCloud, *, binary: bool = True) -> None:
     ]
     with whole_file(path) as partial, partial.open("wb") as file:
         file.write(("\n".join(lines) + "\n").encode("ascii"))
-        if binary:
-            file.write(table.tobytes())
-        else:
-            file.writelines((" ".join(map(repr, row)) + "\n").encode("ascii") for row in table.tolist())
+        file.write(table.tobytes())
 
 
 def _as_numbers(cells: tuple[str, ...]) -> NDArray[np.int32] | None:

@@ -1,0 +1,228 @@
+"""GeoPackage 1.3 containers by the standard library's sqlite3: no GDAL needed to write what GDAL opens.
+
+Coordinates are local metres without a place on Earth (``srs_id`` -1, undefined Cartesian). That also keeps the R*Tree
+exact enough: it stores 32-bit floats, which are micrometres here and would be 0.4 m in degrees.
+
+Source: OGC 12-128r17, GeoPackage Encoding Standard 1.3; annexes F.1-F.3 for the R*Tree.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pomona.errors import PomonaError
+
+__all__ = ["APPLICATION_ID", "USER_VERSION", "add_table", "connect", "create", "points", "points_of", "told", "touch"]
+
+APPLICATION_ID = 0x47504B47  # "GPKG"
+USER_VERSION = 10300
+UNDEFINED_CARTESIAN = -1
+
+LITTLE_ENDIAN = 1
+WKB_POINT_Z = 1001
+
+POINT_Z = np.dtype(
+    [
+        ("magic", "S2"),
+        ("version", "u1"),
+        ("flags", "u1"),
+        ("srs_id", "<i4"),
+        ("wkb_order", "u1"),
+        ("wkb_type", "<u4"),
+        ("xyz", "<f8", 3),
+    ]
+)
+"""The whole geometry of one point, section 2.1.3; packed, 37 bytes."""
+
+CORE_TABLES = """
+CREATE TABLE gpkg_spatial_ref_sys (
+    srs_name TEXT NOT NULL, srs_id INTEGER PRIMARY KEY, organization TEXT NOT NULL,
+    organization_coordsys_id INTEGER NOT NULL, definition TEXT NOT NULL, description TEXT);
+CREATE TABLE gpkg_contents (
+    table_name TEXT NOT NULL PRIMARY KEY, data_type TEXT NOT NULL, identifier TEXT UNIQUE, description TEXT DEFAULT '',
+    last_change DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
+    min_x DOUBLE, min_y DOUBLE, max_x DOUBLE, max_y DOUBLE,
+    srs_id INTEGER REFERENCES gpkg_spatial_ref_sys(srs_id));
+CREATE TABLE gpkg_geometry_columns (
+    table_name TEXT NOT NULL UNIQUE REFERENCES gpkg_contents(table_name), column_name TEXT NOT NULL,
+    geometry_type_name TEXT NOT NULL, srs_id INTEGER NOT NULL REFERENCES gpkg_spatial_ref_sys(srs_id),
+    z TINYINT NOT NULL, m TINYINT NOT NULL, PRIMARY KEY (table_name, column_name));
+CREATE TABLE gpkg_extensions (
+    table_name TEXT, column_name TEXT, extension_name TEXT NOT NULL, definition TEXT NOT NULL, scope TEXT NOT NULL,
+    UNIQUE (table_name, column_name, extension_name));
+INSERT INTO gpkg_spatial_ref_sys VALUES
+    ('Undefined Cartesian SRS', -1, 'NONE', -1, 'undefined', 'local metres'),
+    ('Undefined geographic SRS', 0, 'NONE', 0, 'undefined', NULL),
+    ('WGS 84 geodetic', 4326, 'EPSG', 4326, 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,
+AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],
+UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]', NULL);
+"""
+
+# {t} is a table with the primary key `id` and the geometry `geom`.
+RTREE = """
+CREATE VIRTUAL TABLE rtree_{t}_geom USING rtree(id, minx, maxx, miny, maxy);
+CREATE TRIGGER rtree_{t}_geom_insert AFTER INSERT ON {t}
+WHEN NEW.geom NOT NULL AND NOT ST_IsEmpty(NEW.geom) BEGIN
+    INSERT OR REPLACE INTO rtree_{t}_geom VALUES
+        (NEW.id, ST_MinX(NEW.geom), ST_MaxX(NEW.geom), ST_MinY(NEW.geom), ST_MaxY(NEW.geom)); END;
+CREATE TRIGGER rtree_{t}_geom_update1 AFTER UPDATE OF geom ON {t}
+WHEN OLD.id = NEW.id AND (NEW.geom NOT NULL AND NOT ST_IsEmpty(NEW.geom)) BEGIN
+    INSERT OR REPLACE INTO rtree_{t}_geom VALUES
+        (NEW.id, ST_MinX(NEW.geom), ST_MaxX(NEW.geom), ST_MinY(NEW.geom), ST_MaxY(NEW.geom)); END;
+CREATE TRIGGER rtree_{t}_geom_update2 AFTER UPDATE OF geom ON {t}
+WHEN OLD.id = NEW.id AND (NEW.geom ISNULL OR ST_IsEmpty(NEW.geom)) BEGIN
+    DELETE FROM rtree_{t}_geom WHERE id = OLD.id; END;
+CREATE TRIGGER rtree_{t}_geom_update3 AFTER UPDATE ON {t}
+WHEN OLD.id != NEW.id AND (NEW.geom NOT NULL AND NOT ST_IsEmpty(NEW.geom)) BEGIN
+    DELETE FROM rtree_{t}_geom WHERE id = OLD.id;
+    INSERT OR REPLACE INTO rtree_{t}_geom VALUES
+        (NEW.id, ST_MinX(NEW.geom), ST_MaxX(NEW.geom), ST_MinY(NEW.geom), ST_MaxY(NEW.geom)); END;
+CREATE TRIGGER rtree_{t}_geom_update4 AFTER UPDATE ON {t}
+WHEN OLD.id != NEW.id AND (NEW.geom ISNULL OR ST_IsEmpty(NEW.geom)) BEGIN
+    DELETE FROM rtree_{t}_geom WHERE id IN (OLD.id, NEW.id); END;
+CREATE TRIGGER rtree_{t}_geom_delete AFTER DELETE ON {t} WHEN OLD.geom NOT NULL BEGIN
+    DELETE FROM rtree_{t}_geom WHERE id = OLD.id; END;
+"""
+
+
+def connect(path: Path, *, create: bool = False, timeout_s: float = 10.0) -> sqlite3.Connection:
+    """Open a file for transactions that the caller begins and ends; foreign keys are enforced.
+
+    A reader opens it writable too where it may: only then can SQLite undo what a killed writer left in the journal.
+    """
+    uri = f"file:{quote(str(path.resolve()))}?mode={'rwc' if create else 'rw'}"
+    connection = sqlite3.connect(uri, uri=True, timeout=timeout_s, isolation_level=None)
+    connection.execute("PRAGMA foreign_keys = ON")
+    for name, corner in {"ST_MinX": 0, "ST_MaxX": 1, "ST_MinY": 2, "ST_MaxY": 3}.items():
+        connection.create_function(name, 1, lambda blob, corner=corner: _bounds(blob)[corner], deterministic=True)
+    connection.create_function("ST_IsEmpty", 1, lambda blob: bool(blob[3] & 0x10), deterministic=True)
+    return connection
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Turn the errors of SQLite into one line that names the file and the reason."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        name = getattr(error, "sqlite_errorname", "") or ""
+        reasons = {
+            "SQLITE_BUSY": "another program is writing to it, try again when it is done",
+            "SQLITE_FULL": "the disk is full; the file is as it was before",
+            "SQLITE_IOERR": f"the disk does not take or give what it should ({name}); the file is as it was before",
+            "SQLITE_READONLY": "cannot be written: the file or its folder is read-only",
+            "SQLITE_CANTOPEN": "cannot be opened: is it there, and may it be read?",
+            "SQLITE_NOTADB": "is not a GeoPackage",
+            "SQLITE_CORRUPT": "is damaged; restore it from a copy",
+        }
+        reason = next((text for code, text in reasons.items() if name.startswith(code)), None)
+        if reason is None:
+            raise
+        raise PomonaError(f"{path}: {reason}") from None
+
+
+def create(connection: sqlite3.Connection) -> None:
+    """Make an empty database a GeoPackage, inside the transaction that is open."""
+    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+    connection.execute(f"PRAGMA user_version = {USER_VERSION}")
+    execute_all(connection, CORE_TABLES)
+
+
+def add_table(connection: sqlite3.Connection, name: str, columns: str, description: str, geometry: str = "") -> None:
+    """Add a layer with the primary key ``id``.
+
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+        A GeoPackage with an open transaction.
+    name : str
+        Name of the table.
+    columns : str
+        SQL of the columns after ``id`` and ``geom``.
+    description : str
+        One line that other programs show.
+    geometry : {"", "POINT", "LINESTRING"}
+        Type of the three-dimensional geometry ``geom``; nothing for a table without.
+    """
+    columns = f"geom {geometry}, {columns}" if geometry else columns
+    # AUTOINCREMENT: a number is never given out a second time, even after its row was deleted.
+    connection.execute(f"CREATE TABLE {name} (id INTEGER PRIMARY KEY AUTOINCREMENT, {columns})")
+    connection.execute(
+        "INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id) VALUES (?, ?, ?, ?, ?)",
+        (name, "features" if geometry else "attributes", name, description, UNDEFINED_CARTESIAN if geometry else None),
+    )
+    if geometry:
+        connection.execute(
+            "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', ?, ?, 1, 0)", (name, geometry, UNDEFINED_CARTESIAN)
+        )
+        connection.execute(
+            "INSERT INTO gpkg_extensions VALUES (?, 'geom', 'gpkg_rtree_index', ?, 'write-only')",
+            (name, "http://www.geopackage.org/spec120/#extension_rtree"),
+        )
+        execute_all(connection, RTREE.format(t=name))
+
+
+def touch(connection: sqlite3.Connection, name: str, last_change: str) -> None:
+    """Bring the extent and the time of a layer in the contents up to date; `last_change` is ISO 8601, UTC."""
+    has_geometry = connection.execute("SELECT 1 FROM gpkg_geometry_columns WHERE table_name = ?", (name,)).fetchone()
+    extent: tuple[float | None, ...] = (None, None, None, None)
+    if has_geometry:
+        extent = connection.execute(
+            f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM rtree_{name}_geom"
+        ).fetchone()
+    connection.execute(
+        "UPDATE gpkg_contents SET min_x = ?, min_y = ?, max_x = ?, max_y = ?, last_change = ? WHERE table_name = ?",
+        (*extent, last_change, name),
+    )
+
+
+def execute_all(connection: sqlite3.Connection, script: str) -> None:
+    """Run the statements of a script inside the open transaction (`executescript` would commit it)."""
+    statement = ""
+    for row in script.splitlines(keepends=True):
+        statement += row
+        if sqlite3.complete_statement(statement):
+            connection.execute(statement)
+            statement = ""
+
+
+def points(positions: ArrayLike) -> list[bytes]:
+    """Encode (N, 3) coordinates as GeoPackage points."""
+    xyz = np.asarray(positions, dtype=np.float64)
+    blobs = np.zeros(len(xyz), dtype=POINT_Z)
+    blobs["magic"], blobs["flags"], blobs["srs_id"] = b"GP", LITTLE_ENDIAN, UNDEFINED_CARTESIAN
+    blobs["wkb_order"], blobs["wkb_type"], blobs["xyz"] = LITTLE_ENDIAN, WKB_POINT_Z, xyz
+    whole = blobs.tobytes()
+    return [whole[start : start + POINT_Z.itemsize] for start in range(0, len(whole), POINT_Z.itemsize)]
+
+
+def points_of(blobs: Sequence[bytes]) -> NDArray[np.float64]:
+    """Decode points to (N, 3) coordinates; the inverse of `points`.
+
+    Raises
+    ------
+    PomonaError
+        When a geometry is something else, as another program may have written.
+    """
+    row = next((row for row, blob in enumerate(blobs) if len(blob or b"") != POINT_Z.itemsize), None)
+    if row is None:
+        decoded = np.frombuffer(b"".join(blobs), dtype=POINT_Z)
+        ours = (decoded["magic"] == b"GP") & (decoded["flags"] == LITTLE_ENDIAN) & (decoded["wkb_type"] == WKB_POINT_Z)
+        if ours.all():
+            return decoded["xyz"].astype(np.float64)
+        row = int(np.argmin(ours))
+    raise PomonaError(f"geometry {row} in order of id is not a little-endian POINT Z")
+
+
+def _bounds(point: bytes) -> tuple[float, float, float, float]:
+    """Return min x, max x, min y, max y of a point as this module writes it."""
+    x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
+    return x, x, y, y

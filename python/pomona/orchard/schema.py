@@ -1,0 +1,140 @@
+"""The tables of an orchard map and of a session, and which files are ours."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+from pomona import __version__, geopackage
+from pomona.errors import PomonaError
+
+__all__ = ["FORMAT_VERSION", "Kind", "create", "is_blank", "kind_of", "opened", "snapshot", "transaction"]
+
+FORMAT_VERSION = 1
+"""Counts the changes of the tables below. Version 1 is the first: no older file exists that could be migrated."""
+
+Kind = Literal["session", "map"]
+
+LAYERS = (
+    (
+        "sessions",
+        "",
+        """name TEXT NOT NULL UNIQUE, date TEXT NOT NULL, recording TEXT NOT NULL, content_sha256 TEXT NOT NULL UNIQUE,
+        map_from_session TEXT NOT NULL, program_version TEXT NOT NULL, configuration TEXT NOT NULL,
+        input_hashes TEXT NOT NULL, method TEXT, log_odds REAL, noise_m REAL""",
+        "visits: date, recording, 4x4 transform into the map, provenance",
+    ),
+    ("rows", "LINESTRING", "name TEXT", "rows of trees"),
+    ("trees", "POINT", "name TEXT, row_id INTEGER REFERENCES rows(id)", "trees"),
+    (
+        "fruits",
+        "POINT",
+        """state TEXT NOT NULL CHECK (state IN ('seen', 'missed')), last_seen TEXT NOT NULL,
+        last_session_id INTEGER NOT NULL REFERENCES sessions(id), n_sessions INTEGER NOT NULL, diameter_m REAL,
+        tree_id INTEGER REFERENCES trees(id)""",
+        "fruits where they were last seen; id is the fruit's for good",
+    ),
+    (
+        "observations",
+        "POINT",
+        """session_id INTEGER NOT NULL REFERENCES sessions(id), fruit_id INTEGER NOT NULL REFERENCES fruits(id),
+        label TEXT, diameter_m REAL, cxx REAL, cyy REAL, czz REAL, cxy REAL, cxz REAL, cyz REAL, n_views INTEGER,
+        match_probability REAL, match_distance_m REAL, other_columns TEXT, UNIQUE (session_id, fruit_id)""",
+        "what each session saw of each fruit, in the map's frame",
+    ),
+    (
+        "sightings",
+        "",
+        "observation_id INTEGER NOT NULL REFERENCES observations(id), frame INTEGER NOT NULL",
+        "which frame saw which fruit",
+    ),
+    (
+        "poses",
+        "POINT",
+        """session_id INTEGER NOT NULL REFERENCES sessions(id), frame INTEGER NOT NULL, time_s REAL NOT NULL,
+        qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, qw REAL NOT NULL, UNIQUE (session_id, frame)""",
+        "cameras of each session in the map's frame: position and orientation (map_from_camera)",
+    ),
+)
+"""Name, geometry, columns and description of each layer."""
+
+INDEXES = """
+CREATE INDEX observations_by_fruit ON observations (fruit_id);
+CREATE INDEX sightings_by_observation ON sightings (observation_id);
+"""
+
+
+def create(connection: sqlite3.Connection, kind: Kind) -> None:
+    """Lay out an empty map in an empty database, inside the open transaction."""
+    geopackage.create(connection)
+    geopackage.add_table(
+        connection,
+        "pomona_format",
+        "format_version INTEGER NOT NULL, kind TEXT NOT NULL, program_version TEXT NOT NULL",
+        "version of these tables, and whether this is a session or a map",
+    )
+    connection.execute("INSERT INTO pomona_format VALUES (1, ?, ?, ?)", (FORMAT_VERSION, kind, __version__))
+    for name, geometry, columns, description in LAYERS:
+        geopackage.add_table(connection, name, columns, description, geometry)
+    geopackage.execute_all(connection, INDEXES)
+
+
+def is_blank(connection: sqlite3.Connection) -> bool:
+    """Tell whether nothing was ever committed to the database."""
+    return connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None
+
+
+def kind_of(connection: sqlite3.Connection, path: Path) -> Kind:
+    """Return what the file is; refuse one that is not ours or from a newer program."""
+    (application_id,) = connection.execute("PRAGMA application_id").fetchone()
+    if application_id != geopackage.APPLICATION_ID:
+        raise PomonaError(f"{path}: is not a GeoPackage: application id {application_id:#x}, expected 'GPKG'")
+    if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'pomona_format'").fetchone():
+        raise PomonaError(f"{path}: is a GeoPackage but not one of pomona: it has no table pomona_format")
+    row = connection.execute("SELECT format_version, kind FROM pomona_format").fetchone()
+    version, kind = row or (None, None)
+    if isinstance(version, int) and version > FORMAT_VERSION:
+        raise PomonaError(f"{path}: has format {version}, this program reads up to {FORMAT_VERSION}: update pomona")
+    if version != FORMAT_VERSION or kind not in ("session", "map"):
+        raise PomonaError(f"{path}: has format {version!r} and kind {kind!r}, expected 1 and 'session' or 'map'")
+    return "session" if kind == "session" else "map"
+
+
+@contextmanager
+def opened(
+    path: Path, *, create: bool = False, shown: Path | None = None, timeout_s: float = 10.0
+) -> Iterator[sqlite3.Connection]:
+    """Open and close a file; the errors of SQLite come as one line that names it, or `shown` for a temporary one."""
+    if not create and not path.is_file():
+        raise PomonaError(f"{path}: is not there, expected a session or a map (.gpkg)")
+    with geopackage.told(shown or path):
+        connection = geopackage.connect(path, create=create, timeout_s=timeout_s)
+        try:
+            yield connection
+        finally:
+            connection.close()
+
+
+@contextmanager
+def snapshot(path: Path) -> Iterator[tuple[sqlite3.Connection, Kind]]:
+    """Read a file of ours as it was at one moment, whatever is written meanwhile."""
+    with opened(path) as connection:
+        connection.execute("BEGIN")
+        yield connection, kind_of(connection, path)
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """Let nobody else write from here on; all of the block is kept, or nothing when it raises."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # A full disk may have ended the transaction already.
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise

@@ -1,0 +1,99 @@
+"""One visit: the fruits, when and how they were recorded, and what they were made from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from pomona import __version__
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.trajectory import Trajectory
+
+__all__ = ["Session"]
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One visit in its own frame of reference.
+
+    Attributes
+    ----------
+    name : str
+        Name of the session, used once in a map.
+    date : str
+        Local date or date and time of the visit, ISO 8601: ``2021-09-27`` or ``2021-09-27T11:40:12``.
+    recording : str
+        Where the session came from.
+    cloud : FruitCloud
+        Its fruits; ids are the session's own names, of which the map keeps a note and nothing more.
+    trajectory : Trajectory, optional
+        Camera poses.
+    configuration : mapping
+        Effective settings of the program that made the cloud, JSON values.
+    input_hashes : mapping of str to str
+        File name to SHA-256 of the inputs.
+    program_version : str
+        Version of the program that made the cloud.
+    """
+
+    name: str
+    date: str
+    recording: str
+    cloud: FruitCloud
+    trajectory: Trajectory | None = None
+    configuration: Mapping[str, object] = field(default_factory=dict)
+    input_hashes: Mapping[str, str] = field(default_factory=dict)
+    program_version: str = __version__
+
+    def __post_init__(self) -> None:
+        if not self.name.strip():
+            raise PomonaError("session: found an empty name, expected one that is used once in a map")
+        object.__setattr__(self, "date", _iso_date(self.date))
+        _json("configuration", self.configuration)
+
+    @property
+    def content_sha256(self) -> str:
+        """Hash of what was seen, whatever the session is called."""
+        digest = hashlib.sha256()
+        cloud = self.cloud
+        views = (None, None) if cloud.views is None else (cloud.views.frames, cloud.views.fruits)
+        for array in (cloud.positions, cloud.diameters_m, cloud.covariances, cloud.n_views, *views):
+            # The length in front keeps two different lists of arrays from running into the same bytes.
+            content = b"" if array is None else array.tobytes()
+            digest.update(len(content).to_bytes(8, "little") + content)
+        digest.update(_json("ids", cloud.ids).encode())
+        return digest.hexdigest()
+
+    @property
+    def configuration_json(self) -> str:
+        """The configuration as the files hold it."""
+        return _json("configuration", self.configuration)
+
+    @property
+    def input_hashes_json(self) -> str:
+        """The input hashes as the files hold them."""
+        return _json("input_hashes", self.input_hashes)
+
+
+def _iso_date(date: str) -> str:
+    try:
+        moment = datetime.fromisoformat(date)
+    except ValueError:
+        raise PomonaError(
+            f"session: found the date {date!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
+        ) from None
+    if moment.tzinfo is not None:
+        # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
+        raise PomonaError(f"session: found the date {date!r} with a time zone, expected the orchard's local time")
+    return moment.date().isoformat() if len(date) <= len("2021-09-27") else moment.isoformat()
+
+
+def _json(name: str, value: object) -> str:
+    try:
+        return json.dumps(dict(value) if isinstance(value, Mapping) else value, sort_keys=True, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise PomonaError(f"session: {name} is not JSON: {error}") from None

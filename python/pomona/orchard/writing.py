@@ -1,0 +1,219 @@
+"""Rows of a session into the tables; every function works inside the transaction that is open."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.atomic import whole_file
+from pomona.cloud import FruitCloud
+from pomona.orchard import schema
+from pomona.orchard.session import Session
+from pomona.trajectory import Trajectory
+
+__all__ = ["Placement", "insert_fruits", "insert_observations", "insert_session", "update_layers", "write_session"]
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """How a session came to its place in the map: what `sessions` notes of the match. Without one, it is the frame."""
+
+    map_from_session: NDArray[np.float64]
+    method: str
+    log_odds: float
+    noise_m: float
+
+
+def write_session(
+    path: str | Path,
+    cloud: FruitCloud,
+    *,
+    name: str,
+    date: str,
+    recording: str,
+    trajectory: Trajectory | None = None,
+    configuration: Mapping[str, object] | None = None,
+    input_hashes: Mapping[str, str] | None = None,
+) -> None:
+    """Write one visit as a map with one session (GeoPackage); the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The .gpkg file; an existing one is replaced.
+    cloud : FruitCloud
+        Fruits in the session's frame, metres; ids are the session's own names of the fruits.
+    name : str
+        Name of the session, used once in a map.
+    date : str
+        Local ISO 8601 date or date and time, for example ``2021-09-27`` or ``2021-09-27T11:40:12``.
+    recording : str
+        Where the session came from.
+    trajectory : Trajectory, optional
+        Camera poses in the session's frame.
+    configuration : mapping, optional
+        Effective settings of the program that made the cloud, JSON values.
+    input_hashes : mapping, optional
+        File name to SHA-256 of the inputs.
+
+    Raises
+    ------
+    PomonaError
+        When the date is not one, the configuration is not JSON or the file cannot be written.
+    """
+    session = Session(name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {})
+    with (
+        whole_file(path) as partial,
+        schema.opened(partial, create=True, shown=Path(path)) as connection,
+        schema.transaction(connection),
+    ):
+        schema.create(connection, "session")
+        session_id = insert_session(connection, session)
+        fruit_ids = insert_fruits(connection, session_id, session.date, cloud)
+        insert_observations(connection, session_id, fruit_ids, cloud)
+        update_layers(connection)
+
+
+def insert_session(connection: sqlite3.Connection, session: Session, placement: Placement | None = None) -> int:
+    """Add the session, its provenance and its poses; return its number. Fruits follow."""
+    map_from_session = np.eye(4) if placement is None else placement.map_from_session
+    cursor = connection.execute(
+        """INSERT INTO sessions (name, date, recording, content_sha256, map_from_session, program_version,
+        configuration, input_hashes, method, log_odds, noise_m) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)""",
+        (
+            session.name,
+            session.date,
+            session.recording,
+            session.content_sha256,
+            json.dumps(map_from_session.tolist()),
+            session.program_version,
+            session.configuration_json,
+            session.input_hashes_json,
+            *((placement.method, placement.log_odds, placement.noise_m) if placement else (None, None, None)),
+        ),
+    )
+    session_id = int(cursor.lastrowid or 0)
+    if session.trajectory is not None:
+        _insert_poses(connection, session_id, session.trajectory, map_from_session)
+    return session_id
+
+
+def insert_fruits(
+    connection: sqlite3.Connection, session_id: int, date: str, cloud_in_map: FruitCloud
+) -> NDArray[np.int64]:
+    """Give new fruits their ids, (N,), in order of rows."""
+    if not len(cloud_in_map):
+        return np.empty(0, np.int64)
+    (last,) = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'fruits'").fetchone()
+    ids = np.arange(last + 1, last + 1 + len(cloud_in_map))
+    connection.executemany(
+        """INSERT INTO fruits (id, geom, state, last_seen, last_session_id, n_sessions, diameter_m)
+        VALUES (?, ?, 'seen', ?, ?, 1, ?)""",
+        (
+            (fruit_id, geom, date, session_id, diameter_m)
+            for fruit_id, geom, diameter_m in zip(
+                ids.tolist(), geopackage.points(cloud_in_map.positions), _diameters(cloud_in_map), strict=True
+            )
+        ),
+    )
+    return ids
+
+
+def insert_observations(
+    connection: sqlite3.Connection,
+    session_id: int,
+    fruit_ids: NDArray[np.int64],
+    cloud_in_map: FruitCloud,
+    probabilities: NDArray[np.float64] | None = None,
+    distances_m: NDArray[np.float64] | None = None,
+) -> None:
+    """Add what the session saw of each fruit, one row of the cloud each; NaN where nothing was matched."""
+    n = len(cloud_in_map)
+    (last,) = connection.execute(
+        "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'observations'"
+    ).fetchone()
+    cells = np.full((n, 6), np.nan)
+    if cloud_in_map.covariances is not None:
+        cells = cloud_in_map.covariances.reshape(n, 9)[:, [0, 4, 8, 1, 2, 5]]
+    blank = np.full(n, np.nan)
+    columns = zip(
+        range(last + 1, last + 1 + n),
+        geopackage.points(cloud_in_map.positions),
+        fruit_ids.tolist(),
+        cloud_in_map.ids or [None] * n,
+        _diameters(cloud_in_map),
+        *(_nullable(column) for column in cells.T),
+        [None] * n if cloud_in_map.n_views is None else cloud_in_map.n_views.tolist(),
+        _nullable(blank if probabilities is None else probabilities),
+        _nullable(blank if distances_m is None else distances_m),
+        _other_columns(cloud_in_map),
+        strict=True,
+    )
+    connection.executemany(
+        f"""INSERT INTO observations (session_id, id, geom, fruit_id, label, diameter_m, cxx, cyy, czz, cxy, cxz, cyz,
+        n_views, match_probability, match_distance_m, other_columns) VALUES ({session_id:d}{", ?" * 15})""",
+        columns,
+    )
+    if cloud_in_map.views is not None:
+        connection.executemany(
+            "INSERT INTO sightings (observation_id, frame) VALUES (?, ?)",
+            zip(
+                (cloud_in_map.views.fruits + last + 1).tolist(),
+                cloud_in_map.views.frames.tolist(),
+                strict=True,
+            ),
+        )
+
+
+def update_layers(connection: sqlite3.Connection) -> None:
+    """Bring extents and times up to date; the time is the newest visit's: the same input gives the same file."""
+    (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
+    day, _, time = newest.partition("T")
+    for name in ("pomona_format", *(layer[0] for layer in schema.LAYERS)):
+        geopackage.touch(connection, name, f"{day}T{time[:8] or '00:00:00'}.000Z")
+
+
+def _insert_poses(
+    connection: sqlite3.Connection, session_id: int, trajectory: Trajectory, map_from_session: NDArray[np.float64]
+) -> None:
+    from scipy.spatial.transform import Rotation
+
+    if not len(trajectory):
+        return
+    map_from_camera = map_from_session @ trajectory.session_from_camera
+    quaternions = Rotation.from_matrix(map_from_camera[:, :3, :3]).as_quat(canonical=True)
+    connection.executemany(
+        "INSERT INTO poses (session_id, geom, frame, time_s, qx, qy, qz, qw) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        (
+            (session_id, geom, frame, time_s, *quaternion)
+            for geom, frame, time_s, quaternion in zip(
+                geopackage.points(map_from_camera[:, :3, 3]),
+                trajectory.frames.tolist(),
+                trajectory.times_s.tolist(),
+                quaternions.tolist(),
+                strict=True,
+            )
+        ),
+    )
+
+
+def _nullable(column: NDArray[np.float64]) -> list[float | None]:
+    return [None if value != value else value for value in column.tolist()]
+
+
+def _diameters(cloud: FruitCloud) -> list[float | None]:
+    return [None] * len(cloud) if cloud.diameters_m is None else _nullable(cloud.diameters_m)
+
+
+def _other_columns(cloud: FruitCloud) -> list[str | None]:
+    if not cloud.extras:
+        return [None] * len(cloud)
+    names = list(cloud.extras)
+    return [json.dumps(dict(zip(names, row, strict=True))) for row in zip(*cloud.extras.values(), strict=True)]
