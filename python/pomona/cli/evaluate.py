@@ -21,9 +21,13 @@ def _evaluate() -> None:
 
 @app.command("match")
 def evaluate_match(
-    query: Path = typer.Argument(help="The cloud that was matched, with true ids (.csv, .ply, .gpkg)."),
-    map: Path = typer.Argument(help="The cloud it was matched with, with true ids."),
-    pairs: Path = typer.Argument(help="What `pomona match` wrote with -o or --json; - reads the standard input."),
+    query: Path = typer.Argument(
+        metavar="QUERY", help="The cloud that was matched, with true ids (.csv, .ply, .gpkg)."
+    ),
+    map: Path = typer.Argument(metavar="MAP", help="The cloud it was matched with, with true ids."),
+    pairs: Path = typer.Argument(
+        metavar="PAIRS", help="What `pomona match` wrote with -o or --json; - reads the standard input."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
 ) -> None:
     """Precision and recall of a match: a pair is right where both fruits carry the same id."""

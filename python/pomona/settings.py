@@ -1,0 +1,125 @@
+"""Settings of a match: flags beat the file, the file beats the defaults, and an unknown name is an error."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pomona.errors import PomonaError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from pomona.cloud import FruitCloud
+    from pomona.matching import Match
+
+# Table of the file that holds what `pomona.match` is told by name; the other tables are the core's.
+_CALL_TABLE = "match"
+_CALL_NAMES = ("method", "scale", "noise_m", "up", "per_frame", "threads")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a match runs with.
+
+    Attributes
+    ----------
+    call
+        Arguments of `pomona.match`, defaults included.
+    overrides
+        Values of the core's tables that the file changes.
+    """
+
+    call: Mapping[str, Any]
+    overrides: Mapping[str, Any]
+
+    @classmethod
+    def load(cls, path: Path | None, flags: Mapping[str, Any]) -> Settings:
+        """Put together the defaults, the file at `path` and the flags that were given (None: not given).
+
+        Raises
+        ------
+        PomonaError
+            The file is missing, is no TOML, or names a setting that does not exist.
+        """
+        from pomona.matching import default_config
+
+        tables = {} if path is None else _read_toml(path)
+        from_file = tables.pop(_CALL_TABLE, {})
+        known = {_CALL_TABLE: dict.fromkeys(_CALL_NAMES), **default_config()}
+        _refuse_unknown(path, {_CALL_TABLE: from_file, **tables}, known)
+        given = {name: value for name, value in flags.items() if value is not None}
+        return cls(call={**_defaults_of_match(), **from_file, **given}, overrides=tables)
+
+    def match(self, query: FruitCloud, map: FruitCloud) -> Match:
+        """Run `pomona.match` with these settings."""
+        from pomona.matching import match
+
+        return match(query, map, **self.call, config=self.overrides)
+
+    def as_toml(self) -> str:
+        """Return every effective value; reading it back gives the same settings."""
+        from pomona.matching import default_config
+
+        tables = {_CALL_TABLE: self.call, **_merged(default_config(), self.overrides)}
+        return "\n".join(_toml_lines(tables))
+
+
+def _defaults_of_match() -> dict[str, Any]:
+    from pomona.matching import match
+
+    parameters = inspect.signature(match).parameters
+    return {name: parameters[name].default for name in _CALL_NAMES}
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # covers TOMLDecodeError and UnicodeDecodeError
+        raise PomonaError(f"{path}: is not TOML: {error}") from None
+
+
+def _refuse_unknown(path: Path | None, found: Mapping[str, Any], known: Mapping[str, Any], table: str = "") -> None:
+    for name, value in found.items():
+        if name not in known:
+            raise PomonaError(f"{path}: unknown setting {table}{name}, expected one of {', '.join(known)}")
+        expected = known[name]
+        if isinstance(expected, dict):
+            if not isinstance(value, dict):
+                raise PomonaError(f"{path}: {table}{name}: found {value!r}, expected a table")
+            _refuse_unknown(path, value, expected, f"{table}{name}.")
+
+
+def _merged(defaults: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(defaults)
+    for name, value in overrides.items():
+        merged[name] = _merged(defaults[name], value) if isinstance(value, dict) else value
+    return merged
+
+
+def _toml_lines(tables: Mapping[str, Any], place: str = "") -> Iterator[str]:
+    """Values first, then the tables below, as TOML asks; None has no value in TOML and becomes a comment."""
+    inner = {name: value for name, value in tables.items() if isinstance(value, dict)}
+    for name, value in tables.items():
+        if name not in inner:
+            yield f"# {name} is not set" if value is None else f"{name} = {_toml_value(value)}"
+    for name, table in inner.items():
+        yield f"\n[{place}{name}]" if place or tables is not inner else f"[{place}{name}]"
+        yield from _toml_lines(table, f"{place}{name}.")
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        import json
+
+        return json.dumps(value)  # a JSON string is a TOML basic string
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    return repr(value)
