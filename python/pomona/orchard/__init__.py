@@ -1,7 +1,24 @@
 """The orchard map: fruits with one identity over all sessions, in one GeoPackage file."""
 
+from pomona.orchard.adding import Added, add_session
+from pomona.orchard.integrity import problems
+from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
 from pomona.orchard.reading import load_session, read_cloud, read_session
+from pomona.orchard.schema import FORMAT_VERSION
 from pomona.orchard.session import Session
 from pomona.orchard.writing import write_session
 
-__all__ = ["Session", "load_session", "read_cloud", "read_session", "write_session"]
+__all__ = [
+    "FORMAT_VERSION",
+    "Added",
+    "Observations",
+    "OrchardMap",
+    "Session",
+    "Visit",
+    "add_session",
+    "load_session",
+    "problems",
+    "read_cloud",
+    "read_session",
+    "write_session",
+]

@@ -1,0 +1,211 @@
+"""A session into the map: its fruits are recognised there, and get the identities that only the map gives out."""
+
+from __future__ import annotations
+
+import sqlite3
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.orchard import schema
+from pomona.orchard.reading import fruits_in_map
+from pomona.orchard.session import Session
+from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
+
+if TYPE_CHECKING:
+    from pomona.matching import Match
+
+__all__ = ["Added", "add_session"]
+
+NEIGHBOURS = 5
+"""A fruit was in view when most of its five nearest fruits were seen: as many as make a constellation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Added:
+    """What became of a session.
+
+    Attributes
+    ----------
+    fruit_ids : (N,) int64
+        Identity of each fruit of the session; 0 for all when the session was not added.
+    n_matched, n_new, n_missed : int
+        Fruits known before, fruits of which the session is the first sight, fruits of the map that hang where the
+        session looked and were not seen.
+    match : Match, optional
+        How the session was found in the map; None for the first session.
+    """
+
+    fruit_ids: NDArray[np.int64]
+    n_matched: int
+    n_new: int
+    n_missed: int
+    match: Match | None
+
+    @property
+    def is_added(self) -> bool:
+        """Whether the map holds the session now."""
+        return self.match is None or self.match.status.value == "Found"
+
+
+def add_session(
+    path: str | Path, session: Session, *, method: str = "verified", timeout_s: float = 10.0, **matching: Any
+) -> Added:
+    """Recognise a session's fruits in the map and add it; the first session starts the map.
+
+    All of it happens in one transaction: a crash, a full disk or a kill leaves the map as it was. When the session is
+    not found in the map, nothing is written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The map (.gpkg); it is made when it is not there.
+    session : Session
+        The visit to add.
+    method : {"verified", "paper"}
+        How to match, as in `pomona.match`.
+    timeout_s : float
+        How long to wait for another program that is writing to the map.
+    **matching
+        Other settings of `pomona.match`, for example ``noise_m``.
+
+    Raises
+    ------
+    PomonaError
+        When the file is not a map of ours, holds the session already or cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".gpkg":
+        raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected .gpkg for a map")
+    if not len(session.cloud):
+        raise PomonaError(f"session {session.name}: has no fruits, expected at least one")
+    was_there = path.exists()
+    try:
+        with (
+            schema.opened(path, create=True, timeout_s=timeout_s) as connection,
+            schema.transaction(connection),
+        ):
+            return _add(connection, path, session, method, matching)
+    except BaseException:
+        # SQLite makes the file before the first commit; a map that never was shall leave none.
+        if not was_there and path.exists() and path.stat().st_size == 0:
+            path.unlink()
+        raise
+
+
+def _add(connection: sqlite3.Connection, path: Path, session: Session, method: str, matching: dict[str, Any]) -> Added:
+    if schema.is_blank(connection):
+        schema.create(connection, "map")
+        return _start(connection, session)
+    if schema.kind_of(connection, path) != "map":
+        raise PomonaError(f"{path}: is the file of one session, expected a map; `map add` makes one from it")
+    _require_new(connection, path, session)
+    known = fruits_in_map(connection)
+    if not len(known):
+        return _start(connection, session)
+
+    from pomona.matching import match
+
+    found = match(session.cloud, known, method=method, **matching)
+    if found.status.value != "Found":
+        return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
+    return _join(connection, session, known, found, method)
+
+
+def _start(connection: sqlite3.Connection, session: Session) -> Added:
+    """Make the session's frame the map's, and each of its fruits a new one."""
+    session_id = insert_session(connection, session)
+    fruit_ids = insert_fruits(connection, session_id, session.date, session.cloud)
+    insert_observations(connection, session_id, fruit_ids, session.cloud)
+    update_layers(connection)
+    return Added(fruit_ids, 0, len(fruit_ids), 0, None)
+
+
+def _join(connection: sqlite3.Connection, session: Session, known: FruitCloud, found: Match, method: str) -> Added:
+    """Write the session: matched fruits keep their ids, the others get new ones, the map moves with the tree."""
+    assert found.map_from_query is not None
+    assert known.ids is not None
+    cloud_in_map = session.cloud.transformed(found.map_from_query)
+    known_ids = np.array(known.ids, dtype=np.int64)
+    is_newest = _is_newest(connection, session.date)
+    session_id = insert_session(
+        connection, session, Placement(found.map_from_query, method, found.log_odds, found.noise_m)
+    )
+    rows, known_rows = found.pairs[:, 0], found.pairs[:, 1]
+    fruit_ids = np.zeros(len(cloud_in_map), dtype=np.int64)
+    fruit_ids[rows] = known_ids[known_rows]
+    is_new = np.ones(len(cloud_in_map), dtype=bool)
+    is_new[rows] = False
+    fruit_ids[is_new] = insert_fruits(connection, session_id, session.date, cloud_in_map.select(is_new))
+
+    probabilities = np.full(len(cloud_in_map), np.nan)
+    probabilities[rows] = found.probabilities
+    distances_m = np.full(len(cloud_in_map), np.nan)
+    distances_m[rows] = found.distances_m
+    insert_observations(connection, session_id, fruit_ids, cloud_in_map, probabilities, distances_m)
+
+    _move_fruits(connection, session_id, session.date, cloud_in_map.select(rows), fruit_ids[rows])
+    missed = _missed(known, known_rows)
+    if is_newest:
+        connection.executemany(
+            "UPDATE fruits SET state = 'missed' WHERE id = ?", ((i,) for i in known_ids[missed].tolist())
+        )
+    update_layers(connection)
+    return Added(fruit_ids, len(rows), int(is_new.sum()), len(missed), found)
+
+
+def _require_new(connection: sqlite3.Connection, path: Path, session: Session) -> None:
+    """Refuse a session that is in the map: by its name, by what it saw or by what it was made from."""
+    for name, content_sha256, input_hashes in connection.execute(
+        "SELECT name, content_sha256, input_hashes FROM sessions ORDER BY id"
+    ):
+        if name == session.name:
+            raise PomonaError(f"{path}: session {name} is in the map already")
+        if content_sha256 == session.content_sha256:
+            raise PomonaError(f"{path}: session {session.name} is in the map already, as {name}: the same fruits")
+        if session.input_hashes and input_hashes == session.input_hashes_json:
+            raise PomonaError(f"{path}: session {session.name} is in the map already, as {name}: the same input files")
+
+
+def _is_newest(connection: sqlite3.Connection, date: str) -> bool:
+    (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
+    return bool(date >= newest)
+
+
+def _move_fruits(
+    connection: sqlite3.Connection, session_id: int, date: str, matched_in_map: FruitCloud, fruit_ids: NDArray[np.int64]
+) -> None:
+    """Put matched fruits where the session saw them, unless a later visit has seen them since."""
+    ids = fruit_ids.tolist()
+    connection.executemany("UPDATE fruits SET n_sessions = n_sessions + 1 WHERE id = ?", ((i,) for i in ids))
+    diameters_m = matched_in_map.diameters_m
+    sizes = [None] * len(ids) if diameters_m is None else [d if d == d else None for d in diameters_m.tolist()]
+    connection.executemany(
+        """UPDATE fruits SET geom = ?, state = 'seen', last_seen = ?, last_session_id = ?,
+        diameter_m = coalesce(?, diameter_m) WHERE id = ? AND last_seen <= ?""",
+        (
+            (geom, date, session_id, size, fruit_id, date)
+            for geom, size, fruit_id in zip(geopackage.points(matched_in_map.positions), sizes, ids, strict=True)
+        ),
+    )
+
+
+def _missed(known: FruitCloud, matched_rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the rows of known fruits that were in view, by their neighbours, and were not matched."""
+    from scipy.spatial import cKDTree
+
+    seen = np.zeros(len(known), dtype=bool)
+    seen[matched_rows] = True
+    neighbours = min(NEIGHBOURS, len(known) - 1)
+    unseen = np.flatnonzero(~seen)
+    if not neighbours or not len(unseen):
+        return unseen[:0]
+    _, nearest = cKDTree(known.positions).query(known.positions[unseen], k=list(range(2, neighbours + 2)))
+    in_view: NDArray[np.bool_] = 2 * seen[nearest].sum(axis=1) > neighbours
+    return unseen[in_view]
