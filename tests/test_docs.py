@@ -1,0 +1,85 @@
+"""What the pages say works: their examples run, their links lead somewhere, their tasks exist."""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+page_parameter = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+
+# `make TARGET` in an example is checked to exist, not run: it would build what runs this test.
+MAKE_CHECKS_TARGETS = 'make() { for target in "$@"; do grep -q "^$target:" "$MAKEFILE"; done; }\n'
+
+
+@dataclass(frozen=True)
+class Example:
+    language: str
+    code: str
+    line: int
+
+
+def examples_of(page: Path) -> Iterator[Example]:
+    text = page.read_text(encoding="utf-8")
+    for block in re.finditer(r"^```(\w+)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
+        yield Example(block[1], block[2], line=text.count("\n", 0, block.start(2)) + 1)
+
+
+def run_shell(example: Example, folder: Path) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", MAKE_CHECKS_TARGETS + example.code],
+        cwd=folder,
+        env={**os.environ, "PATH": path, "MAKEFILE": str(ROOT / "Makefile")},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, f"line {example.line}: exit code {done.returncode}\n{done.stderr}"
+
+
+@page_parameter
+def test_examples_run(page: Path, tmp_path: Path) -> None:
+    """The examples of a page run from top to bottom in one folder; the Python ones share their names."""
+    examples = [example for example in examples_of(page) if example.language in ("sh", "python")]
+    if not examples:
+        pytest.skip("no examples on this page")
+    names: dict[str, object] = {}
+    with contextlib.chdir(tmp_path):
+        for example in examples:
+            if example.language == "sh":
+                run_shell(example, tmp_path)
+            else:
+                exec(compile("\n" * (example.line - 1) + example.code, page, "exec"), names)
+
+
+@page_parameter
+def test_links_lead_to_files(page: Path) -> None:
+    targets = re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+    missing = [target for target in targets if not (page.parent / target).exists()]
+    assert not missing
+
+
+@page_parameter
+def test_tasks_that_are_named_exist(page: Path) -> None:
+    named = set(re.findall(r"`make ([a-z-]+)`", page.read_text(encoding="utf-8")))
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    assert named <= targets
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    listed = set(re.findall(r":\s+([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE))
+    assert listed == {page.name for page in (ROOT / "docs").glob("*.md")}
+
+
+def test_the_guide_that_says_what_is_where_names_what_is_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:crates|python|tests|docs|benchmarks|testdata)/[\w./-]*)`", text))
+    assert named
+    assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
