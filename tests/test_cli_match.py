@@ -1,0 +1,279 @@
+"""`pomona match` and `pomona config` as a user meets them: exit code, stdout and stderr of a process of its own."""
+
+import csv
+import json
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer.main
+
+from pomona.cli import app
+from pomona.cloud import FruitCloud
+from pomona.synth.clouds import scene_pair
+
+POMONA = Path(sys.executable).with_name("pomona")
+
+
+def run(*arguments: object, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([POMONA, *map(str, arguments)], input=stdin, capture_output=True, text=True)
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:
+    """Wrong input: exit code 2, nothing on stdout, one line on stderr that names what is wrong."""
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("pomona: ")
+    assert done.stderr.count("\n") == 1
+    for words in named:
+        assert words in done.stderr
+
+
+@pytest.fixture(scope="module")
+def visits(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two visits to one row: query.csv and map.csv; twice.csv is the query in millimetres."""
+    folder = tmp_path_factory.mktemp("visits")
+    pair = scene_pair("base", seed=7)
+    pair.query.write(folder / "query.csv")
+    pair.map.write(folder / "map.csv")
+    scene_pair("noov", seed=7).query.write(folder / "elsewhere.csv")
+    millimetres = FruitCloud(pair.query.positions * 1000.0, ids=pair.query.ids)
+    millimetres.write(folder / "query_mm.csv")
+    FruitCloud(pair.map.positions * 1000.0, ids=pair.map.ids).write(folder / "map_mm.csv")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(visits: Path) -> dict[str, object]:
+    """The answer of `--json`, which later tests compare with."""
+    done = run("match", visits / "query.csv", visits / "map.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    answer: dict[str, object] = json.loads(done.stdout)
+    return answer
+
+
+def verbs(group: object = None, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    group = typer.main.get_command(app) if group is None else group
+    yield path
+    for name, command in getattr(group, "commands", {}).items():
+        yield from verbs(command, (*path, name))
+
+
+@pytest.mark.parametrize("verb", list(verbs()), ids=" ".join)
+def test_help_loads_nothing_heavy(verb: tuple[str, ...]) -> None:
+    program = """
+import atexit, sys
+from pomona.cli import main
+heavy = {"numpy", "scipy", "matplotlib", "cv2", "pyogrio", "onnxruntime"}
+atexit.register(lambda: sys.stderr.write(",".join(sorted(heavy & set(sys.modules)))))
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program, *verb, "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "Usage:" in done.stdout
+    assert done.stderr == ""
+
+
+def test_json_keeps_the_contract(visits: Path, found: dict[str, object]) -> None:
+    assert set(found) == {
+        "status",
+        "map_from_query",
+        "scale",
+        "log_odds",
+        "n_query",
+        "n_map",
+        "matches",
+        "unmatched_query",
+        "elapsed_s",
+    }
+    query, map = FruitCloud.read(visits / "query.csv"), FruitCloud.read(visits / "map.csv")
+    assert found["status"] == "Found"
+    assert (found["n_query"], found["n_map"]) == (len(query), len(map))
+    matches = found["matches"]
+    assert isinstance(matches, list)
+    assert all(set(match) == {"query", "map", "probability", "distance_m"} for match in matches)
+    assert all(0.0 <= match["probability"] <= 1.0 for match in matches)
+    paired = [match["query"] for match in matches]
+    assert query.ids is not None
+    assert sorted([*paired, *found["unmatched_query"]]) == sorted(query.ids)  # type: ignore[misc]
+    transform = np.array(found["map_from_query"])
+    truth = scene_pair("base", seed=7).map_from_query
+    assert np.linalg.norm(transform[:3, :3] - truth[:3, :3]) < np.radians(5.0)
+
+
+def test_text_names_the_verdict_first_and_no_match_is_exit_code_1(visits: Path) -> None:
+    done = run("match", visits / "query.csv", visits / "map.csv", "--explain")
+    assert done.returncode == 0
+    assert done.stdout.startswith("Found: ")
+    assert "translation" in done.stdout
+    assert " deg about " in done.stdout
+    assert "\n  pairs " in done.stdout
+    elsewhere = run("match", visits / "elsewhere.csv", visits / "map.csv")
+    assert elsewhere.returncode == 1
+    assert elsewhere.stdout.startswith("NoMatch: ")
+    assert elsewhere.stderr == ""
+
+
+@pytest.mark.parametrize("method", ["paper", "verified"])
+def test_writes_pairs_and_picture(visits: Path, tmp_path: Path, method: str) -> None:
+    pairs, picture = tmp_path / "pairs.csv", tmp_path / "match.png"
+    done = run("match", visits / "query.csv", visits / "map.csv", "--method", method, "-o", pairs, "--plot", picture)
+    assert done.returncode == 0, done.stderr
+    with pairs.open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["query", "map", "probability", "distance_m"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert sorted(tmp_path.iterdir()) == sorted([pairs, picture])
+    score = json.loads(run("evaluate", "match", visits / "query.csv", visits / "map.csv", pairs, "--json").stdout)
+    assert score["true"] + score["false"] == len(rows)
+    assert score["precision"] > 0.7
+    assert score["recall"] > 0.7
+
+
+def test_evaluate_reads_the_answer_from_a_pipe(visits: Path, found: dict[str, object]) -> None:
+    done = run("evaluate", "match", visits / "query.csv", visits / "map.csv", "-", stdin=json.dumps(found))
+    assert done.returncode == 0
+    header, values = done.stdout.splitlines()
+    assert header.split()[:5] == ["precision", "recall", "true", "false", "missed"]
+    assert int(values.split()[2]) > 0
+
+
+def test_rows_stand_for_fruits_without_ids(visits: Path, tmp_path: Path, found: dict[str, object]) -> None:
+    for side in ("query", "map"):
+        FruitCloud(FruitCloud.read(visits / f"{side}.csv").positions).write(tmp_path / f"{side}.csv")
+    answer = json.loads(run("match", tmp_path / "query.csv", tmp_path / "map.csv", "--json").stdout)
+    ids = FruitCloud.read(visits / "query.csv").ids
+    assert ids is not None
+    assert [ids[match["query"]] for match in answer["matches"]] == [m["query"] for m in found["matches"]]  # type: ignore[attr-defined]
+
+
+def test_threads_and_repetition_change_nothing(visits: Path, found: dict[str, object]) -> None:
+    for threads in (1, 2):
+        done = run("match", visits / "query.csv", visits / "map.csv", "--json", "--threads", threads)
+        assert {**json.loads(done.stdout), "elapsed_s": 0} == {**found, "elapsed_s": 0}
+
+
+def test_explain_with_json_leaves_stdout_to_the_program(visits: Path) -> None:
+    done = run("match", visits / "query.csv", visits / "map.csv", "--json", "--explain")
+    assert json.loads(done.stdout)["status"] == "Found"
+    assert done.stderr.strip()
+
+
+HEADER = "x,y,z\n"
+WRONG_CLOUDS = {
+    "empty": ("", ["cloud.csv"]),
+    "no header": ("1,2,3\n4,5,6\n", ["cloud.csv", "line 1"]),
+    "no z": ("x,y,colour\n1,2,red\n", ["cloud.csv", "z"]),
+    "a letter": (HEADER + "1,2,3\n4,5o,6\n", ["cloud.csv", "line 3", "y", "5o"]),
+    "NaN": (HEADER + "1,2,3\n4,nan,6\n", ["cloud.csv", "line 3"]),
+    "infinite": (HEADER + "1,2,3\n4,5,inf\n", ["cloud.csv", "line 3"]),
+}
+
+
+@pytest.mark.parametrize("content", WRONG_CLOUDS, ids=str)
+@pytest.mark.parametrize("side", ["query", "map"])
+def test_refuses_a_wrong_cloud(visits: Path, tmp_path: Path, content: str, side: str) -> None:
+    text, named = WRONG_CLOUDS[content]
+    cloud, output = tmp_path / "cloud.csv", tmp_path / "pairs.csv"
+    cloud.write_text(text)
+    clouds = (cloud, visits / "map.csv") if side == "query" else (visits / "query.csv", cloud)
+    assert_refused(run("match", *clouds, "-o", output), *named)
+    assert not output.exists()
+
+
+def test_refuses_what_is_no_cloud_file(visits: Path, tmp_path: Path) -> None:
+    (tmp_path / "cloud.txt").write_text(HEADER)
+    assert_refused(run("match", tmp_path / "none.csv", visits / "map.csv"), "none.csv")
+    assert_refused(run("match", tmp_path, visits / "map.csv"), str(tmp_path))
+    assert_refused(run("match", tmp_path / "cloud.txt", visits / "map.csv"), "cloud.txt", ".csv")
+
+
+@pytest.mark.parametrize(
+    ("flags", "named"),
+    [
+        (["--method", "magic"], ["--method", "magic", "paper"]),
+        (["--scale", "big"], ["--scale", "big"]),
+        (["--noise", "-1"], ["--noise"]),
+        (["--up", "0,1"], ["--up", "0,1", "X,Y,Z"]),
+        (["--up", "0,0,0"], ["up"]),
+        (["--up", "0,0,1", "--up", "0,0,1", "--up", "0,0,1"], ["--up", "3"]),
+        (["--threads", "0"], ["--threads"]),
+        (["--unit", "inch"], ["--unit", "inch"]),
+        (["--plot", "match.xyz"], ["match.xyz", ".png"]),
+        (["--nonsense"], ["--nonsense"]),
+        (["-o", "no-such-folder/pairs.csv"], ["no-such-folder/pairs.csv"]),
+        (["--config", "no-such-file.toml"], ["no-such-file.toml"]),
+    ],
+)
+def test_refuses_wrong_flags(visits: Path, flags: list[str], named: list[str]) -> None:
+    assert_refused(run("match", visits / "query.csv", visits / "map.csv", *flags), *named)
+
+
+@pytest.mark.parametrize("verb", ["match", "config"])
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("nonsense = 1\n", ["settings.toml", "nonsense"]),
+        ("[match]\nnonsense = 1\n", ["settings.toml", "match.nonsense", "method"]),
+        ("[paper]\nnonsense = 1\n", ["settings.toml", "paper.nonsense"]),
+        ("paper = 1\n", ["settings.toml", "paper", "table"]),
+        ("[match\n", ["settings.toml", "TOML"]),
+    ],
+)
+def test_refuses_wrong_settings(visits: Path, tmp_path: Path, verb: str, text: str, named: list[str]) -> None:
+    (tmp_path / "settings.toml").write_text(text)
+    clouds = [visits / "query.csv", visits / "map.csv"] if verb == "match" else []
+    assert_refused(run(verb, *clouds, "--config", tmp_path / "settings.toml"), *named)
+
+
+@pytest.mark.parametrize("method", ["paper", "verified"])
+@pytest.mark.parametrize("scale", ["metric", "free"])
+@pytest.mark.parametrize("scene", ["none", "three", "line", "one place"])
+def test_a_scene_without_an_answer_is_a_result(
+    visits: Path, tmp_path: Path, method: str, scale: str, scene: str
+) -> None:
+    steps = np.arange({"none": 0, "three": 3}.get(scene, 40))
+    positions = np.outer(0 * steps if scene == "one place" else steps, [0.2, 0.1, 0.3])
+    FruitCloud(positions).write(tmp_path / "cloud.csv")
+    done = run("match", tmp_path / "cloud.csv", visits / "map.csv", "--method", method, "--scale", scale, "--json")
+    assert done.returncode == 1, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["status"] in ({"TooFew"} if scene in ("none", "three") else {"NoMatch", "TooFew", "Ambiguous"})
+    assert (answer["map_from_query"] is None) == (answer["status"] in ("NoMatch", "TooFew"))
+
+
+def test_millimetres_warn_and_say_what_to_do(visits: Path, found: dict[str, object]) -> None:
+    done = run("match", visits / "query_mm.csv", visits / "map_mm.csv", "--json")
+    warnings = done.stderr.splitlines()
+    assert len(warnings) == 2
+    assert all(line.startswith("pomona: warning: ") and "unit" in line for line in warnings)
+    told = run("match", visits / "query_mm.csv", visits / "map_mm.csv", "--unit", "mm", "--json")
+    assert told.returncode == 0
+    assert told.stderr == ""
+    assert len(json.loads(told.stdout)["matches"]) == len(found["matches"])  # type: ignore[arg-type]
+
+
+def test_config_prints_effective_values(tmp_path: Path) -> None:
+    defaults = tomllib.loads(run("config").stdout)
+    assert defaults["match"]["method"] == "verified"
+    path = tmp_path / "settings.toml"
+    path.write_text('[match]\nmethod = "paper"\nnoise_m = 0.03\n')
+    from_file = tomllib.loads(run("config", "--config", path).stdout)
+    assert from_file["match"] == {**defaults["match"], "method": "paper", "noise_m": 0.03}
+    flags_win = tomllib.loads(run("config", "--config", path, "--method", "verified", "--up", "0,0,1").stdout)
+    assert flags_win["match"]["method"] == "verified"
+    assert flags_win["match"]["noise_m"] == 0.03
+    assert flags_win["match"]["up"] == [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
+
+
+def test_config_reads_back_what_it_prints(visits: Path, tmp_path: Path, found: dict[str, object]) -> None:
+    path = tmp_path / "settings.toml"
+    path.write_text(run("config").stdout)
+    assert run("config", "--config", path).stdout == path.read_text()
+    answer = json.loads(run("match", visits / "query.csv", visits / "map.csv", "--config", path, "--json").stdout)
+    assert {**answer, "elapsed_s": 0} == {**found, "elapsed_s": 0}
