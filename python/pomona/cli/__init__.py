@@ -7,7 +7,7 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import config, evaluate, match, synth
+from pomona.cli import config, evaluate, export, map, match, synth
 from pomona.errors import PomonaError
 
 app = typer.Typer(
@@ -37,6 +37,8 @@ def _pomona(
 
 # One line a verb, in the order of the work.
 app.command()(match.match)
+app.add_typer(map.app, name="map")
+app.command()(export.export)
 app.command()(config.config)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(synth.app, name="synth")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from pomona.orchard import schema
 from pomona.orchard.reading import fruits_in_map
 from pomona.orchard.session import Session
 from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
+from pomona.settings import Settings
 
 if TYPE_CHECKING:
     from pomona.matching import Match
@@ -55,7 +56,7 @@ class Added:
 
 
 def add_session(
-    path: str | Path, session: Session, *, method: str = "verified", timeout_s: float = 10.0, **matching: Any
+    path: str | Path, session: Session, *, settings: Settings | None = None, timeout_s: float = 10.0
 ) -> Added:
     """Recognise a session's fruits in the map and add it; the first session starts the map.
 
@@ -68,12 +69,10 @@ def add_session(
         The map (.gpkg); it is made when it is not there.
     session : Session
         The visit to add.
-    method : {"verified", "paper"}
-        How to match, as in `pomona.match`.
+    settings : Settings, optional
+        How to match; the defaults of `pomona.match` otherwise.
     timeout_s : float
         How long to wait for another program that is writing to the map.
-    **matching
-        Other settings of `pomona.match`, for example ``noise_m``.
 
     Raises
     ------
@@ -91,7 +90,7 @@ def add_session(
             schema.opened(path, create=True, timeout_s=timeout_s) as connection,
             schema.transaction(connection),
         ):
-            return _add(connection, path, session, method, matching)
+            return _add(connection, path, session, settings)
     except BaseException:
         # SQLite makes the file before the first commit; a map that never was shall leave none.
         if not was_there and path.exists() and path.stat().st_size == 0:
@@ -99,23 +98,19 @@ def add_session(
         raise
 
 
-def _add(connection: sqlite3.Connection, path: Path, session: Session, method: str, matching: dict[str, Any]) -> Added:
+def _add(connection: sqlite3.Connection, path: Path, session: Session, settings: Settings | None) -> Added:
     if schema.is_blank(connection):
         schema.create(connection, "map")
         return _start(connection, session)
     if schema.kind_of(connection, path) != "map":
         raise PomonaError(f"{path}: is the file of one session, expected a map; `map add` makes one from it")
     _require_new(connection, path, session)
+    settings = settings or Settings.load(None, {})
     known = fruits_in_map(connection)
-    if not len(known):
-        return _start(connection, session)
-
-    from pomona.matching import match
-
-    found = match(session.cloud, known, method=method, **matching)
+    found = settings.match(session.cloud, known)
     if found.status.value != "Found":
         return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
-    return _join(connection, session, known, found, method)
+    return _join(connection, session, known, found, settings)
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:
@@ -127,16 +122,17 @@ def _start(connection: sqlite3.Connection, session: Session) -> Added:
     return Added(fruit_ids, 0, len(fruit_ids), 0, None)
 
 
-def _join(connection: sqlite3.Connection, session: Session, known: FruitCloud, found: Match, method: str) -> Added:
+def _join(
+    connection: sqlite3.Connection, session: Session, known: FruitCloud, found: Match, settings: Settings
+) -> Added:
     """Write the session: matched fruits keep their ids, the others get new ones, the map moves with the tree."""
     assert found.map_from_query is not None
     assert known.ids is not None
     cloud_in_map = session.cloud.transformed(found.map_from_query)
     known_ids = np.array(known.ids, dtype=np.int64)
     is_newest = _is_newest(connection, session.date)
-    session_id = insert_session(
-        connection, session, Placement(found.map_from_query, method, found.log_odds, found.noise_m)
-    )
+    placement = Placement(found.map_from_query, settings, found.log_odds, found.noise_m)
+    session_id = insert_session(connection, session, placement)
     rows, known_rows = found.pairs[:, 0], found.pairs[:, 1]
     fruit_ids = np.zeros(len(cloud_in_map), dtype=np.int64)
     fruit_ids[rows] = known_ids[known_rows]

@@ -24,7 +24,7 @@ LAYERS = (
         "",
         """name TEXT NOT NULL UNIQUE, date TEXT NOT NULL, recording TEXT NOT NULL, content_sha256 TEXT NOT NULL UNIQUE,
         map_from_session TEXT NOT NULL, program_version TEXT NOT NULL, configuration TEXT NOT NULL,
-        input_hashes TEXT NOT NULL, method TEXT, log_odds REAL, noise_m REAL""",
+        input_hashes TEXT NOT NULL, method TEXT, settings TEXT, log_odds REAL, noise_m REAL""",
         "visits: date, recording, 4x4 transform into the map, provenance",
     ),
     ("rows", "LINESTRING", "name TEXT", "rows of trees"),

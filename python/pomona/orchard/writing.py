@@ -16,6 +16,7 @@ from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
 from pomona.orchard import schema
 from pomona.orchard.session import Session
+from pomona.settings import Settings
 from pomona.trajectory import Trajectory
 
 __all__ = ["Placement", "insert_fruits", "insert_observations", "insert_session", "update_layers", "write_session"]
@@ -26,9 +27,14 @@ class Placement:
     """How a session came to its place in the map: what `sessions` notes of the match. Without one, it is the frame."""
 
     map_from_session: NDArray[np.float64]
-    method: str
+    settings: Settings
     log_odds: float
     noise_m: float
+
+    def noted(self) -> tuple[str, str, float, float]:
+        """Return the columns `method`, `settings`, `log_odds`, `noise_m`."""
+        chosen = {**self.settings.call, "config": self.settings.overrides}
+        return self.settings.call["method"], json.dumps(chosen, sort_keys=True), self.log_odds, self.noise_m
 
 
 def write_session(
@@ -86,7 +92,8 @@ def insert_session(connection: sqlite3.Connection, session: Session, placement: 
     map_from_session = np.eye(4) if placement is None else placement.map_from_session
     cursor = connection.execute(
         """INSERT INTO sessions (name, date, recording, content_sha256, map_from_session, program_version,
-        configuration, input_hashes, method, log_odds, noise_m) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)""",
+        configuration, input_hashes, method, settings, log_odds, noise_m)
+        VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)""",
         (
             session.name,
             session.date,
@@ -96,7 +103,7 @@ def insert_session(connection: sqlite3.Connection, session: Session, placement: 
             session.program_version,
             session.configuration_json,
             session.input_hashes_json,
-            *((placement.method, placement.log_odds, placement.noise_m) if placement else (None, None, None)),
+            *((None,) * 4 if placement is None else placement.noted()),
         ),
     )
     session_id = int(cursor.lastrowid or 0)
@@ -188,7 +195,9 @@ def _insert_poses(
     if not len(trajectory):
         return
     map_from_camera = map_from_session @ trajectory.session_from_camera
-    quaternions = Rotation.from_matrix(map_from_camera[:, :3, :3]).as_quat(canonical=True)
+    # A reconstruction of unknown scale comes into the map by a similarity; the camera's axes keep their length.
+    scale = np.cbrt(np.linalg.det(map_from_session[:3, :3]))
+    quaternions = Rotation.from_matrix(map_from_camera[:, :3, :3] / scale).as_quat(canonical=True)
     connection.executemany(
         "INSERT INTO poses (session_id, geom, frame, time_s, qx, qy, qz, qw) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
         (

@@ -1,0 +1,189 @@
+"""`pomona map ...`: the orchard map, one identity for each fruit over all visits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from pomona.cli.match import (
+    Method,
+    Scale,
+    Unit,
+    call_flags,
+    config_option,
+    method_option,
+    noise_option,
+    per_frame_option,
+    scale_option,
+    threads_option,
+    up_option,
+)
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from pomona.orchard import Added, OrchardMap, Session
+
+app = typer.Typer(help="Keep an orchard map: one identity for each fruit over all visits.", no_args_is_help=True)
+
+orchard_argument = typer.Argument(metavar="ORCHARD", help="The map (.gpkg).")
+
+
+@app.callback()
+def _map() -> None:
+    """Keep an orchard map: one identity for each fruit over all visits."""
+
+
+@app.command("add")
+def map_add(
+    orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg); made when it is not there."),
+    session: Path = typer.Argument(metavar="SESSION", help="A session (.gpkg), or a cloud (.csv, .ply) with --date."),
+    date: str | None = typer.Option(
+        None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; a session has its own."
+    ),
+    method: Method | None = method_option,
+    scale: Scale | None = scale_option,
+    noise_m: float | None = noise_option,
+    up: list[str] | None = up_option,
+    config: Path | None = config_option,
+    per_frame: bool | None = per_frame_option,
+    threads: int | None = threads_option,
+    unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Recognise the fruits of SESSION in ORCHARD and add it.
+
+    Matched fruits keep their ids, the others get new ones; the first session starts the map. Exit code 0: added.
+    1: not found in the map, which stays as it was. 2: wrong input.
+    """
+    from pomona.cli.progress import working
+    from pomona.orchard import add_session, load_session
+    from pomona.settings import Settings
+
+    visit = load_session(session, date=date, unit=unit.value)
+    flags = call_flags(method, scale, noise_m, up, per_frame, threads)
+    settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
+    with working(f"adding {len(visit.cloud)} fruits to {orchard.name}"):
+        added = add_session(orchard, visit, settings=settings)
+    typer.echo(_dumps(_added_as_json(visit, added)) if json else _added_as_text(visit, added))
+    if not added.is_added:
+        raise typer.Exit(1)
+
+
+@app.command("info")
+def map_info(orchard: Path = orchard_argument, json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+    """Say what a map or a session holds: fruits, visits, what was recognised."""
+    from pomona.orchard import OrchardMap
+
+    info = _info(OrchardMap(orchard))
+    typer.echo(_dumps(info) if json else _info_as_text(info))
+
+
+@app.command("check")
+def map_check(orchard: Path = orchard_argument, json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+    """Check that a map or a session is whole. Exit code 0: it is. 1: a problem a line. 2: not a map of ours."""
+    from pomona.cli.progress import working
+    from pomona.orchard import problems
+
+    with working(f"checking {orchard.name}"):
+        found = problems(orchard)
+    typer.echo(_dumps({"problems": found}) if json else "\n".join(found) or "ok")
+    if found:
+        raise typer.Exit(1)
+
+
+def _dumps(value: Any) -> str:
+    import json
+
+    return json.dumps(value)
+
+
+def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
+    match = added.match
+    return {
+        "session": visit.name,
+        "added": added.is_added,
+        "status": None if match is None else match.status.value,
+        "n_fruits": len(visit.cloud),
+        "n_matched": added.n_matched,
+        "n_new": added.n_new,
+        "n_missed": added.n_missed,
+        "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
+        "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
+        if added.is_added
+        else {},
+    }
+
+
+def _added_as_text(visit: Session, added: Added) -> str:
+    match = added.match
+    if match is None:
+        return f"{visit.name}: starts the map with {added.n_new} fruits"
+    if not added.is_added:
+        return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
+    return (
+        f"{visit.name}: {added.n_matched} of {len(visit.cloud)} fruits recognised, {added.n_new} new, "
+        f"{added.n_missed} in view and not seen"
+    )
+
+
+def _info(orchard: OrchardMap) -> dict[str, Any]:
+    from collections import Counter
+
+    from pomona.orchard import FORMAT_VERSION
+
+    fruits, visits = orchard.fruits(), orchard.visits()
+    low, high = (fruits.positions.min(axis=0), fruits.positions.max(axis=0)) if len(fruits) else (None, None)
+    return {
+        "path": str(orchard.path),
+        "kind": orchard.kind,
+        "format_version": FORMAT_VERSION,
+        "n_fruits": len(fruits),
+        "n_observations": sum(visit.n_fruits for visit in visits),
+        "states": dict(sorted(Counter(fruits.extras["state"]).items())),
+        "extent_m": None if low is None or high is None else [low.tolist(), high.tolist()],
+        "sessions": [
+            {
+                "name": visit.name,
+                "date": visit.date,
+                "recording": visit.recording,
+                "n_fruits": visit.n_fruits,
+                "n_matched": visit.n_matched,
+                "n_new": visit.n_fruits - visit.n_matched,
+                "method": visit.method,
+                "log_odds": visit.log_odds,
+                "noise_m": visit.noise_m,
+                "map_from_session": visit.map_from_session.tolist(),
+            }
+            for visit in visits
+        ],
+    }
+
+
+def _info_as_text(info: dict[str, Any]) -> str:
+    states = ", ".join(f"{count} {state}" for state, count in info["states"].items())
+    header = ("session", "date", "fruits", "matched", "new", "method", "noise")
+    rows = [
+        (
+            visit["name"],
+            visit["date"],
+            str(visit["n_fruits"]),
+            str(visit["n_matched"]),
+            str(visit["n_new"]),
+            visit["method"] or "-",
+            "-" if visit["noise_m"] is None else f"{100 * visit['noise_m']:.1f} cm",
+        )
+        for visit in info["sessions"]
+    ]
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (header, *rows)]
+    return "\n".join(
+        [
+            f"{info['path']}: {info['kind']}, format {info['format_version']}",
+            f"{info['n_fruits']} fruits ({states}), {info['n_observations']} observations in {len(rows)} sessions",
+            "",
+            *(line.rstrip() for line in table),
+        ]
+    )

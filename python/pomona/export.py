@@ -1,0 +1,66 @@
+"""Fruits of a session or a map for other programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from pomona.atomic import whole_file
+from pomona.cloud import FruitCloud, csv_file, ply_file
+from pomona.errors import PomonaError
+
+__all__ = ["ExportFormat", "export_cloud"]
+
+ExportFormat = Literal["csv", "ply", "geojson"]
+
+
+def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
+    """Write fruits with their ids, in metres, in the frame they are in; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    cloud : FruitCloud
+        The fruits, for example ``FruitCloud.read("orchard.gpkg")``.
+    path : str or Path
+        The file to write; its suffix is yours to choose.
+    to : {"csv", "ply", "geojson"}
+        Its format. Rows without ids get their row numbers in GeoJSON, which wants an id for every feature.
+    """
+    path = Path(path)
+    if to == "csv":
+        csv_file.write(path, cloud)
+    elif to == "ply":
+        ply_file.write(path, cloud)
+    elif to == "geojson":
+        _write_geojson(path, cloud)
+    else:
+        raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(ExportFormat))}")
+
+
+def _write_geojson(path: Path, cloud: FruitCloud) -> None:
+    """Write GeoJSON whose coordinates are local metres: ``"crs": null`` says that they are no longitude and latitude.
+
+    RFC 7946 knows longitude and latitude only; the 2008 specification, which QGIS and GDAL still read, has the null.
+    """
+    head = {"type": "FeatureCollection", "name": path.stem, "crs": None}
+    columns: dict[str, list[Any]] = {name: list(cells) for name, cells in cloud.extras.items()}
+    if cloud.diameters_m is not None:
+        columns["diameter_m"] = [None if np.isnan(value) else value for value in cloud.diameters_m.tolist()]
+    if cloud.n_views is not None:
+        columns["n_views"] = cloud.n_views.tolist()
+    if cloud.covariances is not None:
+        columns["covariance_m2"] = cloud.covariances.tolist()
+    with whole_file(path) as partial, partial.open("w", encoding="utf-8") as file:
+        file.write(json.dumps(head)[:-1] + ', "features": [')
+        for row, position in enumerate(cloud.positions.tolist()):
+            feature = {
+                "type": "Feature",
+                "id": cloud.label(row),
+                "properties": {"id": cloud.label(row), **{name: cells[row] for name, cells in columns.items()}},
+                "geometry": {"type": "Point", "coordinates": position},
+            }
+            file.write(("," if row else "") + "\n" + json.dumps(feature, ensure_ascii=False, allow_nan=False))
+        file.write("\n]}\n")
