@@ -36,6 +36,7 @@ def _pomona(
 
 
 # One line a verb, in the order of the work.
+app.command()(demo.demo)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
 app.command()(export.export)
