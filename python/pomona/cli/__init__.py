@@ -7,7 +7,7 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import config, evaluate, export, map, match, synth
+from pomona.cli import config, demo, evaluate, export, map, match, synth
 from pomona.errors import PomonaError
 
 app = typer.Typer(
