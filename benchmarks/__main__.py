@@ -1,0 +1,37 @@
+"""Run the named benchmarks, or all of them: `python -m benchmarks [NAME ...] [-- OPTIONS]`.
+
+Options after the name of a single benchmark go to it: `python -m benchmarks cells --cells base --seeds 0:5`.
+"""
+
+import importlib
+import sys
+
+NAMES = ("robustness", "cells", "kinect", "season", "clouds", "speed")
+"""In the order in which all of them run."""
+
+
+def main(arguments: list[str]) -> int:
+    if arguments and arguments[0] in ("-h", "--help"):
+        sys.stdout.write(f"{__doc__}\n{', '.join(NAMES)}\n")
+        return 0
+    if not arguments:
+        for name in NAMES:
+            _run(name, [])
+        return 0
+    names = [argument for argument in arguments if argument in NAMES]
+    options = arguments[len(names) :]
+    if names != arguments[: len(names)] or not names or (options and len(names) > 1):
+        sys.stderr.write(f"benchmarks: found {' '.join(arguments)!r}, expected names of {', '.join(NAMES)}\n")
+        return 2
+    for name in names:
+        _run(name, options)
+    return 0
+
+
+def _run(name: str, options: list[str]) -> None:
+    sys.stderr.write(f"== {name}\n")
+    importlib.import_module(f"benchmarks.{name}").main(options)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,99 @@
+"""What a match costs: CPU, peak memory over the bare import, and what a second thread brings.
+
+Each measurement runs in a process of its own. Time: the fastest of some repetitions, CPU on one thread, wall time on
+one and two. Memory: growth of the peak resident set over that after `import pomona` with the clouds made. Writes
+speed.csv and speed.md.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import pomona
+from benchmarks.results import markdown, write_rows, write_text
+from pomona.cloud import FruitCloud
+from pomona.synth.clouds import scene_pair
+
+METHODS = ("paper", "verified")
+CELLS = ("base", "part1o45", "noov", "big5k")
+WORKS = (*CELLS, "frame")
+REPEATS = {"big5k": 3}
+
+
+def main(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks speed", description=__doc__)
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
+    parser.add_argument("--one", nargs=3, metavar=("WORK", "METHOD", "THREADS"), help="measure here, print JSON")
+    options = parser.parse_args(arguments)
+    if options.one:
+        work, method, threads = options.one
+        sys.stdout.write(json.dumps(measure(work, method, int(threads))) + "\n")
+        return
+    rows = []
+    for work in WORKS:
+        for method in options.methods:
+            alone, both = (_in_new_process(work, method, threads) for threads in (1, 2))
+            rows.append({"work": work, "method": method, **alone, "wall_two_threads_s": both["wall_s"]})
+            sys.stderr.write(f"speed: {work}, {method} done\n")
+    write_rows("speed.csv", rows)
+    write_text("speed.md", report(rows))
+
+
+def _in_new_process(work: str, method: str, threads: int) -> dict[str, float]:
+    command = [sys.executable, "-m", "benchmarks", "speed", "--one", work, method, str(threads)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    measured: dict[str, float] = json.loads(done.stdout)
+    return measured
+
+
+def measure(work: str, method: str, threads: int) -> dict[str, float]:
+    """Fastest of some repetitions, and the peak memory of all of them."""
+    task = _frame_in_map(method, threads) if work == "frame" else _cell(work, method, threads)
+    before_mb = _peak_mb()
+    cpu_s, wall_s = [], []
+    for _ in range(REPEATS.get(work, 10)):
+        start_cpu_s, start_s = time.process_time(), time.perf_counter()
+        task()
+        cpu_s.append(time.process_time() - start_cpu_s)
+        wall_s.append(time.perf_counter() - start_s)
+    return {"cpu_s": min(cpu_s), "wall_s": min(wall_s), "peak_mb": _peak_mb() - before_mb}
+
+
+def _cell(name: str, method: str, threads: int) -> Callable[[], object]:
+    pair = scene_pair(name, 0)
+    return lambda: pomona.match(pair.query, pair.map, scale=pair.cell.scale, method=method, threads=threads)
+
+
+def _frame_in_map(method: str, threads: int) -> Callable[[], object]:
+    """Forty neighbouring fruits of a visit against the other visit's map, indexed once."""
+    pair = scene_pair("base", 0)
+    index = pomona.Index(pair.map, method=method, threads=threads)
+    distance = np.linalg.norm(pair.query.positions - pair.query.positions.mean(axis=0), axis=1)
+    frame = FruitCloud(pair.query.positions[np.argsort(distance)[:40]])
+    return lambda: index.match(frame)
+
+
+def _peak_mb() -> float:
+    # Linux counts kibibytes, macOS bytes.
+    unit = 1.0 if sys.platform == "darwin" else 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def report(rows: list[dict[str, object]]) -> str:
+    header = ("work", "method", "CPU ms", "wall ms, 1 thread", "wall ms, 2 threads", "peak MB over import")
+    lines = [
+        (
+            row["work"],
+            row["method"],
+            *(f"{1e3 * row[column]:.1f}" for column in ("cpu_s", "wall_s", "wall_two_threads_s")),
+            f"{row['peak_mb']:.0f}",
+        )
+        for row in rows
+    ]
+    return f"# Speed\n\n{' '.join((__doc__ or '').split())}\n\n{markdown(header, lines)}"
