@@ -194,13 +194,15 @@ def similarity_fit(query: NDArray[np.float64], map_: NDArray[np.float64]) -> NDA
 
 
 def _vines(path: Path) -> list[FruitCloud]:
-    """One cloud per vine, metres, side by side; of fruits digitised at one place the first."""
+    """One cloud per vine, metres, side by side; of fruits digitised at one place the first, none without a place."""
     places: dict[int, dict[tuple[float, ...], str]] = {}
     with path.open(encoding="utf-8", newline="") as file:
-        for line in csv.DictReader(file):
-            vine = int(line["vine"])
-            place = tuple(float(line[axis]) / 1e3 for axis in ("shoot_x_mm", "shoot_y_mm", "dist_from_wire_mm"))
-            places.setdefault(vine, {}).setdefault(place, line["fruit_id"])
+        # Its fruit_id is not unique; the line is.
+        for number, line in enumerate(csv.DictReader(file)):
+            cells = [line[axis] for axis in ("shoot_x_mm", "shoot_y_mm", "dist_from_wire_mm")]
+            if all(cells):
+                place = tuple(float(cell) / 1e3 for cell in cells)
+                places.setdefault(int(line["vine"]), {}).setdefault(place, f"k{number}")
     return [
         FruitCloud(np.array(list(fruits)) + np.array([6.0 * vine, 0.0, 0.0]), ids=tuple(fruits.values()))
         for vine, fruits in sorted(places.items())

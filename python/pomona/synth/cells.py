@@ -131,7 +131,7 @@ _CLEAN = Cell("clean", hidden=0.0, false_rate=0.0, noise_m=0.01)
 
 ADVERSARIAL_CELLS = (
     replace(_CLEAN, name="grid", scene="grid", hidden=0.2, right_answers=_NO_ANSWER),
-    replace(_BASE, name="twins", scene="twins", seen=5, shared=1, right_answers=("Ambiguous",)),
+    replace(_BASE, name="twins", scene="twins", seen=5, shared=1, right_answers=("Found", "Ambiguous")),
     replace(_BASE, name="twinrow", scene="twins"),
     replace(_BASE, name="mirror", mirrored=True, right_answers=_NO_ANSWER),
     replace(_BASE, name="plane", scene="plane"),
