@@ -5,7 +5,7 @@ RUN = $(UV) run --frozen
 UV_VERSION = 0.13.8
 
 .DEFAULT_GOAL := help
-.PHONY: all install demo test test-rust test-python lint format bench docs clean help
+.PHONY: all install develop demo test test-rust test-python lint format bench docs clean help
 
 all: lint test docs ## what CI runs, and the documentation
 
@@ -15,6 +15,9 @@ $(UV):
 
 install: $(UV) ## build pomona and install it with its tools into .venv
 	$(UV) sync --frozen
+
+develop: $(UV) ## rebuild the extension quickly after an edit of Rust sources (dev profile)
+	$(UV) run --no-sync maturin develop --uv --quiet
 
 demo: install ## the main job in half a minute: two dates of a row, one map, one picture
 	$(RUN) pomona demo
@@ -44,7 +47,7 @@ bench: install ## accuracy and speed; writes benchmarks/results
 	$(RUN) python -m benchmarks
 
 docs: $(UV) ## the documentation site, into site/
-	$(UV) run --frozen --group docs mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(UV) run --frozen --group docs mkdocs build --strict
 
 clean: ## remove what was built
 	rm -rf .venv .tools site target out
