@@ -12,9 +12,8 @@ from pomona.errors import PomonaError
 from pomona.matching import Match, Verdict
 from pomona.plot import draw_match, save_picture, view_from_above
 
-RNG = np.random.default_rng(5)
 # A row along y, 6 m long, 1 m deep, 3 m high, far from the origin.
-ROW = RNG.uniform([0.0, 0.0, 0.0], [1.0, 6.0, 3.0], (60, 3)) + [100.0, 0.0, 7.0]
+ROW = np.random.default_rng(5).uniform([100.0, 0.0, 7.0], [101.0, 6.0, 10.0], (60, 3))
 
 
 def a_match(status: Verdict, n_pairs: int, map_from_query: np.ndarray | None) -> Match:
