@@ -7,7 +7,7 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import config, demo, evaluate, export, map, match, synth
+from pomona.cli import config, demo, evaluate, export, import_, info, map, match, scan, synth
 from pomona.errors import PomonaError
 
 app = typer.Typer(
@@ -37,6 +37,9 @@ def _pomona(
 
 # One line a verb, in the order of the work.
 app.command()(demo.demo)
+app.add_typer(import_.app, name="import")
+app.command()(info.info)
+app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
 app.command()(export.export)

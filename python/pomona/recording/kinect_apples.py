@@ -1,0 +1,96 @@
+"""Importer of the Azure Kinect captures of one Fuji scene (GRAP-UdL-AT/ak_sw_benchmarker, MIT)."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pomona.errors import PomonaError
+from pomona.recording.calibration import Calibration
+from pomona.recording.pictures import read_depth
+
+__all__ = ["DATE", "NOMINAL", "Capture", "import_captures"]
+
+NOMINAL = Calibration(width=1920, height=1080, fx=913.0, fy=913.0, cx=960.0, cy=540.0)
+"""Nominal intrinsics: the data set's c = (959.5, 539.5) counts from the centre of the first pixel, ours from its
+corner."""
+
+DATE = "2021-09-27"
+"""Day of all captures; their names are the time of the day."""
+
+DETECTION_COLUMNS = ("frame", "xmin", "ymin", "xmax", "ymax", "score", "id")
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A capture that was imported."""
+
+    folder: Path
+    boxes: int
+    has_colour: bool
+
+
+def import_captures(source: Path, output: Path) -> Iterator[Capture]:
+    """Make a recording folder `output/HHMMSS` of each capture in `source`; each appears whole or not at all.
+
+    Raises
+    ------
+    PomonaError
+        When there is no capture, a file is missing or wrong, or a folder is already there.
+    """
+    names = sorted(
+        match[1] for file in source.glob("*_depth.png") if (match := re.fullmatch(r"(\d{6})_depth", file.stem))
+    )
+    if not names:
+        raise PomonaError(f"{source}: no captures found, expected HHMMSS_depth.png with HHMMSS_boxes.csv")
+    taken = [output / name for name in names if (output / name).exists()]
+    if taken:
+        raise PomonaError(f"{taken[0]}: is already there, expected a new folder")
+    output.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        with tempfile.TemporaryDirectory(prefix=f".{name}.", dir=output) as partial:
+            folder = Path(partial) / name
+            boxes, has_colour = _write(source, name, folder)
+            folder.rename(output / name)
+        yield Capture(output / name, boxes, has_colour)
+
+
+def _write(source: Path, name: str, folder: Path) -> tuple[int, bool]:
+    depth = source / f"{name}_depth.png"
+    read_depth(depth, NOMINAL)
+    (folder / "depth").mkdir(parents=True)
+    shutil.copyfile(depth, folder / "depth" / "0000.png")
+    colour = source / f"{name}_color.jpg"
+    if colour.exists():
+        (folder / "left").mkdir()
+        shutil.copyfile(colour, folder / "left" / "0000.jpg")
+    NOMINAL.write(folder / "calibration.json")
+    about = {
+        "name": f"kinect-apples-{name}",
+        "date": f"{DATE}T{name[:2]}:{name[2:4]}:{name[4:]}",
+        "source": "GRAP-UdL-AT/ak_sw_benchmarker",
+    }
+    (folder / "recording.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+    return _write_detections(source / f"{name}_boxes.csv", folder / "detections.csv"), colour.exists()
+
+
+def _write_detections(boxes: Path, detections: Path) -> int:
+    with (
+        boxes.open(newline="", encoding="utf-8-sig") as read,
+        detections.open("w", newline="", encoding="utf-8") as write,
+    ):
+        rows = csv.DictReader(read)
+        needed = {"id", "xmin", "ymin", "xmax", "ymax"}
+        if not needed <= set(rows.fieldnames or ()):
+            raise PomonaError(f"{boxes}: found {','.join(rows.fieldnames or ())}, expected id,xmin,ymin,xmax,ymax")
+        writer = csv.DictWriter(write, DETECTION_COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        found = [{**row, "frame": 0, "score": 1} for row in rows]
+        writer.writerows(found)
+    return len(found)

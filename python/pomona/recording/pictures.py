@@ -1,0 +1,65 @@
+"""Picture files: colour as BGR bytes, depth as metres."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.recording.calibration import Calibration
+
+__all__ = ["read_colour", "read_depth"]
+
+
+def read_colour(path: Path, calibration: Calibration) -> NDArray[np.uint8]:
+    """Read a colour picture as (H, W, 3) uint8, BGR."""
+    import cv2
+
+    picture = _decode(path, cv2.IMREAD_COLOR)
+    _require_size(path, picture, calibration)
+    return np.asarray(picture, np.uint8)
+
+
+def read_depth(path: Path, calibration: Calibration) -> NDArray[np.float32]:
+    """Read a 16-bit depth picture as (H, W) float32 metres along the optical axis, 0 where nothing was measured."""
+    import cv2
+
+    picture = _decode(path, cv2.IMREAD_UNCHANGED)
+    channels = 1 if picture.ndim == 2 else picture.shape[2]
+    if channels != 1:
+        raise PomonaError(f"{path}: found {channels} channels, expected one: depth, 16 bit")
+    if picture.dtype != np.uint16:
+        bits = picture.dtype.itemsize * 8
+        raise PomonaError(f"{path}: found {bits}-bit pixels, expected 16 bit: depth in {calibration.depth_unit_m:g} m")
+    _require_size(path, picture, calibration)
+    return picture.astype(np.float32) * np.float32(calibration.depth_unit_m)
+
+
+def _decode(path: Path, flags: int) -> NDArray[Any]:
+    import cv2
+
+    try:
+        encoded = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
+    if path.suffix.lower() == ".png" and not _png_ends(encoded):
+        raise PomonaError(f"{path}: the PNG is cut off or not a PNG")
+    picture = cv2.imdecode(encoded, flags) if len(encoded) else None
+    if picture is None:
+        raise PomonaError(f"{path}: not a picture, or a corrupt one")
+    return np.asarray(picture)
+
+
+def _png_ends(encoded: NDArray[np.uint8]) -> bool:
+    # A truncated PNG decodes with rows of zeros and only a message on stderr: its last chunk must be IEND.
+    return encoded[:8].tobytes() == b"\x89PNG\r\n\x1a\n" and b"IEND" in encoded[-32:].tobytes()
+
+
+def _require_size(path: Path, picture: NDArray[Any], calibration: Calibration) -> None:
+    height, width = picture.shape[:2]
+    if (width, height) != calibration.size_px:
+        expected = f"{calibration.width}x{calibration.height} as in calibration.json"
+        raise PomonaError(f"{path}: found {width}x{height} pixels, expected {expected}")

@@ -1,0 +1,71 @@
+"""Camera poses as TUM text: `time tx ty tz qx qy qz qw`, one line a frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+
+__all__ = ["read_tum"]
+
+UNIT_TOLERANCE = 1e-2
+"""Quaternions are written with few digits; one that is 1 % off unit length is something else."""
+
+
+def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read poses; `#` starts a comment.
+
+    Returns
+    -------
+    times_s : (F,) float64
+        Ascending.
+    session_from_camera : (F, 4, 4) float64
+        OpenCV axes: x right, y down, z forward.
+    """
+    rows = [_row(path, number, line) for number, line in _lines(path)]
+    table = np.array(rows, np.float64).reshape(-1, 8)
+    if (np.diff(table[:, 0]) <= 0).any():
+        late = int(np.argmax(np.diff(table[:, 0]) <= 0)) + 1
+        raise PomonaError(f"{path}: pose {late + 1}: time {table[late, 0]:g} s does not come after the one before")
+    poses = np.tile(np.eye(4), (len(table), 1, 1))
+    poses[:, :3, :3] = _rotations(table[:, 4:])
+    poses[:, :3, 3] = table[:, 1:4]
+    return table[:, 0], poses
+
+
+def _lines(path: Path) -> list[tuple[int, str]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise PomonaError(f"{path}: not text, expected lines of time tx ty tz qx qy qz qw") from None
+    numbered = ((number, line.partition("#")[0].strip()) for number, line in enumerate(text.splitlines(), start=1))
+    return [(number, line) for number, line in numbered if line]
+
+
+def _row(path: Path, number: int, line: str) -> list[float]:
+    try:
+        row = [float(cell) for cell in line.split()]
+    except ValueError as error:
+        raise PomonaError(f"{path}: line {number}: {error}") from None
+    if len(row) != 8:
+        raise PomonaError(f"{path}: line {number}: found {len(row)} numbers, expected time tx ty tz qx qy qz qw")
+    if not np.isfinite(row).all():
+        raise PomonaError(f"{path}: line {number}: found NaN or infinity, expected finite numbers")
+    length = float(np.linalg.norm(row[4:]))
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise PomonaError(f"{path}: line {number}: found a quaternion of length {length:.3g}, expected 1")
+    return row
+
+
+def _rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrices of (F, 4) quaternions x, y, z, w."""
+    x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
