@@ -17,6 +17,10 @@ __all__ = ["ExportFormat", "export_cloud"]
 ExportFormat = Literal["csv", "ply", "geojson"]
 
 
+LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
+"""A frame without a place on Earth, as well-known text."""
+
+
 def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
     """Write fruits with their ids, in metres, in the frame they are in; the file appears whole or not at all.
 
@@ -41,11 +45,16 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
 
 
 def _write_geojson(path: Path, cloud: FruitCloud) -> None:
-    """Write GeoJSON whose coordinates are local metres: ``"crs": null`` says that they are no longitude and latitude.
+    """Write GeoJSON whose coordinates are local metres.
 
-    RFC 7946 knows longitude and latitude only; the 2008 specification, which QGIS and GDAL still read, has the null.
+    RFC 7946 knows longitude and latitude only. The specification of 2008, which QGIS and GDAL read, names a coordinate
+    system: with ours, programs that know it do not take the metres for degrees, and the others skip the name.
     """
-    head = {"type": "FeatureCollection", "name": path.stem, "crs": None}
+    head = {
+        "type": "FeatureCollection",
+        "name": path.stem,
+        "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
+    }
     columns: dict[str, list[Any]] = {name: list(cells) for name, cells in cloud.extras.items()}
     if cloud.diameters_m is not None:
         columns["diameter_m"] = [None if np.isnan(value) else value for value in cloud.diameters_m.tolist()]

@@ -54,10 +54,11 @@ def number(name: str, cell: str) -> float:
     if name in BLANKABLE and cell.strip() in ("", "nan"):
         return math.nan
     try:
-        # Python reads 1_000 as a number, nobody else does.
-        value = float(cell) if "_" not in cell else math.nan
+        value = float(cell)
     except ValueError:
         raise ValueError("expected a number") from None
+    if "_" in cell:  # Python reads 1_000 as a number, nobody else does
+        raise ValueError("expected a number")
     if not math.isfinite(value):
         raise ValueError("expected a finite number")
     if name in WHOLE and (not value.is_integer() or abs(value) > 2**53):

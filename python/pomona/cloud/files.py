@@ -24,6 +24,9 @@ MIN_SPACING_M = 0.005
 MAX_SPACING_M = 5.0
 """A fruit has a neighbour on its tree, and trees are under 5 m; fruits 6 cm apart are 60 away in mm, 6 in cm."""
 
+MIN_FRUITS = 5
+"""Fewer have no median to speak of."""
+
 SPACING_SAMPLE = 1000
 """Fruits asked for their neighbour: the median of 1000 is known to 2 % of rank, whatever the size of the cloud."""
 
@@ -63,7 +66,7 @@ def check_spacing(path: Path, positions: NDArray[np.float64]) -> None:
     """Warn when the distances between neighbours, (N, 3) metres, cannot be those of fruits."""
     from scipy.spatial import cKDTree
 
-    if len(positions) < 2:
+    if len(positions) < MIN_FRUITS:
         return
     sample = positions[:: -(-len(positions) // SPACING_SAMPLE)]
     tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)

@@ -184,7 +184,8 @@ def _array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) ->
     )
     if not fits:
         wanted = ", ".join("N" if want is None else str(want) for want in shape)
-        raise PomonaError(f"{name}: found shape {array.shape}, expected ({wanted})")
+        found = ", ".join(map(str, array.shape))
+        raise PomonaError(f"{name}: found shape ({found}), expected ({wanted})")
     return array
 
 

@@ -1,0 +1,35 @@
+"""What several tests need."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pomona import FruitCloud, Views
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real recordings; tests that need it are skipped where it is absent."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("POMONA_DATA", beside))
+    if not (folder / "kinect_apples").is_dir():
+        pytest.skip(f"no real recordings: {folder} has no kinect_apples; set POMONA_DATA to the folder that has")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def full_cloud() -> FruitCloud:
+    """Six fruits with everything that a cloud can have."""
+    rng = np.random.default_rng(5)
+    spread_m = 0.02 * rng.normal(size=(6, 3, 3))
+    return FruitCloud(
+        positions=rng.normal(size=(6, 3)),
+        ids=tuple(f"apple {row}" for row in range(6)),
+        diameters_m=np.array([0.07, np.nan, 0.071, 0.08, 0.0655, 0.069]),
+        covariances=spread_m @ spread_m.transpose(0, 2, 1),
+        n_views=np.arange(6),
+        views=Views(frames=np.array([4, 4, 9]), fruits=np.array([0, 2, 2])),
+        extras={"note": tuple("abcdef")},
+    )

@@ -1,0 +1,83 @@
+"""The struct of arrays itself: what it takes, how rows are picked, how it is moved."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pomona import FruitCloud, PomonaError, Views
+
+
+def test_a_list_of_points_is_a_cloud() -> None:
+    cloud = FruitCloud([[0, 1, 2], [3, 4, 5]])  # type: ignore[arg-type]
+    assert len(cloud) == 2
+    assert cloud.positions.dtype == np.float64
+    assert cloud.label(1) == "1"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ({"positions": np.zeros((3, 2))}, "positions: found shape (3, 2), expected (N, 3)"),
+        ({"positions": [[0, 0, 0], [0, np.inf, 0]]}, "positions: row 1 is NaN or infinite, expected finite numbers"),
+        ({"ids": ("a",)}, "ids: found 1 values, expected 2, one a fruit"),
+        ({"ids": ("a", "a")}, "ids: rows 0 and 1 are both 'a', expected each id once"),
+        ({"diameters_m": [0.07, -0.07]}, "diameters_m: row 1 is -0.07, expected positive metres or NaN"),
+        ({"diameters_m": ["big", "small"]}, "diameters_m: expected an array of float64"),
+        ({"covariances": np.zeros((2, 3))}, "covariances: found shape (2, 3), expected (2, 3, 3)"),
+        ({"n_views": [1]}, "n_views: found shape (1), expected (2)"),
+        ({"views": Views(np.array([0]), np.array([2]))}, "views.fruits: a sighting names a row outside 0..1"),
+        ({"extras": {"note": ("a",)}}, "note: found 1 values, expected 2, one a fruit"),
+    ],
+)
+def test_refuses_in_one_line(wrong: dict[str, object], line: str) -> None:
+    with pytest.raises(PomonaError) as caught:
+        FruitCloud(**{"positions": np.zeros((2, 3)), **wrong})  # type: ignore[arg-type]
+    assert str(caught.value) == line
+
+
+def test_views_of_unequal_length_are_refused() -> None:
+    with pytest.raises(PomonaError, match=r"views.fruits: found shape \(1\), expected \(2\)"):
+        Views(frames=np.array([1, 2]), fruits=np.array([1]))
+
+
+def test_select_takes_rows_in_order_with_their_sightings(full_cloud: FruitCloud) -> None:
+    cloud = full_cloud
+    picked = cloud.select([2, 0])
+    assert picked.ids == ("apple 2", "apple 0")
+    assert picked.extras["note"] == ("c", "a")
+    np.testing.assert_array_equal(picked.positions, cloud.positions[[2, 0]])
+    assert picked.views is not None
+    np.testing.assert_array_equal(picked.views.frames, [4, 4, 9])
+    np.testing.assert_array_equal(picked.views.fruits, [1, 0, 0])
+
+
+def test_select_takes_a_mask_and_nothing(full_cloud: FruitCloud) -> None:
+    cloud = full_cloud
+    assert cloud.select(np.arange(6) > 3).ids == ("apple 4", "apple 5")
+    assert len(cloud.select([])) == 0
+
+
+def test_select_refuses_a_row_twice(full_cloud: FruitCloud) -> None:
+    with pytest.raises(PomonaError, match="a row is named twice"):
+        full_cloud.select([1, 1])
+
+
+@given(scale=st.floats(0.1, 10.0), angle_rad=st.floats(-3.1, 3.1))
+def test_transformed_turns_scales_and_moves(full_cloud: FruitCloud, scale: float, angle_rad: float) -> None:
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    map_from_query = np.eye(4)
+    map_from_query[:3, :3] = scale * rotation
+    map_from_query[:3, 3] = (1, 2, 3)
+    cloud = full_cloud
+    moved = cloud.transformed(map_from_query)
+    np.testing.assert_allclose(moved.positions, scale * cloud.positions @ rotation.T + (1, 2, 3), atol=1e-12)
+    assert moved.covariances is not None
+    assert cloud.covariances is not None
+    # The volume of the error ellipsoid grows with the sixth power of the scale, whatever the rotation.
+    np.testing.assert_allclose(np.linalg.det(moved.covariances), scale**6 * np.linalg.det(cloud.covariances), rtol=1e-6)
+    assert moved.diameters_m is not None
+    np.testing.assert_allclose(moved.diameters_m[0], scale * 0.07)
+    back = moved.transformed(np.linalg.inv(map_from_query))
+    np.testing.assert_allclose(back.positions, cloud.positions, atol=1e-9)
