@@ -182,8 +182,7 @@ WRONG_CLOUDS = {
 }
 
 
-@pytest.mark.parametrize("content", WRONG_CLOUDS, ids=str)
-@pytest.mark.parametrize("side", ["query", "map"])
+@pytest.mark.parametrize(("content", "side"), [*((content, "query") for content in WRONG_CLOUDS), ("a letter", "map")])
 def test_refuses_a_wrong_cloud(visits: Path, tmp_path: Path, content: str, side: str) -> None:
     text, named = WRONG_CLOUDS[content]
     cloud, output = tmp_path / "cloud.csv", tmp_path / "pairs.csv"
@@ -239,10 +238,12 @@ def test_refuses_wrong_settings(visits: Path, tmp_path: Path, verb: str, text: s
 
 
 @pytest.mark.parametrize("method", ["paper", "verified"])
-@pytest.mark.parametrize("scale", ["metric", "free"])
-@pytest.mark.parametrize("scene", ["none", "three", "line", "one place"])
+@pytest.mark.parametrize(
+    ("scene", "scale"),
+    [("none", "metric"), ("three", "metric"), ("line", "metric"), ("line", "free"), ("one place", "metric")],
+)
 def test_a_scene_without_an_answer_is_a_result(
-    visits: Path, tmp_path: Path, method: str, scale: str, scene: str
+    visits: Path, tmp_path: Path, method: str, scene: str, scale: str
 ) -> None:
     steps = np.arange({"none": 0, "three": 3}.get(scene, 40))
     positions = np.outer(0 * steps if scene == "one place" else steps, [0.2, 0.1, 0.3])
