@@ -65,7 +65,7 @@ class Settings:
         from pomona.matching import default_config
 
         tables = {_CALL_TABLE: self.call, **_merged(default_config(), self.overrides)}
-        return "\n".join(_toml_lines(tables))
+        return "\n".join(_toml_lines(tables)).lstrip("\n")
 
 
 def _defaults_of_match() -> dict[str, Any]:
@@ -109,7 +109,7 @@ def _toml_lines(tables: Mapping[str, Any], place: str = "") -> Iterator[str]:
         if name not in inner:
             yield f"# {name} is not set" if value is None else f"{name} = {_toml_value(value)}"
     for name, table in inner.items():
-        yield f"\n[{place}{name}]" if place or tables is not inner else f"[{place}{name}]"
+        yield f"\n[{place}{name}]"
         yield from _toml_lines(table, f"{place}{name}.")
 
 

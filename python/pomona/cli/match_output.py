@@ -64,7 +64,12 @@ def as_text(match: Match) -> str:
 def as_stages(match: Match) -> str:
     """Return what happened, a stage and its count a line."""
     width = max((len(name) for name, _ in match.stages), default=0)
-    return "\n".join(f"  {name:<{width}}  {count:,.6g}" for name, count in match.stages)
+    lines = (f"  {name:<{width}}  {_count(count)}" for name, count in match.stages)
+    return "\n".join(["stages", *lines])
+
+
+def _count(count: float) -> str:
+    return f"{count:,.0f}" if float(count).is_integer() else f"{count:,.4g}"
 
 
 def _rows(match: Match) -> Iterator[tuple[int, int, float, float]]:
