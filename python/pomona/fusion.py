@@ -4,6 +4,12 @@ With sightings x_i of covariance C_i the centre is the minimum of sum_i rho(m_i^
 x_i), rho Cauchy's: x = (sum w_i C_i^-1)^-1 sum w_i C_i^-1 x_i with w_i = 1 / (1 + m_i^2 / 3) (3 is what m_i^2 is on
 average). A sighting of the leaf in front is 5 sigma off and counts a ninth. Rays that cross make the long axes of the
 C_i cut each other: that is how many poor depths give one good place.
+
+Leaves make an outline smaller, never larger. So a measured diameter D_i is the true one, less a hidden part with an
+exponential distribution of mean h_i D_i, plus Gaussian noise, and the diameter comes from the likelihood
+
+    L(D) = prod_i 1/(h_i D_i) exp(sigma_i^2 / (2 h_i^2 D_i^2) - (D - D_i) / (h_i D_i))
+                  Phi((D - D_i) / sigma_i - sigma_i / (h_i D_i)).                                     (1)
 """
 
 from __future__ import annotations
@@ -16,6 +22,9 @@ __all__ = ["fuse_centres", "fuse_diameters"]
 Array = NDArray[np.float64]
 
 ITERATIONS = 10
+
+CANDIDATES = 400
+"""Diameters at which the likelihood is summed: a tenth of a millimetre apart for an apple."""
 
 SHARED = 0.1
 """Part of a sighting's variance that the next one repeats: shape, outline and leaves change little from frame to
@@ -51,16 +60,40 @@ def fuse_centres(centres: Array, covariances: Array) -> tuple[Array, Array]:
     return centre, (covariance + covariance.T) / 2
 
 
-def fuse_diameters(diameters_m: Array, sigmas_m: Array) -> tuple[float, float]:
-    """Fuse diameters (V,) with standard deviations (V,) in the same way; give the diameter and its sigma."""
-    diameter_m = float(np.median(diameters_m))
-    for _ in range(ITERATIONS):
-        weight = 1.0 / (sigmas_m**2 * (1.0 + ((diameters_m - diameter_m) / sigmas_m) ** 2))
-        diameter_m = float(weight @ diameters_m / weight.sum())
+def fuse_diameters(diameters_m: Array, sigmas_m: Array, hidden: Array) -> tuple[float, float]:
+    """Fuse diameters of one fruit by equation (1).
+
+    One sighting alone stays as it is: nothing says how much of it is hidden.
+
+    Parameters
+    ----------
+    diameters_m : (V,) float64
+        As the sightings measured them.
+    sigmas_m : (V,) float64
+        Their standard deviations, what leaves hide included.
+    hidden : (V,) float64
+        Mean part of the diameter that leaves are expected to hide.
+
+    Returns
+    -------
+    diameter_m, sigma_m : float
+        Mean and standard deviation of the likelihood.
+    """
+    from scipy.special import log_ndtr
+
     if len(diameters_m) == 1:
-        return diameter_m, float(sigmas_m[0])
-    chi2 = float(weight @ (diameters_m - diameter_m) ** 2) / (len(diameters_m) - 1)
-    return diameter_m, float(np.sqrt(max(chi2, 1.0) / weight.sum() + SHARED * np.mean(sigmas_m**2)))
+        return float(diameters_m[0]), float(sigmas_m[0])
+    scale = hidden * diameters_m
+    sigma = np.sqrt(np.maximum(sigmas_m**2 - scale**2, scale**2 / 100))
+    low, high = float((diameters_m - 3 * sigma).min()), float((diameters_m + 3 * sigma + 3 * scale).max())
+    candidates = np.linspace(max(low, 0.0), high, CANDIDATES)
+    short = candidates[:, None] - diameters_m
+    log_density = log_ndtr(short / sigma - sigma / scale) - short / scale + (sigma / scale) ** 2 / 2
+    log_likelihood = log_density.sum(axis=1) / (1.0 + SHARED * (len(diameters_m) - 1))
+    weight = np.exp(log_likelihood - log_likelihood.max())
+    weight /= weight.sum()
+    mean = float(weight @ candidates)
+    return mean, float(np.sqrt(weight @ (candidates - mean) ** 2))
 
 
 def _mahalanobis2(deviations: Array, information: Array) -> Array:

@@ -64,6 +64,8 @@ class Outline:
         0 or 1 where the fruit is partly hidden along x or y.
     slack : float
         How far the centre can lie from `centre` along `hidden_axis`, either way; 0 without one.
+    whole_axes : int
+        How many axes have both edges of the fruit itself, 0 to 2.
     """
 
     centre: NDArray[np.float64]
@@ -72,6 +74,7 @@ class Outline:
     radius_sigma: float
     hidden_axis: int | None
     slack: float
+    whole_axes: int
 
 
 @dataclass(frozen=True)
@@ -155,9 +158,9 @@ def _whole(sides: tuple[_Side, _Side]) -> Outline:
     slack = radii[long] - radii[1 - long]
     # Rounding alone makes a fruit of few pixels elongated.
     if radii[long] > ROUNDNESS * radii[1 - long] and slack > middle_sigma.max():
-        return Outline(centre, radii[long], middle_sigma, float(middle_sigma[long]), 1 - long, slack)
+        return Outline(centre, radii[long], middle_sigma, float(middle_sigma[long]), 1 - long, slack, 2)
     radius_sigma = float(np.hypot(*middle_sigma)) / 2  # half the difference of two edges, averaged over two sides
-    return Outline(centre, math.sqrt(radii[0] * radii[1]), middle_sigma, radius_sigma, None, 0.0)
+    return Outline(centre, math.sqrt(radii[0] * radii[1]), middle_sigma, radius_sigma, None, 0.0, 2)
 
 
 def _bounded(sides: tuple[_Side, _Side]) -> Outline:
@@ -173,16 +176,17 @@ def _bounded(sides: tuple[_Side, _Side]) -> Outline:
         axis = int(sides[1].radius > sides[0].radius)
         radius_sigma = math.hypot(sides[axis].edge_sigma / math.sqrt(2), COVERED_SIGMA * radius)
     other = sides[1 - axis]
+    whole_axes = sides[0].whole + sides[1].whole
     centre, centre_sigma = np.empty(2), np.empty(2)
     centre[axis], centre_sigma[axis] = sides[axis].middle, max(sides[axis].edge_sigma / math.sqrt(2), radius_sigma)
     centre[1 - axis], centre_sigma[1 - axis] = other.middle, other.edge_sigma / math.sqrt(2)
     if not any(other.own):
-        return Outline(centre, radius, centre_sigma, radius_sigma, 1 - axis, radius - other.radius)
+        return Outline(centre, radius, centre_sigma, radius_sigma, 1 - axis, radius - other.radius, whole_axes)
     if not other.whole and radius > ROUNDNESS * other.radius:
         own = 0 if other.own[0] else 1
         centre[1 - axis] = _centre_from_edge(other.angles[own], radius, +1 if own == 0 else -1)
         centre_sigma[1 - axis] = math.hypot(other.edge_sigma, radius_sigma)
-    return Outline(centre, radius, centre_sigma, radius_sigma, None, 0.0)
+    return Outline(centre, radius, centre_sigma, radius_sigma, None, 0.0, whole_axes)
 
 
 def _centre_from_edge(angle: float, radius: float, inwards: int) -> float:

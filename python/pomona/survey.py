@@ -61,6 +61,7 @@ class _Sightings:
     covariances: list[NDArray[np.float64]] = field(default_factory=list)
     diameters_m: list[float] = field(default_factory=list)
     diameter_sigmas_m: list[float] = field(default_factory=list)
+    hidden: list[float] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -73,6 +74,7 @@ class _Sightings:
         self.covariances.extend(rotation @ lifted.covariances @ rotation.T)
         self.diameters_m.extend(lifted.diameters_m.tolist())
         self.diameter_sigmas_m.extend(lifted.diameter_sigmas_m.tolist())
+        self.hidden.extend(lifted.hidden.tolist())
 
 
 def scan(recording: Recording, detector: Detector, *, progress: Progress | None = None) -> Survey:
@@ -153,9 +155,10 @@ def _fused(sightings: _Sightings) -> FruitCloud:
     covariances = np.array(sightings.covariances).reshape(-1, 3, 3)
     diameters_m = np.array(sightings.diameters_m, np.float64)
     sigmas_m = np.array(sightings.diameter_sigmas_m, np.float64)
+    hidden = np.array(sightings.hidden, np.float64)
     groups = [np.flatnonzero(fruit == row) for row in range(len(row_of))]
     places = [fuse_centres(centres[group], covariances[group]) for group in groups]
-    sizes = [fuse_diameters(diameters_m[group], sigmas_m[group]) for group in groups]
+    sizes = [fuse_diameters(diameters_m[group], sigmas_m[group], hidden[group]) for group in groups]
     return FruitCloud(
         positions=np.array([centre for centre, _ in places]).reshape(-1, 3),
         ids=tuple(row_of),
