@@ -166,26 +166,28 @@ def _whole(sides: tuple[_Side, _Side]) -> Outline:
 def _bounded(sides: tuple[_Side, _Side]) -> Outline:
     """Take size from the longer side and place from edges of the fruit's own, where others are only bounds.
 
-    A box as round as fruits are was drawn around the whole fruit, leaf or not: then its middle is the better place.
+    A box as round as fruits are was drawn around the whole fruit, leaf or not: it counts as it is.
     """
-    radius = max(side.radius for side in sides)
-    if sides[0].whole or sides[1].whole:
-        axis = 0 if sides[0].whole else 1
-        radius_sigma = sides[axis].edge_sigma / math.sqrt(2)
-    else:
-        axis = int(sides[1].radius > sides[0].radius)
-        radius_sigma = math.hypot(sides[axis].edge_sigma / math.sqrt(2), COVERED_SIGMA * radius)
-    other = sides[1 - axis]
+    short, long = sorted(side.radius for side in sides)
+    is_cut = any(sides[0].cut) or any(sides[1].cut)
+    is_round = not is_cut and long <= ROUNDNESS * short
+    radius = math.sqrt(short * long) if is_round else long
     whole_axes = sides[0].whole + sides[1].whole
+    axis = int(sides[1].radius > sides[0].radius) if whole_axes == 0 else int(sides[1].whole)
+    edge_sigma = sides[axis].edge_sigma / math.sqrt(2)
+    radius_sigma = edge_sigma if whole_axes else math.hypot(edge_sigma, COVERED_SIGMA * radius)
+    other = sides[1 - axis]
     centre, centre_sigma = np.empty(2), np.empty(2)
-    centre[axis], centre_sigma[axis] = sides[axis].middle, max(sides[axis].edge_sigma / math.sqrt(2), radius_sigma)
+    centre[axis], centre_sigma[axis] = sides[axis].middle, max(edge_sigma, radius_sigma)
     centre[1 - axis], centre_sigma[1 - axis] = other.middle, other.edge_sigma / math.sqrt(2)
+    if is_round or other.whole:
+        return Outline(centre, radius, centre_sigma, radius_sigma, None, 0.0, whole_axes)
     if not any(other.own):
-        return Outline(centre, radius, centre_sigma, radius_sigma, 1 - axis, radius - other.radius, whole_axes)
-    if not other.whole and radius > ROUNDNESS * other.radius:
-        own = 0 if other.own[0] else 1
-        centre[1 - axis] = _centre_from_edge(other.angles[own], radius, +1 if own == 0 else -1)
-        centre_sigma[1 - axis] = math.hypot(other.edge_sigma, radius_sigma)
+        slack = max(radius - other.radius, 0.0)
+        return Outline(centre, radius, centre_sigma, radius_sigma, 1 - axis, slack, whole_axes)
+    own = 0 if other.own[0] else 1
+    centre[1 - axis] = _centre_from_edge(other.angles[own], radius, +1 if own == 0 else -1)
+    centre_sigma[1 - axis] = math.hypot(other.edge_sigma, radius_sigma)
     return Outline(centre, radius, centre_sigma, radius_sigma, None, 0.0, whole_axes)
 
 
