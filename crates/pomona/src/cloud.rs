@@ -54,6 +54,7 @@ impl FruitCloud {
     }
 
     /// The rows `rows` as a cloud of their own, in that order; sightings are dropped.
+    #[must_use]
     pub fn select(&self, rows: &[usize]) -> Self {
         Self {
             positions: rows.iter().map(|&row| self.positions[row]).collect(),

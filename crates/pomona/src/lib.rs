@@ -9,8 +9,11 @@
 
 pub mod assignment;
 pub mod cloud;
+pub mod constellation;
+pub mod descriptor;
 pub mod error;
 pub mod geometry;
+pub mod index;
 pub mod matching;
 
 pub use cloud::{FruitCloud, Views};

@@ -1,0 +1,477 @@
+//! Exact search among points of a fixed dimension: codes of constellations (5, 8, 11 or 14 numbers) and fruits (3).
+//!
+//! A balanced k-d tree whose nodes keep the tight box of their points and whose leaves hold up to [`LEAF`] points
+//! coordinate by coordinate, so that one pass of vector instructions measures a whole leaf. Boxes and leaves are stored
+//! in single precision, about the middle of the points; every candidate that survives is measured again in double
+//! precision. The bound that prunes is widened by the largest possible rounding error, so the answer is exact. Of equal
+//! distances the smaller row wins, which makes the answer independent of the order of the search.
+
+use rayon::prelude::*;
+
+/// Points in a leaf at most: four vectors of four lanes, the width every x86-64 and aarch64 has.
+const LEAF: usize = 16;
+/// Below this many points a subtree is built on one thread; splitting smaller work costs more than it saves.
+const PARALLEL_BUILD: usize = 4096;
+/// Queries answered in one piece of work.
+const QUERIES_PER_TASK: usize = 512;
+
+/// A row of the index and its Euclidean distance from the query.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    /// Row among the indexed points.
+    pub row: usize,
+    /// Euclidean distance.
+    pub distance: f64,
+}
+
+/// Exact nearest-neighbour and radius search over points of `D` numbers.
+#[derive(Debug, Clone)]
+pub struct Index<const D: usize> {
+    points: Vec<[f64; D]>,
+    /// Row of each place of the leaves; `u32::MAX` pads.
+    rows: Vec<[u32; LEAF]>,
+    leaves: Vec<[[f32; LEAF]; D]>,
+    /// Boxes of the complete binary tree, the root first, the children of `i` at `2 i + 1` and `2 i + 2`.
+    boxes: Vec<Aabb<D>>,
+    middle: [f64; D],
+    /// Largest distance of a coordinate from the middle.
+    reach: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Aabb<const D: usize> {
+    low: [f32; D],
+    high: [f32; D],
+}
+
+impl<const D: usize> Aabb<D> {
+    const EMPTY: Self = Self { low: [f32::INFINITY; D], high: [f32::NEG_INFINITY; D] };
+
+    #[inline]
+    fn distance_squared(&self, query: &[f32; D]) -> f32 {
+        let mut sum = 0.0;
+        for ((low, high), x) in self.low.iter().zip(&self.high).zip(query) {
+            let outside = (low - x).max(x - high).max(0.0);
+            sum += outside * outside;
+        }
+        sum
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        let mut union = *self;
+        for d in 0..D {
+            union.low[d] = union.low[d].min(other.low[d]);
+            union.high[d] = union.high[d].max(other.high[d]);
+        }
+        union
+    }
+}
+
+/// What a search keeps of the points it meets.
+trait Keep {
+    /// Squared distance beyond which nothing is kept any more.
+    fn limit_squared(&self) -> f64;
+    fn offer(&mut self, row: u32, distance_squared: f64);
+}
+
+struct KeepNearest {
+    row: u32,
+    distance_squared: f64,
+}
+
+impl Keep for KeepNearest {
+    fn limit_squared(&self) -> f64 {
+        self.distance_squared
+    }
+
+    fn offer(&mut self, row: u32, distance_squared: f64) {
+        if (distance_squared, row) < (self.distance_squared, self.row) {
+            (self.row, self.distance_squared) = (row, distance_squared);
+        }
+    }
+}
+
+struct KeepWithin {
+    limit_squared: f64,
+    found: Vec<(u32, f64)>,
+}
+
+impl Keep for KeepWithin {
+    fn limit_squared(&self) -> f64 {
+        self.limit_squared
+    }
+
+    fn offer(&mut self, row: u32, distance_squared: f64) {
+        if distance_squared <= self.limit_squared {
+            self.found.push((row, distance_squared));
+        }
+    }
+}
+
+/// The `count` nearest, nearest first.
+struct KeepNearestFew {
+    count: usize,
+    found: Vec<(f64, u32)>,
+}
+
+impl Keep for KeepNearestFew {
+    fn limit_squared(&self) -> f64 {
+        if self.found.len() < self.count { f64::INFINITY } else { self.found[self.count - 1].0 }
+    }
+
+    fn offer(&mut self, row: u32, distance_squared: f64) {
+        let place = self.found.partition_point(|&kept| kept < (distance_squared, row));
+        if place < self.count {
+            self.found.truncate(self.count - 1);
+            self.found.insert(place, (distance_squared, row));
+        }
+    }
+}
+
+/// A query in the precision of the tree.
+struct Probe<'a, const D: usize> {
+    exact: &'a [f64; D],
+    rounded: [f32; D],
+    /// Largest error of a distance between this query and a point or box, see [`Index::probe`].
+    slack: f64,
+}
+
+impl<const D: usize> Probe<'_, D> {
+    /// A single-precision bound that no rounding error lets a kept point exceed.
+    fn widen(&self, limit_squared: f64) -> f32 {
+        let relative = 1.0 + D as f64 * f64::from(f32::EPSILON);
+        let widened = (limit_squared.sqrt() + self.slack) * relative;
+        (widened * widened * relative) as f32
+    }
+}
+
+impl<const D: usize> Index<D> {
+    /// Indexes `points`; rows of answers are rows of `points`.
+    ///
+    /// # Panics
+    /// If a coordinate is not finite or there are more than `u32::MAX - 1` points.
+    pub fn new(points: Vec<[f64; D]>) -> Self {
+        assert!(points.iter().flatten().all(|x| x.is_finite()), "an indexed coordinate is not finite");
+        let mut order: Vec<u32> = (0..u32::try_from(points.len()).expect("fewer than 2^32 points")).collect();
+        let (low, high) = extent(&points, &order);
+        let middle: [f64; D] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
+        let reach = (0..D).map(|d| 0.5 * (high[d] - low[d])).fold(0.0, f64::max);
+        let levels = points.len().div_ceil(LEAF).next_power_of_two().ilog2();
+        split(&points, &mut order, levels);
+        let mut index = Self { points, rows: Vec::new(), leaves: Vec::new(), boxes: Vec::new(), middle, reach };
+        index.fill_leaves(&order, levels);
+        index.fill_boxes();
+        index
+    }
+
+    /// Number of indexed points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether nothing is indexed.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The indexed points, in the order they were given.
+    pub fn points(&self) -> &[[f64; D]] {
+        &self.points
+    }
+
+    fn fill_leaves(&mut self, order: &[u32], levels: u32) {
+        let (n, n_leaves) = (order.len(), 1usize << levels);
+        let mut start = 0;
+        let mut ends = Vec::with_capacity(n_leaves);
+        leaf_ends(n, levels, 0, &mut ends);
+        for end in ends {
+            let mut leaf = [[f32::INFINITY; LEAF]; D];
+            let mut rows = [u32::MAX; LEAF];
+            for (place, &row) in order[start..end].iter().enumerate() {
+                rows[place] = row;
+                let rounded = self.round(&self.points[row as usize]);
+                for d in 0..D {
+                    leaf[d][place] = rounded[d];
+                }
+            }
+            self.rows.push(rows);
+            self.leaves.push(leaf);
+            start = end;
+        }
+    }
+
+    fn fill_boxes(&mut self) {
+        let inner = self.leaves.len() - 1;
+        self.boxes = vec![Aabb::EMPTY; inner + self.leaves.len()];
+        for (leaf, (coordinates, rows)) in (inner..).zip(self.leaves.iter().zip(&self.rows)) {
+            let filled = rows.iter().filter(|&&row| row != u32::MAX).count();
+            let side = |pick: fn(f32, f32) -> f32, start| {
+                std::array::from_fn(|d| coordinates[d][..filled].iter().copied().fold(start, pick))
+            };
+            self.boxes[leaf] = Aabb { low: side(f32::min, f32::INFINITY), high: side(f32::max, f32::NEG_INFINITY) };
+        }
+        for node in (0..inner).rev() {
+            self.boxes[node] = self.boxes[2 * node + 1].union(&self.boxes[2 * node + 2]);
+        }
+    }
+
+    fn round(&self, point: &[f64; D]) -> [f32; D] {
+        std::array::from_fn(|d| (point[d] - self.middle[d]) as f32)
+    }
+
+    /// Rounding moves a coordinate of query or point by half an ulp of at most `reach` or the query's own, and their
+    /// difference by as much again: four ulps per coordinate cover it.
+    fn probe<'a>(&self, query: &'a [f64; D]) -> Probe<'a, D> {
+        let rounded = self.round(query);
+        let largest = rounded.iter().fold(self.reach, |largest, x| largest.max(f64::from(x.abs())));
+        Probe { exact: query, rounded, slack: 4.0 * largest * f64::from(f32::EPSILON) * (D as f64).sqrt() }
+    }
+
+    /// The nearest point; `None` where nothing is indexed.
+    pub fn nearest(&self, query: &[f64; D]) -> Option<Neighbour> {
+        self.nearest_from(query, None)
+    }
+
+    /// The nearest point, where `guess` is a row that is probably near.
+    fn nearest_from(&self, query: &[f64; D], guess: Option<usize>) -> Option<Neighbour> {
+        let mut keep = KeepNearest { row: u32::MAX, distance_squared: f64::INFINITY };
+        if let Some(row) = guess {
+            keep.offer(row as u32, distance_squared(query, &self.points[row]));
+        }
+        self.search(query, &mut keep);
+        (keep.row != u32::MAX).then(|| Neighbour { row: keep.row as usize, distance: keep.distance_squared.sqrt() })
+    }
+
+    /// The nearest point of every query; `None` where nothing is indexed.
+    ///
+    /// Queries are answered in the order of the tree, so that neighbouring queries share what they touch and the answer
+    /// of one bounds the next.
+    pub fn nearest_all(&self, queries: &[[f64; D]]) -> Vec<Option<Neighbour>> {
+        let mut order: Vec<(u32, u32)> =
+            queries.par_iter().enumerate().map(|(i, query)| (self.home(query), i as u32)).collect();
+        order.par_sort_unstable();
+        let answers: Vec<_> = order
+            .par_chunks(QUERIES_PER_TASK)
+            .flat_map_iter(|chunk| {
+                let mut guess = None;
+                chunk.iter().map(move |&(_, i)| {
+                    let found = self.nearest_from(&queries[i as usize], guess);
+                    guess = found.map(|neighbour| neighbour.row);
+                    (i, found)
+                })
+            })
+            .collect();
+        let mut sorted = vec![None; queries.len()];
+        for (i, found) in answers {
+            sorted[i as usize] = found;
+        }
+        sorted
+    }
+
+    /// All points within `radius`, by ascending row.
+    pub fn within(&self, query: &[f64; D], radius: f64) -> Vec<Neighbour> {
+        let mut keep = KeepWithin { limit_squared: radius * radius, found: Vec::new() };
+        self.search(query, &mut keep);
+        keep.found.sort_unstable_by_key(|&(row, _)| row);
+        keep.found.iter().map(|&(row, d)| Neighbour { row: row as usize, distance: d.sqrt() }).collect()
+    }
+
+    /// The `count` nearest points, nearest first; fewer where fewer are indexed.
+    pub fn nearest_few(&self, query: &[f64; D], count: usize) -> Vec<Neighbour> {
+        if count == 0 {
+            return Vec::new();
+        }
+        let mut keep = KeepNearestFew { count, found: Vec::with_capacity(count + 1) };
+        self.search(query, &mut keep);
+        keep.found.iter().map(|&(d, row)| Neighbour { row: row as usize, distance: d.sqrt() }).collect()
+    }
+
+    /// The leaf that a query falls into.
+    fn home(&self, query: &[f64; D]) -> u32 {
+        let (query, inner) = (self.round(query), self.leaves.len() - 1);
+        let mut node = 0;
+        while node < inner {
+            let (left, right) = (2 * node + 1, 2 * node + 2);
+            let nearer_right = self.boxes[right].distance_squared(&query) < self.boxes[left].distance_squared(&query);
+            node = if nearer_right { right } else { left };
+        }
+        (node - inner) as u32
+    }
+
+    fn search(&self, query: &[f64; D], keep: &mut impl Keep) {
+        let probe = self.probe(query);
+        let inner = self.leaves.len() - 1;
+        let mut limit = probe.widen(keep.limit_squared());
+        // Depth of the tree at most 28 for 2^32 points; one waiting sibling per level.
+        let mut waiting = [(0usize, 0.0f32); 32];
+        let mut n_waiting = 0;
+        let (mut node, mut distance) = (0, 0.0);
+        loop {
+            if distance <= limit {
+                while node < inner {
+                    let left = self.boxes[2 * node + 1].distance_squared(&probe.rounded);
+                    let right = self.boxes[2 * node + 2].distance_squared(&probe.rounded);
+                    let nearer_right = right < left;
+                    let farther = left.max(right);
+                    if farther <= limit {
+                        waiting[n_waiting] = (2 * node + 2 - usize::from(nearer_right), farther);
+                        n_waiting += 1;
+                    }
+                    node = 2 * node + 1 + usize::from(nearer_right);
+                    distance = left.min(right);
+                    if distance > limit {
+                        break;
+                    }
+                }
+                if node >= inner && distance <= limit && self.scan(node - inner, &probe, limit, keep) {
+                    limit = probe.widen(keep.limit_squared());
+                }
+            }
+            if n_waiting == 0 {
+                return;
+            }
+            n_waiting -= 1;
+            (node, distance) = waiting[n_waiting];
+        }
+    }
+
+    /// Measures a leaf; whether anything was offered.
+    #[inline]
+    fn scan(&self, leaf: usize, probe: &Probe<D>, limit: f32, keep: &mut impl Keep) -> bool {
+        let mut sums = [0.0f32; LEAF];
+        for (coordinates, query) in self.leaves[leaf].iter().zip(&probe.rounded) {
+            for (sum, x) in sums.iter_mut().zip(coordinates) {
+                let difference = x - query;
+                *sum += difference * difference;
+            }
+        }
+        if sums.iter().copied().fold(f32::INFINITY, f32::min) > limit {
+            return false;
+        }
+        let rows = &self.rows[leaf];
+        for place in 0..LEAF {
+            if sums[place] <= limit && rows[place] != u32::MAX {
+                keep.offer(rows[place], distance_squared(probe.exact, &self.points[rows[place] as usize]));
+            }
+        }
+        true
+    }
+}
+
+fn distance_squared<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|d| (a[d] - b[d]) * (a[d] - b[d])).sum()
+}
+
+/// Smallest and largest coordinates of the rows `order`; zeros where there are none.
+fn extent<const D: usize>(points: &[[f64; D]], order: &[u32]) -> ([f64; D], [f64; D]) {
+    let first = order.first().map_or([0.0; D], |&row| points[row as usize]);
+    let (mut low, mut high) = (first, first);
+    for &row in order {
+        let point = &points[row as usize];
+        for d in 0..D {
+            low[d] = low[d].min(point[d]);
+            high[d] = high[d].max(point[d]);
+        }
+    }
+    (low, high)
+}
+
+/// Orders rows such that every subtree is contiguous; halves along the widest side, ties by row.
+fn split<const D: usize>(points: &[[f64; D]], order: &mut [u32], levels: u32) {
+    if levels == 0 {
+        return;
+    }
+    let (low, high) = extent(points, order);
+    let widest = (0..D).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+    let half = order.len() / 2;
+    if half > 0 {
+        order.select_nth_unstable_by(half, |&a, &b| {
+            points[a as usize][widest].total_cmp(&points[b as usize][widest]).then(a.cmp(&b))
+        });
+    }
+    let (left, right) = order.split_at_mut(half);
+    if left.len() > PARALLEL_BUILD {
+        rayon::join(|| split(points, left, levels - 1), || split(points, right, levels - 1));
+    } else {
+        split(points, left, levels - 1);
+        split(points, right, levels - 1);
+    }
+}
+
+/// Where the leaves end after [`split`] of `n` rows.
+fn leaf_ends(n: usize, levels: u32, start: usize, ends: &mut Vec<usize>) {
+    if levels == 0 {
+        ends.push(start + n);
+    } else {
+        leaf_ends(n / 2, levels - 1, start, ends);
+        leaf_ends(n - n / 2, levels - 1, start + n / 2, ends);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Every row, nearest first, ties by row.
+    fn ranked<const D: usize>(points: &[[f64; D]], query: &[f64; D]) -> Vec<(f64, usize)> {
+        let mut all: Vec<_> =
+            points.iter().enumerate().map(|(row, p)| (distance_squared(query, p).sqrt(), row)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        all
+    }
+
+    fn answers(found: &[Neighbour]) -> Vec<(f64, usize)> {
+        found.iter().map(|neighbour| (neighbour.distance, neighbour.row)).collect()
+    }
+
+    fn check<const D: usize>(points: &[[f64; D]], queries: &[[f64; D]], radius: f64) {
+        let index = Index::new(points.to_vec());
+        let together = index.nearest_all(queries);
+        for (query, nearest) in queries.iter().zip(together) {
+            let expected = ranked(points, query);
+            assert_eq!(nearest.map(|n| (n.distance, n.row)), expected.first().copied());
+            assert_eq!(index.nearest(query), nearest);
+            assert_eq!(answers(&index.nearest_few(query, 7)), expected[..expected.len().min(7)].to_vec());
+            let mut inside: Vec<_> = expected.iter().copied().filter(|n| n.0 * n.0 <= radius * radius).collect();
+            inside.sort_by_key(|n| n.1);
+            assert_eq!(answers(&index.within(query, radius)), inside);
+        }
+    }
+
+    fn points<const D: usize>(most: usize) -> impl Strategy<Value = Vec<[f64; D]>> {
+        // Some coordinates on a grid, which makes ties.
+        let coordinate = prop_oneof![-1.0..1.0f64, (-3..3i32).prop_map(|i| f64::from(i) / 4.0)];
+        prop::collection::vec(prop::array::uniform(coordinate), 0..most)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn as_looking_at_all_in_3d(all in points::<3>(300), queries in points::<3>(20), radius in 0.0..1.0f64) {
+            check(&all, &queries, radius);
+        }
+
+        #[test]
+        fn as_looking_at_all_in_8d(all in points::<8>(300), queries in points::<8>(20), radius in 0.0..2.0f64) {
+            check(&all, &queries, radius);
+        }
+
+        #[test]
+        fn far_from_the_origin(all in points::<3>(200), queries in points::<3>(20)) {
+            // Easting and northing: metres in the hundreds of thousands, which single precision rounds to centimetres.
+            let moved = |p: &[f64; 3]| [p[0] * 0.01 + 512_345.0, p[1] * 0.01 + 4_181_234.0, p[2]];
+            let all: Vec<_> = all.iter().map(moved).collect();
+            let queries: Vec<_> = queries.iter().map(moved).collect();
+            check(&all, &queries, 0.01);
+        }
+    }
+
+    #[test]
+    fn nothing_indexed_nothing_found() {
+        let index = Index::<5>::new(Vec::new());
+        assert_eq!(index.nearest(&[0.0; 5]), None);
+        assert!(index.within(&[0.0; 5], f64::MAX).is_empty());
+    }
+}
