@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from pomona.cli.match import (
+from pomona.cli.match_options import (
     Method,
     Scale,
     call_flags,

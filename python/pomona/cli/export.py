@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from pomona.cli.match import Unit
+from pomona.cli.match_options import Unit
 
 
 class Format(StrEnum):

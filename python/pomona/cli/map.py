@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pomona.cli.match import (
+from pomona.cli.match_options import (
     Method,
     Scale,
     Unit,

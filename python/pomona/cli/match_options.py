@@ -1,0 +1,82 @@
+"""What the verbs that match are told: flags with their help, shared by `match`, `map add` and `config`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import typer
+
+from pomona.errors import PomonaError
+
+
+class Method(StrEnum):
+    """Which method decides."""
+
+    paper = "paper"
+    verified = "verified"
+
+
+class Scale(StrEnum):
+    """What is known of the two clouds' scales."""
+
+    metric = "metric"
+    free = "free"
+
+
+class Unit(StrEnum):
+    """Unit of the coordinates in the files."""
+
+    m = "m"
+    cm = "cm"
+    mm = "mm"
+    free = "free"
+
+
+method_option = typer.Option(None, help="The paper's votes, or constellations verified by log-odds (the default).")
+scale_option = typer.Option(None, help="metric: both clouds are in metres (the default); free: their ratio is unknown.")
+noise_option = typer.Option(
+    None, "--noise", min=0.0, help="Relative noise of the visits per axis, metres; estimated where not given."
+)
+up_option = typer.Option(
+    None,
+    "--up",
+    metavar="X,Y,Z",
+    help="The vertical, as a direction. Once: the same in both clouds; twice: in the query, then in the map.",
+)
+config_option = typer.Option(None, help="Settings as TOML; `pomona config` prints them all.")
+per_frame_option = typer.Option(
+    None, "--per-frame/--whole", help="One transform for each frame of the query, pairs merged; or one for the cloud."
+)
+threads_option = typer.Option(None, min=1, help="How many threads to use; the answer is the same for any number.")
+
+
+def call_flags(
+    method: Method | None,
+    scale: Scale | None,
+    noise_m: float | None,
+    up: list[str] | None,
+    per_frame: bool | None,
+    threads: int | None,
+) -> dict[str, object]:
+    """Return the flags under the names of `pomona.match`'s arguments; None where a flag was not given."""
+    return {
+        "method": method and method.value,
+        "scale": scale and scale.value,
+        "noise_m": noise_m,
+        "up": _parse_up(up) if up else None,
+        "per_frame": per_frame,
+        "threads": threads,
+    }
+
+
+def _parse_up(texts: list[str]) -> list[list[float]]:
+    if len(texts) > 2:
+        raise PomonaError(f"--up: found {len(texts)} directions, expected one for both clouds or query then map")
+    directions = []
+    for text in texts:
+        try:
+            x, y, z = (float(number) for number in text.split(","))
+        except ValueError:
+            raise PomonaError(f"--up: found {text!r}, expected three numbers X,Y,Z") from None
+        directions.append([x, y, z])
+    return directions if len(directions) == 2 else directions * 2
