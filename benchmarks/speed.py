@@ -1,8 +1,9 @@
 """What a match costs: CPU, peak memory over the bare import, and what a second thread brings.
 
 Each measurement runs in a process of its own. Time: the fastest of some repetitions, CPU on one thread, wall time on
-one and two. Memory: growth of the peak resident set over that after `import pomona` with the clouds made. Writes
-speed.csv and speed.md.
+one and two. Memory: growth of the peak resident set over that after `import pomona` with the clouds made. Counts per
+second of the core's stages: crates/pomona/examples/throughput.rs on a base pair. Writes speed.csv, throughput.csv and
+speed.md.
 """
 
 import argparse
@@ -10,8 +11,10 @@ import json
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -24,6 +27,7 @@ METHODS = ("paper", "verified")
 CELLS = ("base", "part1o45", "noov", "big5k")
 WORKS = (*CELLS, "frame")
 REPEATS = {"big5k": 3}
+ROOT = Path(__file__).parents[1]
 
 
 def main(arguments: list[str]) -> None:
@@ -41,8 +45,10 @@ def main(arguments: list[str]) -> None:
             alone, both = (_in_new_process(work, method, threads) for threads in (1, 2))
             rows.append({"work": work, "method": method, **alone, "wall_two_threads_s": both["wall_s"]})
             sys.stderr.write(f"speed: {work}, {method} done\n")
+    counts = throughput()
     write_rows("speed.csv", rows)
-    write_text("speed.md", report(rows))
+    write_rows("throughput.csv", [{"stage": stage, "per_second": count} for stage, count in counts.items()])
+    write_text("speed.md", report(rows, counts))
 
 
 def _in_new_process(work: str, method: str, threads: int) -> dict[str, float]:
@@ -79,13 +85,26 @@ def _frame_in_map(method: str, threads: int) -> Callable[[], object]:
     return lambda: index.match(frame)
 
 
+def throughput() -> dict[str, float]:
+    """Count per second what the core's stages do with a base pair, one thread."""
+    pair = scene_pair("base", 0)
+    with tempfile.TemporaryDirectory() as scratch:
+        paths = [Path(scratch) / name for name in ("query", "map")]
+        for path, cloud in zip(paths, (pair.query, pair.map), strict=True):
+            np.savetxt(path, cloud.positions)
+        command = ["cargo", "run", "--quiet", "--release", "--locked", "--package", "pomona", "--example", "throughput"]
+        done = subprocess.run([*command, *paths], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    counts: dict[str, float] = json.loads(done.stdout)
+    return counts
+
+
 def _peak_mb() -> float:
     # Linux counts kibibytes, macOS bytes.
     unit = 1.0 if sys.platform == "darwin" else 1024.0
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
-def report(rows: list[dict[str, object]]) -> str:
+def report(rows: list[dict[str, object]], counts: dict[str, float]) -> str:
     header = ("work", "method", "CPU ms", "wall ms, 1 thread", "wall ms, 2 threads", "peak MB over import")
     lines = [
         (
@@ -96,4 +115,8 @@ def report(rows: list[dict[str, object]]) -> str:
         )
         for row in rows
     ]
-    return f"# Speed\n\n{' '.join((__doc__ or '').split())}\n\n{markdown(header, lines)}"
+    stages = [(stage.removesuffix("_per_s"), f"{count:,.0f}") for stage, count in counts.items()]
+    return (
+        f"# Speed\n\n{' '.join((__doc__ or '').split())}\n\n{markdown(header, lines)}\n"
+        f"{markdown(('stage', 'per second'), stages)}"
+    )
