@@ -8,7 +8,7 @@ import typer
 
 from pomona import __version__
 from pomona.cli import config, demo, evaluate, export, import_, info, map, match, scan, synth
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
 
 app = typer.Typer(
     name="pomona",
@@ -50,9 +50,11 @@ app.add_typer(synth.app, name="synth")
 
 def main() -> None:
     """Run the command line; wrong input is one line on stderr and exit code 2, a bug is a trace."""
-    warnings.showwarning = _warn
     try:
-        code = app(standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", PomonaWarning)
+            warnings.showwarning = _warn
+            code = app(standalone_mode=False)
     except PomonaError as error:
         _refuse(str(error))
     except _UsageError as error:
