@@ -43,9 +43,9 @@ SCALE_SIGMA = 0.001
 """Error of depth in proportion to depth, as the makers of time-of-flight cameras state it."""
 
 HIDDEN = (0.09, 0.04, 0.02)
-"""Mean part of the diameter that leaves hide, by the number of axes on which no leaf covers an edge: 0, 1, 2. From
-boxes around the visible part of rendered fruits (`rendered_row`): 9, 4 and 3 %, of which 1 % is rounding to whole
-pixels."""
+"""Mean part of the diameter that leaves hide, by the number of axes on which no leaf covers an edge: 0, 1, 2. With
+`HIDDEN_UNSUPPORTED` it makes what boxes around the visible part of rendered fruits lack: 10, 6 and 3 %
+(`rendered_row`, both dates)."""
 
 HIDDEN_UNSUPPORTED = 0.04
 """What is added to it for a fruit of which nearly nothing agrees with the outline."""

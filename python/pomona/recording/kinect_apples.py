@@ -81,6 +81,8 @@ def _write(source: Path, name: str, folder: Path) -> tuple[int, bool]:
 
 
 def _write_detections(boxes: Path, detections: Path) -> int:
+    if not boxes.is_file():
+        raise PomonaError(f"{boxes}: not found, expected id,xmin,ymin,xmax,ymax")
     with (
         boxes.open(newline="", encoding="utf-8-sig") as read,
         detections.open("w", newline="", encoding="utf-8") as write,
