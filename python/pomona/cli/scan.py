@@ -39,14 +39,14 @@ def scan(
     from pomona.survey import scan as scan_recording
 
     _require_writable(output)
+    _require_date(date)
     opened = open_recording(recording)
     boxes = detections or recording / "detections.csv"
     detector = FileDetector.read(boxes, opened.calibration, opened.numbers)
-    when = _date(opened, date) if output.suffix.lower() == ".gpkg" else ""
     with _progress(opened) as progress:
         survey = scan_recording(opened, detector, progress=progress)
     if output.suffix.lower() == ".gpkg":
-        _write_session(output, opened, survey, boxes, name or opened.name, when)
+        _write_session(output, opened, survey, boxes, name or opened.name, date or _date(opened))
     else:
         survey.cloud.write(output)
     summary = _summary(opened, survey, output)
@@ -63,19 +63,25 @@ def _require_writable(output: Path) -> None:
         raise PomonaError(f"{output}: the folder {output.parent} is not there")
 
 
-def _date(recording: Recording, date: str | None) -> str:
-    """Take the date that was given or recorded; else the day of the first file, and say so."""
+def _require_date(date: str | None) -> None:
+    import datetime
+
+    from pomona.errors import PomonaError
+
+    try:
+        if date is not None:
+            datetime.datetime.fromisoformat(date)
+    except ValueError:
+        raise PomonaError(f"--date: found {date!r}, expected ISO 8601, for example 2024-08-09") from None
+
+
+def _date(recording: Recording) -> str:
+    """Take the date that was recorded; else the day of the newest file, and say so."""
     import datetime
     import warnings
 
-    from pomona.errors import PomonaError, PomonaWarning
+    from pomona.errors import PomonaWarning
 
-    if date is not None:
-        try:
-            datetime.datetime.fromisoformat(date)
-        except ValueError:
-            raise PomonaError(f"--date: found {date!r}, expected ISO 8601, for example 2024-08-09") from None
-        return date
     if recording.date is not None:
         return recording.date
     newest_s = max(file.stat().st_mtime for file in recording.inputs())

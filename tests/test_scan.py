@@ -1,0 +1,285 @@
+"""`pomona scan`, `pomona info` and `pomona import`: from folders to sessions, and every kind of wrong folder."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.lifting import rigid_residuals, rows_named
+from benchmarks.recordings import rendered_truth, scanned, scanned_captures, with_true_boxes
+
+from pomona.cli import main
+from pomona.cloud import FruitCloud
+from pomona.orchard import load_session
+from recording_maker import FIELDS, FRUITS, HEADER, make_recording
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def pomona(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """The command line, in this process."""
+
+    def run_main(*arguments: object) -> subprocess.CompletedProcess[str]:
+        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, ended.value.code, printed.out, printed.err)
+
+    return run_main
+
+
+@pytest.fixture
+def row(tmp_path: Path) -> Path:
+    """Three frames, 10 cm apart."""
+    return make_recording(tmp_path / "2024-08-09", (0.0, 0.1, 0.2))
+
+
+def assert_true_places(cloud: FruitCloud, within_m: float = 0.001) -> None:
+    assert cloud.ids == tuple(FRUITS)
+    np.testing.assert_allclose(cloud.positions, [fruit.centre for fruit in FRUITS.values()], atol=within_m)
+    assert cloud.diameters_m is not None
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], output: Path, *named: str) -> None:
+    """Exit code 2, one line that names what is wrong, and nothing written."""
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("pomona: ")
+    assert done.stderr.count("\n") == 1
+    for words in named:
+        assert words in done.stderr
+    assert not output.exists()
+    assert not list(output.parent.glob("*.partial"))
+    assert not list(output.parent.glob(".*.partial"))
+
+
+def test_a_recording_becomes_a_session(pomona, row, tmp_path):
+    done = pomona("scan", row, "-o", tmp_path / "session.gpkg")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "3 fruits, median diameter 7" in done.stdout
+    session = load_session(tmp_path / "session.gpkg")
+    assert_true_places(session.cloud)
+    assert (session.name, session.date) == ("2024-08-09", "2024-08-09")
+    assert session.cloud.n_views.tolist() == [3, 3, 3]
+    seen = sorted(zip(session.cloud.views.frames.tolist(), session.cloud.views.fruits.tolist(), strict=True))
+    assert seen == [(frame, fruit) for frame in range(3) for fruit in range(3)]
+    np.testing.assert_allclose(session.trajectory.session_from_camera[:, 0, 3], [0, 0.1, 0.2])
+    assert float(session.cloud.extras["diameter_sigma_m"][0]) < 0.01
+    depth = row / "depth" / "0001.png"
+    assert session.input_hashes["depth/0001.png"] == hashlib.sha256(depth.read_bytes()).hexdigest()
+    assert {"calibration.json", "poses_tum.txt", "detections.csv"} <= set(session.input_hashes)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".ply"])
+def test_fruits_alone_by_suffix(pomona, row, tmp_path, suffix):
+    assert pomona("scan", row, "-o", tmp_path / f"fruits{suffix}").returncode == 0
+    cloud = FruitCloud.read(tmp_path / f"fruits{suffix}")
+    assert_true_places(cloud)
+    assert cloud.covariances is not None
+
+
+def test_the_same_recording_gives_the_same_file(pomona, row, tmp_path):
+    for name in ("first.csv", "second.csv"):
+        assert pomona("scan", row, "-o", tmp_path / name).returncode == 0
+    assert (tmp_path / "first.csv").read_bytes() == (tmp_path / "second.csv").read_bytes()
+
+
+def test_json_says_what_was_found(pomona, row, tmp_path):
+    done = pomona("scan", row, "-o", tmp_path / "fruits.csv", "--json")
+    found = json.loads(done.stdout)
+    assert (found["n_fruits"], found["n_boxes"], found["n_frames"], found["n_refused"]) == (3, 9, 3, {})
+    assert found["median_diameter_mm"] == pytest.approx(75, abs=3)
+
+
+def test_poses_put_the_fruits_into_their_frame(tmp_path):
+    folder = make_recording(tmp_path / "row", (0.0,))
+    half = np.sqrt(0.5)
+    # The camera looks along the session's y, its y axis points down.
+    (folder / "poses_tum.txt").write_text(f"0 5 -2 1.5 {-half} 0 0 {half}\n")
+    cloud = scanned(folder).cloud
+    x, y, z = FRUITS["a"].centre
+    np.testing.assert_allclose(cloud.positions[0], [5 + x, -2 + z, 1.5 - y], atol=0.001)
+    # The covariance turns with it: its long axis along y now.
+    assert np.argmax(np.diagonal(cloud.covariances[0])) == 1
+
+
+def test_one_frame_needs_no_poses_and_no_ids(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", ids=False)
+    assert pomona("scan", folder, "-o", tmp_path / "fruits.csv").returncode == 0
+    cloud = FruitCloud.read(tmp_path / "fruits.csv")
+    assert cloud.ids == ("0", "1", "2")
+    assert cloud.n_views.tolist() == [1, 1, 1]
+
+
+def test_more_frames_fuse_to_smaller_covariances(row, tmp_path):
+    one = scanned(make_recording(tmp_path / "one")).cloud
+    three = scanned(row).cloud
+    assert (np.trace(three.covariances, axis1=1, axis2=2) < np.trace(one.covariances, axis1=1, axis2=2)).all()
+
+
+def test_no_detections_are_a_valid_empty_session(pomona, row, tmp_path):
+    (row / "detections.csv").write_text(HEADER + "\n")
+    done = pomona("scan", row, "-o", tmp_path / "empty.gpkg")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "0 fruits, from 0 boxes" in done.stdout
+    session = load_session(tmp_path / "empty.gpkg")
+    assert len(session.cloud) == 0
+    assert len(session.trajectory) == 3
+
+
+def test_boxes_without_depth_are_counted(pomona, row, tmp_path):
+    with (row / "detections.csv").open("a") as file:
+        file.write("0,625,465,640,480,0.5,corner\n")
+    done = pomona("scan", row, "-o", tmp_path / "fruits.csv")
+    assert "1 boxes without a fruit: cut by the edge of the picture" in done.stdout
+    assert len(FruitCloud.read(tmp_path / "fruits.csv")) == 3
+
+
+def test_other_detections_name_and_date(pomona, row, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(line for line in (row / "detections.csv").read_text().splitlines() if ",c" not in line))
+    arguments = ("--detections", other, "--name", "row 3", "--date", "2024-08-10T09:30:00")
+    assert pomona("scan", row, "-o", tmp_path / "session.gpkg", *arguments).returncode == 0
+    session = load_session(tmp_path / "session.gpkg")
+    assert (session.name, session.date, len(session.cloud)) == ("row 3", "2024-08-10T09:30:00", 2)
+
+
+def test_an_unknown_date_is_said(pomona, tmp_path):
+    folder = make_recording(tmp_path / "row")
+    done = pomona("scan", folder, "-o", tmp_path / "session.gpkg")
+    assert done.returncode == 0
+    assert "no date noted" in done.stderr
+    assert "--date" in done.stderr
+
+
+def test_a_wrong_depth_unit_is_said(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09")
+    (folder / "calibration.json").write_text(json.dumps({**FIELDS, "depth_unit_m": 0.01}))
+    done = pomona("scan", folder, "-o", tmp_path / "fruits.csv")
+    assert done.returncode == 0
+    assert "the median diameter is 7" in done.stderr
+    assert "depth_unit_m" in done.stderr
+
+
+def test_frames_without_poses_are_refused(pomona, tmp_path):
+    folder = make_recording(tmp_path / "row", (0.0, 0.1), poses=False)
+    output = tmp_path / "session.gpkg"
+    assert_refused(pomona("scan", folder, "-o", output), output, "2 frames without poses", "poses_tum.txt")
+
+
+def test_frames_with_boxes_without_ids_are_refused(pomona, tmp_path):
+    folder = make_recording(tmp_path / "row", (0.0, 0.1), ids=False)
+    output = tmp_path / "fruits.csv"
+    assert_refused(pomona("scan", folder, "-o", output), output, "boxes without ids in 2 frames")
+
+
+def test_a_recording_without_depth_is_refused(pomona, row, tmp_path):
+    (row / "depth").rename(row / "left")
+    output = tmp_path / "fruits.csv"
+    assert_refused(pomona("scan", row, "-o", output), output, "frame 0 has no depth", "depth/")
+
+
+def test_a_corrupt_picture_leaves_the_old_session_as_it_was(pomona, row, tmp_path):
+    output = tmp_path / "session.gpkg"
+    assert pomona("scan", row, "-o", output).returncode == 0
+    before = output.read_bytes()
+    picture = row / "depth" / "0002.png"
+    picture.write_bytes(picture.read_bytes()[:500])
+    done = pomona("scan", row, "-o", output)
+    assert done.returncode == 2
+    assert "0002.png" in done.stderr
+    assert output.read_bytes() == before
+    assert sorted(file.name for file in tmp_path.iterdir()) == [row.name, "session.gpkg"]
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda row: (row / "calibration.json").unlink(), ["calibration.json"]),
+        (lambda row: (row / "detections.csv").unlink(), ["detections.csv", "not found"]),
+        (lambda row: (row / "detections.csv").write_text(f"{HEADER}\n9,1,2,3,4,1,a\n"), ["line 2", "frame: found 9"]),
+        (lambda row: (row / "detections.csv").write_text(f"{HEADER}\n0,9,2,3,4,1,a\n"), ["line 2", "xmin 9"]),
+        (lambda row: (row / "depth" / "0000.png").unlink(), ["3 poses", "2 frames"]),
+    ],
+)
+def test_a_broken_folder_is_refused(pomona, row, tmp_path, change, named):
+    change(row)
+    output = tmp_path / "session.gpkg"
+    assert_refused(pomona("scan", row, "-o", output), output, *named)
+
+
+def test_a_wrong_output_is_refused_before_the_work(pomona, row, tmp_path):
+    (row / "depth" / "0000.png").write_bytes(b"")  # would be the error if work had begun
+    for output, named in ((tmp_path / "session.txt", "suffix '.txt'"), (tmp_path / "no" / "s.csv", "is not there")):
+        assert_refused(pomona("scan", row, "-o", output), output, named)
+    output = tmp_path / "session.gpkg"
+    assert_refused(pomona("scan", row, "-o", output, "--date", "9 August"), output, "--date", "ISO 8601")
+
+
+def test_info_says_what_is_there(pomona, row):
+    assert "frames       3" in pomona("info", row).stdout
+    found = json.loads(pomona("info", row, "--json").stdout)
+    assert (found["frames"], found["poses"], found["pictures"]) == (3, True, {"depth": 3})
+
+
+def test_import_says_where_there_is_no_colour(pomona, shared_data, tmp_path):
+    done = pomona("import", "kinect-apples", shared_data / "kinect_apples", tmp_path / "out")
+    lines = done.stdout.splitlines()
+    assert done.returncode == 0
+    assert [("no colour picture" in line) for line in lines] == [True, True, False, False]
+    again = pomona("import", "kinect-apples", shared_data / "kinect_apples", tmp_path / "out")
+    assert again.returncode == 2
+    assert "already there" in again.stderr
+
+
+@pytest.fixture(scope="module")
+def captures(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, FruitCloud]:
+    return scanned_captures(shared_data, tmp_path_factory.mktemp("kinect"))
+
+
+def test_captures_agree_at_least_as_well_as_the_positions_that_came_with_them(captures, shared_data):
+    names = list(captures)
+    ours, theirs = [], []
+    for first, second in ((a, b) for a in names for b in names if a < b):
+        shipped = [FruitCloud.read(shared_data / "kinect_apples" / f"{name}_fruits.csv") for name in (first, second)]
+        scans = [captures[name] for name in (first, second)]
+        common = sorted(set.intersection(*(set(cloud.ids) for cloud in (*shipped, *scans))))
+        assert len(common) >= 27
+        for found, clouds in ((ours, scans), (theirs, shipped)):
+            found.append(rigid_residuals(*(rows_named(cloud, common).positions for cloud in clouds)))
+    ours, theirs = np.concatenate(ours), np.concatenate(theirs)
+    assert np.median(ours) < np.median(theirs) + 0.0001
+    assert np.percentile(ours, 90) < np.percentile(theirs, 90)
+    assert ours.max() < 0.012 < theirs.max()
+
+
+def test_every_box_of_the_captures_becomes_a_fruit(captures):
+    assert [len(cloud) for cloud in captures.values()] == [28, 28, 28, 28]
+    # Behind the row of the scene, at 2.5 m and more, hang more apples.
+    assert max(cloud.positions[:, 2].max() for cloud in captures.values()) < 2.0
+
+
+@pytest.mark.parametrize("date", ["2024-08-09", "2024-08-28"])
+def test_the_rendered_row_is_found_where_it_is(shared_data, tmp_path, date):
+    source = shared_data / "rendered_row" / date
+    with_true_boxes(source, tmp_path / date)
+    cloud = scanned(tmp_path / date).cloud
+    truth = rows_named(rendered_truth(source), list(cloud.ids))
+    often = cloud.n_views >= 5
+    distances_mm = 1000 * np.linalg.norm(cloud.positions - truth.positions, axis=1)[often]
+    sizes_mm = 1000 * (cloud.diameters_m - truth.diameters_m)[often]
+    assert often.sum() > 100
+    assert np.median(distances_mm) < 3.0
+    assert np.percentile(distances_mm, 95) < 7.0
+    assert abs(sizes_mm.mean()) < 1.5
+    assert np.sqrt((sizes_mm**2).mean()) < 3.0
+    # The covariances tell the truth: the mean of chi^2 with 3 degrees of freedom is 3.
+    errors = (cloud.positions - truth.positions)[often]
+    mean_chi2 = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(cloud.covariances[often]), errors).mean()
+    assert 1.5 < mean_chi2 < 4.5
