@@ -25,6 +25,8 @@ def test_a_list_of_points_is_a_cloud() -> None:
         ({"diameters_m": [0.07, -0.07]}, "diameters_m: row 1 is -0.07, expected positive metres or NaN"),
         ({"diameters_m": ["big", "small"]}, "diameters_m: expected an array of float64"),
         ({"covariances": np.zeros((2, 3))}, "covariances: found shape (2, 3), expected (2, 3, 3)"),
+        ({"covariances": [np.eye(3), -np.eye(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),
+        ({"covariances": [np.eye(3), np.tri(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),
         ({"n_views": [1]}, "n_views: found shape (1), expected (2)"),
         ({"views": Views(np.array([0]), np.array([2]))}, "views.fruits: a sighting names a row outside 0..1"),
         ({"extras": {"note": ("a",)}}, "note: found 1 values, expected 2, one a fruit"),

@@ -134,7 +134,8 @@ CELLS = st.sampled_from(
 def test_the_fast_reader_agrees_with_the_one_of_cells(tmp_path: Path, rows: list[list[str]], end: str) -> None:
     names = ["id", "x", "diameter_m", "note"]
     path = write(tmp_path, "".join(",".join(row) + end for row in [names, *rows]))
-    fast = csv_file._read_table(path, names, 1)
+    with csv_file._opened(path) as file:
+        fast = csv_file._read_table(file, names, 1)
     if fast is None:
         return
     with csv_file._opened(path) as file:
@@ -189,7 +190,8 @@ def test_two_million_points_take_the_fast_path(tmp_path: Path) -> None:
     with path.open("w") as file:
         file.write("x,y,z\n")
         file.writelines(line.format(row % 2000, row // 2000) for row in range(n))
-    table = csv_file._read_table(path, ["x", "y", "z"], 1)
+    with csv_file._opened(path) as file:
+        table = csv_file._read_table(file, ["x", "y", "z"], 1)
     assert table is not None
     cloud = FruitCloud.read(path)
     assert len(cloud) == n

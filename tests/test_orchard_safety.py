@@ -201,12 +201,35 @@ def test_a_second_writer_waits_and_is_told(orchard: Path, started: Path, visits:
     other.execute("BEGIN IMMEDIATE")
     with pytest.raises(PomonaError) as caught:
         add_session(orchard, load_session(visits[1]), timeout_s=0.05)
-    assert str(caught.value) == f"{orchard}: another program is writing to it, try again when it is done"
+    assert str(caught.value) == f"{orchard}: another program is using it, try again when it is done"
     # Readers are not kept waiting.
     assert len(OrchardMap(orchard).fruits()) == len(OrchardMap(started).fruits())
     other.execute("ROLLBACK")
     other.close()
     assert_as_before(orchard, started, visits[1])
+
+
+def test_a_reader_that_does_not_go_is_told_of(orchard: Path, started: Path, visits: tuple[Path, Path]) -> None:
+    """The commit has to wait for readers; when they stay, the map is as it was."""
+    reader = sqlite3.connect(orchard, isolation_level=None)
+    reader.execute("BEGIN")
+    reader.execute("SELECT count(*) FROM fruits").fetchone()
+    with pytest.raises(PomonaError, match="another program is using it"):
+        add_session(orchard, load_session(visits[1]), timeout_s=0.05)
+    reader.execute("COMMIT")
+    reader.close()
+    assert_as_before(orchard, started, visits[1])
+
+
+def test_a_map_that_qgis_has_open_takes_a_visit(orchard: Path, visits: tuple[Path, Path]) -> None:
+    """QGIS switches a file to a write-ahead log; what we write must be in the file when we are done."""
+    qgis = sqlite3.connect(orchard)
+    assert qgis.execute("PRAGMA journal_mode = WAL").fetchone() == ("wal",)
+    assert add_session(orchard, load_session(visits[1])).is_added
+    assert qgis.execute("SELECT count(*) FROM sessions").fetchone() == (2,)
+    qgis.close()
+    assert list(orchard.parent.iterdir()) == [orchard]
+    assert problems(orchard) == []
 
 
 def test_two_writers_at_once_both_get_in(tmp_path: Path, visits: tuple[Path, Path]) -> None:

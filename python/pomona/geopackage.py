@@ -115,7 +115,7 @@ def told(path: Path) -> Iterator[None]:
     except sqlite3.Error as error:
         name = getattr(error, "sqlite_errorname", "") or ""
         reasons = {
-            "SQLITE_BUSY": "another program is writing to it, try again when it is done",
+            "SQLITE_BUSY": "another program is using it, try again when it is done",
             "SQLITE_FULL": "the disk is full; the file is as it was before",
             "SQLITE_IOERR": f"the disk does not take or give what it should ({name}); the file is as it was before",
             "SQLITE_READONLY": "cannot be written: the file or its folder is read-only",

@@ -29,7 +29,8 @@ def read(path: Path) -> FruitCloud:
     """
     with _opened(path) as file:
         names, header_lines = _header(path, file)
-    columns = _read_table(path, names, header_lines)
+    with _opened(path) as file:
+        columns = _read_table(file, names, header_lines)
     if columns is None:
         with _opened(path) as file:
             columns = _read_cells(path, file, names, header_lines)
@@ -78,20 +79,19 @@ def _header(path: Path, file: IO[str]) -> tuple[list[str], int]:
     return names, reader.line_num
 
 
-def _read_table(path: Path, names: list[str], header_lines: int) -> dict[str, Any] | None:
+def _read_table(file: IO[str], names: list[str], header_lines: int) -> dict[str, Any] | None:
     """Read all rows at numpy's speed; None when there is a cell to look at more closely."""
     kinds: dict[str, Any] = {name: np.float64 if name in NUMBERS else object for name in names}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "loadtxt: input contained no data")
         try:
             table = np.loadtxt(
-                path,
+                file,
                 dtype=[(f"f{i}", kind) for i, kind in enumerate(kinds.values())],
                 delimiter=",",
                 quotechar='"',
                 comments=None,
                 skiprows=header_lines,
-                encoding=ENCODING,
                 ndmin=1,
             )
         except ValueError:

@@ -67,7 +67,7 @@ class FruitCloud:
     Raises
     ------
     PomonaError
-        When an array has the wrong shape, a coordinate is not finite or an id is used twice.
+        When an array has the wrong shape, a number is not finite, a covariance is none or an id is used twice.
     """
 
     positions: NDArray[np.float64]
@@ -87,7 +87,7 @@ class FruitCloud:
             object.__setattr__(self, "diameters_m", _diameters(self.diameters_m, n))
         if self.covariances is not None:
             covariances = _array("covariances", self.covariances, np.float64, (n, 3, 3))
-            _require_finite("covariances", covariances)
+            _require_covariances(covariances)
             object.__setattr__(self, "covariances", covariances)
         if self.n_views is not None:
             object.__setattr__(self, "n_views", _array("n_views", self.n_views, np.int64, (n,)))
@@ -194,6 +194,16 @@ def _require_finite(name: str, array: NDArray[np.float64]) -> None:
     if not finite.all():
         row = int(np.argmin(finite.reshape(len(array), -1).all(axis=1)))
         raise PomonaError(f"{name}: row {row} is NaN or infinite, expected finite numbers")
+
+
+def _require_covariances(covariances: NDArray[np.float64]) -> None:
+    """Refuse what is not symmetric positive semi-definite beyond rounding."""
+    _require_finite("covariances", covariances)
+    tolerance = 1e-9 * np.linalg.norm(covariances, axis=(1, 2))
+    skew = np.abs(covariances - covariances.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
+    wrong = (skew > tolerance) | (np.linalg.eigvalsh(covariances).min(axis=1, initial=np.inf) < -tolerance)
+    if wrong.any():
+        raise PomonaError(f"covariances: row {int(np.argmax(wrong))} is not symmetric positive semi-definite")
 
 
 def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
