@@ -8,13 +8,30 @@ from pomona.errors import PomonaError, PomonaWarning
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
+    from pomona.matching import Index, Match, Verdict, default_config, match
 
-__all__ = ["FruitCloud", "PomonaError", "PomonaWarning", "Views", "__version__"]
+__all__ = [
+    "FruitCloud",
+    "Index",
+    "Match",
+    "PomonaError",
+    "PomonaWarning",
+    "Verdict",
+    "Views",
+    "__version__",
+    "default_config",
+    "match",
+]
 
 # Loaded at first use, so that `pomona --help` does not wait for numpy.
 _MODULE_OF = {
     "FruitCloud": "pomona.cloud",
     "Views": "pomona.cloud",
+    "Index": "pomona.matching",
+    "Match": "pomona.matching",
+    "Verdict": "pomona.matching",
+    "default_config": "pomona.matching",
+    "match": "pomona.matching",
 }
 
 

@@ -1,9 +1,15 @@
-//! Python bindings of the pomona core: thin, no logic.
+//! Python bindings of the pomona core: thin, no logic. One file per core module.
+
+mod cloud;
+mod matching;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<matching::PyMatch>()?;
+    module.add_class::<matching::PyMapIndex>()?;
+    module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())
 }

@@ -9,14 +9,21 @@
 
 pub mod assignment;
 pub mod cloud;
+pub mod config;
 pub mod constellation;
 pub mod descriptor;
 pub mod error;
 pub mod geometry;
 pub mod index;
 pub mod matching;
+pub mod verified;
 
 pub use cloud::{FruitCloud, Views};
+pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
-pub use matching::{Match, Method, Pair, Registration, Request, Verdict};
+pub use matching::{MapIndex, Match, Method, Pair, Registration, Request, Verdict, match_clouds};
+pub use verified::VerifiedConfig;
+
+/// The linear algebra whose types the interface uses.
+pub use nalgebra;

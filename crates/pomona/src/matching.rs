@@ -1,5 +1,8 @@
 //! The facade: which fruit of the query is which fruit of the map.
 
+use crate::cloud::FruitCloud;
+use crate::config::Config;
+use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -80,4 +83,81 @@ pub struct Match {
     pub noise_m: f64,
     /// What happened, stage by stage: name and count, for `--explain`.
     pub stages: Vec<(&'static str, f64)>,
+}
+
+impl Match {
+    /// A result without a registration.
+    pub(crate) fn without_answer(verdict: Verdict, stages: Vec<(&'static str, f64)>) -> Self {
+        Self { verdict, registration: None, alternatives: Vec::new(), pairs: Vec::new(), noise_m: f64::NAN, stages }
+    }
+}
+
+/// A map made ready for many queries.
+#[derive(Debug, Clone)]
+pub struct MapIndex {
+    map: FruitCloud,
+    config: Config,
+    method: Method,
+    scale: Scale,
+    prepared: Prepared,
+}
+
+#[derive(Debug, Clone)]
+enum Prepared {
+    Verified(Box<crate::verified::Prepared>),
+}
+
+impl MapIndex {
+    /// Prepares `map` for queries by `method`.
+    ///
+    /// # Errors
+    /// A cloud or a setting that is wrong.
+    pub fn new(map: FruitCloud, method: Method, scale: Scale, config: Config) -> Result<Self> {
+        map.validate()?;
+        config.validate()?;
+        let prepared = match method {
+            Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(&map, scale))),
+            Method::Paper => {
+                return Err(Error::Setting { name: "method", reason: "paper is not part of this build".to_owned() });
+            }
+        };
+        Ok(Self { map, config, method, scale, prepared })
+    }
+
+    /// Finds `query` in the map.
+    ///
+    /// # Errors
+    /// A cloud or a value that is wrong. That there is no match is no error.
+    pub fn search(&self, query: &FruitCloud, noise_m: Option<f64>, up: Option<[Vector3<f64>; 2]>) -> Result<Match> {
+        query.validate()?;
+        let request = Request { method: self.method, scale: self.scale, noise_m, up };
+        request.validate()?;
+        Ok(match &self.prepared {
+            Prepared::Verified(prepared) => {
+                crate::verified::search(prepared, &self.map, query, &request, &self.config.verified)
+            }
+        })
+    }
+}
+
+impl Request {
+    fn validate(&self) -> Result<()> {
+        if let Some(noise) = self.noise_m.filter(|noise| !(noise.is_finite() && *noise > 0.0)) {
+            let reason = format!("found {noise}, expected a length above 0 m");
+            return Err(Error::Setting { name: "noise_m", reason });
+        }
+        if self.up.iter().flatten().any(|up| !(up.norm().is_finite() && up.norm() > 0.0)) {
+            let reason = "expected a finite vector that is not zero".to_owned();
+            return Err(Error::Setting { name: "up", reason });
+        }
+        Ok(())
+    }
+}
+
+/// Which fruit of `query` is which fruit of `map`.
+///
+/// # Errors
+/// A cloud or a setting that is wrong. That there is no match is no error.
+pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, config: &Config) -> Result<Match> {
+    MapIndex::new(map.clone(), request.method, request.scale, *config)?.search(query, request.noise_m, request.up)
 }

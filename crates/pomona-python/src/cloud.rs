@@ -1,0 +1,61 @@
+//! Fruit clouds from arrays.
+
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pomona::nalgebra::{Matrix3, Point3};
+use pomona::{FruitCloud, Views};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The arrays of one cloud, as Python passes them.
+#[derive(FromPyObject)]
+pub struct Arrays<'py> {
+    #[pyo3(item)]
+    positions: PyReadonlyArray2<'py, f64>,
+    #[pyo3(item)]
+    covariances: Option<PyReadonlyArray3<'py, f64>>,
+    #[pyo3(item)]
+    diameters_m: Option<PyReadonlyArray1<'py, f64>>,
+    #[pyo3(item)]
+    view_frames: Option<PyReadonlyArray1<'py, i64>>,
+    #[pyo3(item)]
+    view_fruits: Option<PyReadonlyArray1<'py, i64>>,
+}
+
+impl Arrays<'_> {
+    /// Copies the arrays into a cloud of the core.
+    pub fn to_cloud(&self) -> PyResult<FruitCloud> {
+        if self.positions.shape()[1] != 3 {
+            let found = self.positions.shape()[1];
+            return Err(PyValueError::new_err(format!("positions: found {found} columns, expected 3 (x, y, z)")));
+        }
+        let positions = self.positions.as_array().rows().into_iter().map(|p| Point3::new(p[0], p[1], p[2])).collect();
+        let covariances = match &self.covariances {
+            Some(all) if all.shape()[1..] != [3, 3] => {
+                return Err(PyValueError::new_err("covariances: expected an array of shape (N, 3, 3)"));
+            }
+            Some(all) => {
+                Some(all.as_array().outer_iter().map(|c| Matrix3::from_fn(|row, column| c[[row, column]])).collect())
+            }
+            None => None,
+        };
+        let views = match (&self.view_frames, &self.view_fruits) {
+            (Some(frames), Some(fruits)) => Some(Views {
+                frames: frames.as_array().to_vec(),
+                fruits: fruits
+                    .as_array()
+                    .iter()
+                    .map(|&fruit| usize::try_from(fruit))
+                    .collect::<Result<_, _>>()
+                    .map_err(|_| PyValueError::new_err("views: a fruit's row is negative"))?,
+            }),
+            _ => None,
+        };
+        Ok(FruitCloud {
+            positions,
+            covariances,
+            diameters_m: self.diameters_m.as_ref().map(|all| all.as_array().to_vec()),
+            ids: None,
+            views,
+        })
+    }
+}

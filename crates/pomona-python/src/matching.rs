@@ -1,0 +1,153 @@
+//! The facade: an index of a map, its answers, the settings.
+
+use crate::cloud::Arrays;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pomona::nalgebra::{Matrix4, Vector3};
+use pomona::{Config, MapIndex, Match, Method, Scale, Verdict};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Settings and their defaults as JSON.
+#[pyfunction]
+pub fn default_config() -> PyResult<String> {
+    serde_json::to_string(&Config::default()).map_err(wrong)
+}
+
+fn wrong(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// The answer to one query.
+#[pyclass(name = "Match", module = "pomona._core", frozen)]
+pub struct PyMatch(Match);
+
+fn rows(matrix: &Matrix4<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+#[pymethods]
+impl PyMatch {
+    #[getter]
+    fn status(&self) -> &'static str {
+        match self.0.verdict {
+            Verdict::Found => "Found",
+            Verdict::TooFew => "TooFew",
+            Verdict::Ambiguous => "Ambiguous",
+            Verdict::NoMatch => "NoMatch",
+        }
+    }
+
+    #[getter]
+    fn map_from_query<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let matrix = self.0.registration.map(|found| rows(&found.map_from_query.to_matrix()));
+        matrix.map(|rows| PyArray2::from_vec2(py, &rows).map_err(wrong)).transpose()
+    }
+
+    #[getter]
+    fn scale(&self) -> Option<f64> {
+        self.0.registration.map(|found| found.map_from_query.scale)
+    }
+
+    #[getter]
+    fn log_odds(&self) -> Option<f64> {
+        self.0.registration.map(|found| found.log_odds)
+    }
+
+    #[getter]
+    fn alternatives(&self) -> Vec<(Vec<Vec<f64>>, f64)> {
+        self.0.alternatives.iter().map(|found| (rows(&found.map_from_query.to_matrix()), found.log_odds)).collect()
+    }
+
+    #[getter]
+    fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let flat: Vec<i64> = self.0.pairs.iter().flat_map(|pair| [pair.query as i64, pair.map as i64]).collect();
+        PyArray1::from_vec(py, flat).reshape([self.0.pairs.len(), 2])
+    }
+
+    #[getter]
+    fn probabilities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.probability))
+    }
+
+    #[getter]
+    fn distances_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.distance_m))
+    }
+
+    #[getter]
+    fn support<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.support))
+    }
+
+    #[getter]
+    fn noise_m(&self) -> f64 {
+        self.0.noise_m
+    }
+
+    #[getter]
+    fn stages(&self) -> Vec<(&'static str, f64)> {
+        self.0.stages.clone()
+    }
+}
+
+/// A map made ready for many queries.
+#[pyclass(name = "MapIndex", module = "pomona._core", frozen)]
+pub struct PyMapIndex {
+    index: MapIndex,
+    pool: Option<rayon::ThreadPool>,
+}
+
+#[pymethods]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+impl PyMapIndex {
+    #[new]
+    #[pyo3(signature = (map, *, method, scale, config, threads=None))]
+    fn new(
+        py: Python<'_>,
+        map: Arrays<'_>,
+        method: &str,
+        scale: &str,
+        config: &str,
+        threads: Option<usize>,
+    ) -> PyResult<Self> {
+        let method: Method = parse("method", method)?;
+        let scale: Scale = parse("scale", scale)?;
+        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
+        let pool = threads
+            .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
+            .transpose()
+            .map_err(wrong)?;
+        let cloud = map.to_cloud()?;
+        let build = || MapIndex::new(cloud, method, scale, config);
+        let built = py.detach(|| match &pool {
+            Some(pool) => pool.install(build),
+            None => build(),
+        });
+        let index = built.map_err(wrong)?;
+        Ok(Self { index, pool })
+    }
+
+    #[pyo3(signature = (query, *, noise_m=None, up=None))]
+    fn search(
+        &self,
+        py: Python<'_>,
+        query: Arrays<'_>,
+        noise_m: Option<f64>,
+        up: Option<([f64; 3], [f64; 3])>,
+    ) -> PyResult<PyMatch> {
+        let cloud = query.to_cloud()?;
+        let up = up.map(|(query, map)| [Vector3::from(query), Vector3::from(map)]);
+        let search = || self.index.search(&cloud, noise_m, up);
+        let found = py.detach(|| match &self.pool {
+            Some(pool) => pool.install(search),
+            None => search(),
+        });
+        found.map(PyMatch).map_err(wrong)
+    }
+}
+
+/// A name of an enumeration, spelled as in the configuration.
+fn parse<T: serde::de::DeserializeOwned>(field: &str, name: &str) -> PyResult<T> {
+    serde_json::from_value(serde_json::Value::String(name.to_owned()))
+        .map_err(|error| wrong(format!("{field}: {error}")))
+}

@@ -1,0 +1,65 @@
+//! When evidence is enough: thresholds as a false-alarm rate.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Settings of the verified method. Lengths are shares of the clouds' own spacing (see the docs page), so that there is
+/// nothing to tune to an orchard.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VerifiedConfig {
+    /// Probability that two clouds without a common fruit are given an answer.
+    pub false_alarm_rate: f64,
+    /// Seeds tried per fruit of the query before the answer is "no match".
+    pub seeds_per_fruit: u64,
+    /// Least probability of a reported pair.
+    pub min_probability: f64,
+}
+
+impl Default for VerifiedConfig {
+    fn default() -> Self {
+        Self {
+            // One in ten thousand: a grower who scans daily for a decade sees none.
+            false_alarm_rate: 1e-4,
+            // Twelve of at most 120: at 45 % occlusion and one shared tree of five, ten true seeds are among them.
+            seeds_per_fruit: 12,
+            // A wrong pair costs a ninth of what a right one is worth.
+            min_probability: 0.1,
+        }
+    }
+}
+
+impl VerifiedConfig {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// The setting that is outside its range.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |name, reason: &str| Err(Error::Setting { name, reason: reason.to_owned() });
+        if !(self.false_alarm_rate > 0.0 && self.false_alarm_rate < 1.0) {
+            return wrong("verified.false_alarm_rate", "expected a probability between 0 and 1");
+        }
+        if self.seeds_per_fruit == 0 {
+            return wrong("verified.seeds_per_fruit", "found 0, expected at least 1");
+        }
+        if !(0.0..=1.0).contains(&self.min_probability) {
+            return wrong("verified.min_probability", "expected a probability from 0 to 1");
+        }
+        Ok(())
+    }
+
+    /// Log-odds that a pose must exceed after `tries` candidates have been looked at, nats.
+    ///
+    /// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six
+    /// numbers to each candidate and so stretches the tail: over disjoint rows the largest log-odds among N tries
+    /// follow `P(max > t) = N exp(-(t - OFFSET) / STRETCH)`; the benchmark `acceptance` measures both constants.
+    pub(crate) fn threshold(&self, tries: u64) -> f64 {
+        OFFSET + STRETCH * ((tries.max(1) as f64).ln() - self.false_alarm_rate.ln())
+    }
+}
+
+/// Least log-odds at which one candidate can be confused, nats.
+const OFFSET: f64 = 2.2;
+
+/// How much slower than exp(-t) the tail of refined wrong poses falls.
+const STRETCH: f64 = 1.5;

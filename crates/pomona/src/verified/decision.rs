@@ -1,0 +1,263 @@
+//! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
+
+use super::acceptance::VerifiedConfig;
+use super::association::associate;
+use super::growth::{Overlap, grow, settle};
+use super::hypothesis::{Hypothesis, Model};
+use super::landscape::Landscape;
+use super::outline;
+use super::pose::Pose;
+use super::search::{Effort, round};
+use super::seeds::SeedIndex;
+use super::size::Sizes;
+use crate::cloud::FruitCloud;
+use crate::geometry::Scale;
+use crate::matching::{Match, Pair, Registration, Request, Verdict};
+
+/// Fruits below which there is no answer: a seed of four and one that speaks for it.
+const MIN_FRUITS: usize = 5;
+
+/// Noise in spacings that seeds are searched with: 2 cm in an orchard.
+const SEED_SIGMA: f64 = 0.075;
+
+/// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
+const DETECTION: f64 = 0.55;
+
+/// Outlines sharper than this many spacings of noise are refined cell by cell.
+const SHARP: f64 = 0.18;
+
+/// Rounds of the search: seeds per fruit and candidates that are refined.
+const ROUNDS: [(u64, usize); 3] = [(1, 32), (4, 48), (u64::MAX, 64)];
+
+/// Hypotheses of a round that are grown.
+const GROWN: usize = 6;
+
+/// A rival with this share of the best evidence makes the answer ambiguous.
+const RIVAL: f64 = 0.7;
+
+/// How far the vertical of a pose may lean from the one given: 10 degrees.
+const MAX_LEAN_RAD: f64 = 0.175;
+
+/// A map made ready for many queries.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    landscape: Landscape,
+    seeds: SeedIndex,
+    scale: Scale,
+}
+
+impl Prepared {
+    pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
+        let landscape = Landscape::new(map);
+        let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
+        Self { landscape, seeds, scale }
+    }
+}
+
+/// An overlap with the region it was found from.
+struct Finding {
+    overlap: Overlap,
+    seed: Hypothesis,
+}
+
+/// Finds the query in the map.
+pub(crate) fn search(
+    prepared: &Prepared,
+    map: &FruitCloud,
+    query: &FruitCloud,
+    request: &Request,
+    config: &VerifiedConfig,
+) -> Match {
+    if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS {
+        return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
+    }
+    let search = Search::new(prepared, query, request, config);
+    let (findings, stages) = search.run();
+    search.answer(findings, map, query, stages)
+}
+
+struct Search<'a> {
+    query: Landscape,
+    map: &'a Landscape,
+    seeds: &'a SeedIndex,
+    model: Model,
+    config: VerifiedConfig,
+    up: Option<[nalgebra::Vector3<f64>; 2]>,
+}
+
+type Stages = Vec<(&'static str, f64)>;
+
+impl<'a> Search<'a> {
+    fn new(prepared: &'a Prepared, query: &FruitCloud, request: &Request, config: &VerifiedConfig) -> Self {
+        let map = &prepared.landscape;
+        let sigma = request.noise_m.unwrap_or(SEED_SIGMA * map.spacing).max(0.2 * SEED_SIGMA * map.spacing);
+        Self {
+            query: Landscape::new(query),
+            map,
+            seeds: &prepared.seeds,
+            model: Model {
+                sigma: sigma.min(2.0 * SEED_SIGMA * map.spacing),
+                detection: DETECTION,
+                scale: prepared.scale,
+            },
+            config: *config,
+            up: request.up.map(|pair| pair.map(|up| up.normalize())),
+        }
+    }
+
+    fn admits(&self, pose: &Pose) -> bool {
+        self.up.is_none_or(|[query, map]| (pose.rotation * query).dot(&map) > MAX_LEAN_RAD.cos())
+    }
+
+    /// Rounds of seeds until a pose is accepted, then the outline.
+    fn run(&self) -> (Vec<Finding>, Stages) {
+        let mut effort = Effort::default();
+        let mut turn = 0;
+        let mut best: Option<f64> = None;
+        let mut findings = Vec::new();
+        let (mut refined, mut grown) = (0, 0);
+        for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
+            let end = turns.min(self.config.seeds_per_fruit);
+            let admits = |pose: &Pose| self.admits(pose);
+            let (hypotheses, spent) = round(&self.query, self.map, self.seeds, &self.model, &admits, turn..end, keep);
+            turn = end;
+            effort = effort + spent;
+            refined += hypotheses.len();
+            let threshold = self.config.threshold(effort.fitted);
+            grown += self.grow_distinct(&hypotheses, &mut findings);
+            for finding in &findings {
+                best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
+            }
+            findings.retain(|finding| finding.overlap.log_odds > threshold);
+            if !findings.is_empty() {
+                break;
+            }
+            // After the first round, before the long ones: what shows the same trees is found here at any noise.
+            if let Some(found) = (index == 0).then(|| self.by_outline()).flatten() {
+                findings.push(found);
+                break;
+            }
+        }
+        findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        let stages = vec![
+            ("query_fruits", self.query.len() as f64),
+            ("map_fruits", self.map.len() as f64),
+            ("map_seeds", self.seeds.quads.len() as f64),
+            ("query_codes", effort.codes as f64),
+            ("candidates", effort.candidates as f64),
+            ("fitted", effort.fitted as f64),
+            ("refined", refined as f64),
+            ("grown", f64::from(grown)),
+            ("threshold_nats", self.config.threshold(effort.fitted)),
+            ("best_nats", best.unwrap_or(f64::NAN)),
+            ("verified", findings.len() as f64),
+        ];
+        (findings, stages)
+    }
+
+    /// Grows the best hypotheses that no finding explains yet; returns how many.
+    fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding>) -> u32 {
+        let mut grown = 0;
+        for seed in hypotheses {
+            if grown as usize == GROWN {
+                break;
+            }
+            if findings.iter().any(|finding| self.explains(finding, seed)) {
+                continue;
+            }
+            let overlap = grow(&self.query, self.map, seed, &self.model);
+            grown += 1;
+            findings.push(Finding { overlap, seed: *seed });
+        }
+        grown
+    }
+
+    /// Whether a finding puts the fruits around the seed where the seed puts them.
+    fn explains(&self, finding: &Finding, seed: &Hypothesis) -> bool {
+        let reach = self.query.spacing;
+        let mut near = Vec::new();
+        self.query.tree.nearest(&super::landscape::single(&seed.place), 8, &mut near);
+        let same = near
+            .iter()
+            .filter(|(row, _)| {
+                let p = self.query.points[*row as usize];
+                let place = match finding.overlap.predictions[*row as usize] {
+                    Some(prediction) => prediction.place,
+                    None => finding.seed.pose.apply(&p),
+                };
+                (place - seed.pose.apply(&p)).norm() < reach * seed.pose.scale
+            })
+            .count();
+        2 * same > near.len()
+    }
+
+    fn by_outline(&self) -> Option<Finding> {
+        let seed = outline::hypothesis(&self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
+        let model = Model { sigma: seed.sigma, ..self.model };
+        let mut overlap = if seed.sigma < SHARP * self.map.spacing {
+            grow(&self.query, self.map, &seed, &model)
+        } else {
+            settle(&self.query, self.map, &seed, &model)
+        };
+        overlap.log_odds = overlap.log_odds.max(seed.log_odds);
+        Some(Finding { overlap, seed })
+    }
+
+    fn answer(&self, mut findings: Vec<Finding>, map: &FruitCloud, query: &FruitCloud, mut stages: Stages) -> Match {
+        if findings.is_empty() {
+            return Match::without_answer(Verdict::NoMatch, stages);
+        }
+        let best = findings.remove(0);
+        let rivals: Vec<Registration> = findings
+            .iter()
+            .filter(|f| f.overlap.log_odds > RIVAL * best.overlap.log_odds && self.contradict(&best, f))
+            .map(|f| self.registration(f))
+            .collect();
+        let sizes = Sizes::new(query, map, &self.query, self.map);
+        let mut pairs = associate(&self.query, self.map, &best.overlap, &|_, _| 1.0, self.config.min_probability);
+        if let Some(cue) = sizes.and_then(|sizes| sizes.cue(&pairs)) {
+            let size = |q: u32, m: u32| cue.ratio(q, m);
+            pairs = associate(&self.query, self.map, &best.overlap, &size, self.config.min_probability);
+        }
+        let mut pairs: Vec<Pair> = pairs
+            .iter()
+            .map(|pair| Pair {
+                query: self.query.rows[pair.query as usize] as usize,
+                map: self.map.rows[pair.map as usize] as usize,
+                probability: pair.probability,
+                distance_m: pair.distance,
+                support: pair.gain,
+            })
+            .collect();
+        pairs.sort_unstable_by_key(|pair| pair.query);
+        stages.push(("pairs", pairs.len() as f64));
+        Match {
+            verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
+            registration: Some(self.registration(&best)),
+            alternatives: rivals,
+            pairs,
+            noise_m: best.overlap.sigma,
+            stages,
+        }
+    }
+
+    fn registration(&self, finding: &Finding) -> Registration {
+        Registration {
+            map_from_query: finding.overlap.pose.to_similarity(&self.query.centre, &self.map.centre),
+            log_odds: finding.overlap.log_odds,
+        }
+    }
+
+    /// Whether two findings explain the same fruits of the query by different fruits of the map.
+    fn contradict(&self, a: &Finding, b: &Finding) -> bool {
+        let both = a.overlap.predictions.iter().zip(&b.overlap.predictions);
+        let shared: Vec<bool> = both
+            .filter_map(|pair| match pair {
+                (Some(x), Some(y)) => Some((x.place - y.place).norm() > 0.5 * self.map.spacing),
+                _ => None,
+            })
+            .collect();
+        let claimed = b.overlap.predictions.iter().flatten().count().max(1);
+        2 * shared.iter().filter(|&&apart| apart).count() > claimed.min(shared.len().max(claimed / 2))
+    }
+}

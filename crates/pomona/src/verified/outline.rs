@@ -1,0 +1,134 @@
+//! Poses from the outline of two clouds that show the same trees.
+//!
+//! When the noise is as large as the gaps inside a cluster, no constellation survives, but two visits to the same
+//! trees still have the same extent. The principal axes give the pose up to half-turns; annealed least squares, from
+//! the width of a branch down to the noise, decides between them.
+
+use super::hypothesis::{Hypothesis, gaussian};
+use super::landscape::Landscape;
+use super::pose::{Moments, Pose};
+use crate::geometry::Scale;
+use nalgebra::{Matrix3, Vector3};
+
+/// Standard deviations of the annealing, in spacings of the map: from the width of a branch down by a factor 0.75.
+const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
+
+/// The pose of the outline with the evidence of its fine structure; `None` where it is no better than chance.
+pub(crate) fn hypothesis(
+    query: &Landscape,
+    map: &Landscape,
+    scale: Scale,
+    admits: &impl Fn(&Pose) -> bool,
+) -> Option<Hypothesis> {
+    let ((axes_query, extent_query), (axes_map, extent_map)) = (axes(query)?, axes(map)?);
+    let ratio = match scale {
+        Scale::Metric => 1.0,
+        Scale::Free => extent_map / extent_query,
+    };
+    let (pose, first) = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]
+        .into_iter()
+        .map(|signs| {
+            let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
+            let rotation = turned * axes_query.transpose();
+            anneal(query, map, Pose { rotation, translation: Vector3::zeros(), scale: ratio }, scale)
+        })
+        .filter(|pose| admits(pose))
+        .map(|pose| (pose, fine_structure(query, map, &pose, SCREENING * map.spacing)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if first < 0.5 * threshold(query) {
+        return None;
+    }
+    let (sigma, log_odds) = sharpest(query, map, &pose);
+    (log_odds > threshold(query)).then(|| Hypothesis { pose, log_odds, place: middle(query), sigma })
+}
+
+/// Evidence in nats above which an outline is accepted: five standard deviations of its sum under chance.
+///
+/// Over disjoint rows the sum has mean zero and a standard deviation of 0.9 per square root of fruits.
+pub(crate) fn threshold(query: &Landscape) -> f64 {
+    5.0 * (query.len() as f64).sqrt()
+}
+
+/// Principal axes as a proper rotation, and the root-mean-square extent.
+fn axes(cloud: &Landscape) -> Option<(Matrix3<f64>, f64)> {
+    let scatter = cloud.points.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose()) / cloud.len() as f64;
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let [first, second] = [order[0], order[1]].map(|i| eigen.eigenvectors.column(i).into_owned());
+    let axes = Matrix3::from_columns(&[first, second, first.cross(&second)]);
+    let extent = scatter.trace().sqrt();
+    (extent > 0.0 && axes.iter().all(|x| x.is_finite())).then_some((axes, extent))
+}
+
+/// The fruit nearest the centre.
+fn middle(cloud: &Landscape) -> Vector3<f64> {
+    cloud.points.iter().copied().min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared())).unwrap_or_default()
+}
+
+fn anneal(query: &Landscape, map: &Landscape, start: Pose, scale: Scale) -> Pose {
+    let mut pose = start;
+    for width in ANNEALING {
+        let sigma = width * map.spacing;
+        let precision = -0.5 / (sigma * sigma);
+        let mut moments = Moments::default();
+        for p in &query.points {
+            let place = pose.apply(p);
+            // The mean of the fruits nearby, weighted by their likelihood, as in the E step of coherent point drift.
+            let (mut mean, mut total) = (Vector3::zeros(), 0.0);
+            map.near(&place, 2.0 * sigma, |row| {
+                let partner = map.points[row as usize];
+                let weight = (precision * (partner - place).norm_squared()).exp();
+                mean += partner * weight;
+                total += weight;
+            });
+            if total > 0.05 {
+                moments.add(p, &(mean / total), total / (total + 0.5));
+            }
+        }
+        pose = moments.step(&pose, scale, 0.0).unwrap_or(pose);
+    }
+    pose
+}
+
+/// The noise under which the fine structure speaks most for the pose, and what it says, nats.
+fn sharpest(query: &Landscape, map: &Landscape, pose: &Pose) -> (f64, f64) {
+    SIGMAS
+        .iter()
+        .map(|&share| (share * map.spacing, fine_structure(query, map, pose, share * map.spacing)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((map.spacing, f64::NEG_INFINITY))
+}
+
+/// Whether fruits line up, given that crowns do: the density of the map's fruits at the width of the noise against
+/// that at the width of a branch. Under a pose that lays crown on crown by chance the expectation is below zero.
+fn fine_structure(query: &Landscape, map: &Landscape, pose: &Pose, sigma: f64) -> f64 {
+    let variance = sigma * sigma;
+    let wide = WIDE * map.spacing * WIDE * map.spacing + variance;
+    query
+        .points
+        .iter()
+        .map(|p| {
+            let place = pose.apply(p);
+            let (mut here, mut around) = (0.0, map.floor);
+            map.near(&place, 2.5 * wide.sqrt(), |row| {
+                let d2 = (map.points[row as usize] - place).norm_squared();
+                here += gaussian(d2, variance);
+                around += gaussian(d2, wide);
+            });
+            (1.0 - DETECTION + DETECTION * (here + map.floor) / around).ln()
+        })
+        .sum()
+}
+
+/// Noise in spacings that is tried: 1.5 to 11 cm in an orchard.
+const SIGMAS: [f64; 9] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33, 0.42];
+
+/// Noise in spacings at which the half-turns are compared.
+const SCREENING: f64 = 0.25;
+
+/// Width in spacings of the crowns' structure that chance may share.
+const WIDE: f64 = 0.9;
+
+/// Share of fruits expected to be seen again while poses are compared.
+const DETECTION: f64 = 0.55;

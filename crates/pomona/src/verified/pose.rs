@@ -1,0 +1,157 @@
+//! Poses between two centred clouds and their weighted least-squares steps.
+
+use crate::geometry::{Scale, Similarity};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// `map = scale * rotation * query + translation`, both clouds about their own centres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pose {
+    pub(crate) rotation: Matrix3<f64>,
+    pub(crate) translation: Vector3<f64>,
+    pub(crate) scale: f64,
+}
+
+impl Pose {
+    #[inline]
+    pub(crate) fn apply(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * p * self.scale + self.translation
+    }
+
+    /// Pose in the clouds' own frames.
+    pub(crate) fn to_similarity(self, centre_query: &Vector3<f64>, centre_map: &Vector3<f64>) -> Similarity {
+        let mut rotation = Rotation3::from_matrix_unchecked(self.rotation);
+        rotation.renormalize();
+        let translation = centre_map + self.translation - rotation * centre_query * self.scale;
+        Similarity { rotation, translation, scale: self.scale }
+    }
+
+    #[cfg(test)]
+    /// Angle of the rotation between two poses, radians.
+    pub(crate) fn angle_to(&self, other: &Self) -> f64 {
+        let trace = (self.rotation.transpose() * other.rotation).trace();
+        ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+    }
+}
+
+/// Sums of weighted pairs, enough for one least-squares step from a current pose.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moments {
+    pub(crate) weight: f64,
+    query: Vector3<f64>,
+    map: Vector3<f64>,
+    /// Sum of w m q^T.
+    cross: Matrix3<f64>,
+    /// Sum of w q q^T.
+    square: Matrix3<f64>,
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        Self {
+            weight: 0.0,
+            query: Vector3::zeros(),
+            map: Vector3::zeros(),
+            cross: Matrix3::zeros(),
+            square: Matrix3::zeros(),
+        }
+    }
+}
+
+impl Moments {
+    #[inline]
+    pub(crate) fn add(&mut self, query: &Vector3<f64>, map: &Vector3<f64>, weight: f64) {
+        self.weight += weight;
+        self.query += query * weight;
+        self.map += map * weight;
+        self.cross += map * (query * weight).transpose();
+        self.square += query * (query * weight).transpose();
+    }
+
+    /// Adds another sum with a weight of its own.
+    pub(crate) fn accumulate(&mut self, other: &Self, weight: f64) {
+        self.weight += other.weight * weight;
+        self.query += other.query * weight;
+        self.map += other.map * weight;
+        self.cross += other.cross * weight;
+        self.square += other.square * weight;
+    }
+
+    /// Centroid of the query's points.
+    pub(crate) fn centroid(&self) -> Vector3<f64> {
+        self.query / self.weight
+    }
+
+    /// Second moments of the query's points about their centroid, divided by the weight.
+    pub(crate) fn spread(&self) -> Matrix3<f64> {
+        let mean = self.centroid();
+        self.square / self.weight - mean * mean.transpose()
+    }
+
+    /// One Gauss-Newton step of the Procrustes problem from `start`, whose rotation must be near.
+    ///
+    /// Minimises the sum of w |m - s exp(w x) R q - t|^2 to first order in the turn: three linear equations instead
+    /// of a singular value decomposition. `prior` (inverse variance in units of one pair's weight over square metres)
+    /// holds the turn at `start` where the pairs do not fix it.
+    pub(crate) fn step(&self, start: &Pose, scale: Scale, prior: f64) -> Option<Pose> {
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let (mean_query, mean_map) = (self.query / self.weight, self.map / self.weight);
+        let cross = self.cross - mean_map * mean_query.transpose() * self.weight;
+        let square = self.square - mean_query * mean_query.transpose() * self.weight;
+        let turned = start.rotation * square * start.rotation.transpose() * (start.scale * start.scale);
+        let moved = cross * start.rotation.transpose() * start.scale; // sum of w m q'^T with q' = s R q
+        // sum of w q' x m, from the antisymmetric part of the sum of m q'^T.
+        let torque =
+            Vector3::new(moved[(2, 1)] - moved[(1, 2)], moved[(0, 2)] - moved[(2, 0)], moved[(1, 0)] - moved[(0, 1)]);
+        let inertia = Matrix3::identity() * (turned.trace() + prior) - turned;
+        let turn = inertia.cholesky()?.solve(&torque);
+        if !turn.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let rotation = Rotation3::new(turn).into_inner() * start.rotation;
+        let scale = match scale {
+            Scale::Metric => start.scale,
+            Scale::Free => (cross * rotation.transpose()).trace() / square.trace(),
+        };
+        (scale > 0.0 && scale.is_finite()).then(|| Pose {
+            rotation,
+            translation: mean_map - rotation * mean_query * scale,
+            scale,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn steps_converge_to_the_pose(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 6..20),
+            turn in prop::array::uniform3(-0.2..0.2f64),
+            shift in prop::array::uniform3(-1.0..1.0f64),
+            scale in 0.7..1.4f64,
+        ) {
+            let truth = Pose {
+                rotation: Rotation3::new(Vector3::from(turn)).into_inner(),
+                translation: Vector3::from(shift),
+                scale,
+            };
+            let mut moments = Moments::default();
+            for p in &points {
+                let p = Vector3::from(*p);
+                moments.add(&p, &truth.apply(&p), 1.0);
+            }
+            let mut pose = Pose { rotation: Matrix3::identity(), translation: Vector3::zeros(), scale: 1.0 };
+            for _ in 0..30 {
+                pose = moments.step(&pose, Scale::Free, 0.0).expect("random points span space");
+            }
+            prop_assert!(pose.angle_to(&truth) < 1e-6);
+            prop_assert!((pose.scale - scale).abs() < 1e-9);
+            prop_assert!((pose.translation - truth.translation).norm() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! From seeds to hypotheses: rounds of query seeds, their candidates in the map, the best of them refined.
+
+use super::hypothesis::{Hypothesis, Model, Scratch, first_look, fit_seed, refine};
+use super::landscape::Landscape;
+use super::pose::Pose;
+use super::seeds::{Code, Quad, SeedIndex, canonical, near_ties, shuffled, without_scale};
+use crate::geometry::Scale;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// A seed of the query laid on a seed of the map.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    pub(crate) pose: Pose,
+    pub(crate) log_odds: f64,
+    pub(crate) place: Vector3<f64>,
+    /// Query fruit and the rows of the seeds: a total order for equal evidence.
+    key: (Quad, Quad),
+}
+
+/// What a round cost.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Effort {
+    pub(crate) codes: u64,
+    pub(crate) candidates: u64,
+    pub(crate) fitted: u64,
+}
+
+impl std::ops::Add for Effort {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            codes: self.codes + other.codes,
+            candidates: self.candidates + other.candidates,
+            fitted: self.fitted + other.fitted,
+        }
+    }
+}
+
+/// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
+fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<(Quad, Code)> {
+    let near = &query.neighbours[row as usize];
+    let n = near.len().min(super::seeds::COMPANIONS) as u64;
+    let count = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
+    if turn >= count {
+        return None;
+    }
+    let key = shuffled(u64::from(row));
+    // A stride that shares no factor with the count walks through all of them.
+    let stride = [37, 31, 29, 23, 19, 17, 13, 11, 7, 1].into_iter().find(|s| !count.is_multiple_of(*s)).unwrap_or(1);
+    let [a, b, c] = unrank((key % count + turn * stride) % count);
+    let pick = |i: u64| near[i as usize];
+    canonical(&query.points, [row, pick(a), pick(b), pick(c)])
+}
+
+/// The `rank`-th triple a < b < c in colexicographic order.
+fn unrank(rank: u64) -> [u64; 3] {
+    let mut c = 2;
+    while (c + 1) * c * (c - 1) / 6 <= rank {
+        c += 1;
+    }
+    let rest = rank - c * (c - 1) * (c - 2) / 6;
+    let mut b = 1;
+    while (b + 1) * b / 2 <= rest {
+        b += 1;
+    }
+    [rest - b * (b - 1) / 2, b, c]
+}
+
+/// Candidates of one seed of the query that survive the fit and the first look.
+fn candidates_of(
+    query: &Landscape,
+    map: &Landscape,
+    index: &SeedIndex,
+    model: &Model,
+    admits: &(impl Fn(&Pose) -> bool + Sync),
+    seed: (Quad, Code),
+    found: &mut Vec<Candidate>,
+) -> Effort {
+    let mut effort = Effort::default();
+    let length = f64::from(seed.1[0]);
+    // Noise in the metres of the query: with the scale unknown, the same share of the spacing.
+    let sigma = match model.scale {
+        Scale::Metric => model.sigma,
+        Scale::Free => model.sigma / map.spacing * query.spacing,
+    };
+    if length < 6.0 * sigma {
+        return effort;
+    }
+    let mut hits: Vec<(u32, f32)> = Vec::new();
+    near_ties(&query.points, seed.0, 2.8 * sigma, &mut |quad, code| {
+        effort.codes += 1;
+        let (code, radius) = match model.scale {
+            Scale::Metric => (code, RADIUS * sigma),
+            Scale::Free => (without_scale(&code), RADIUS * sigma / length),
+        };
+        hits.clear();
+        index.tree.within(&code, radius as f32, |hit, d2| hits.push((hit, d2)));
+        effort.candidates += hits.len() as u64;
+        if hits.len() > COMMON {
+            return; // a shape that every cluster shows says nothing about the place
+        }
+        for &(hit, _) in &hits {
+            let target = &index.quads[hit as usize];
+            let Some((pose, residual)) = fit_seed(query, map, &quad, target, model.scale) else { continue };
+            if residual > MAX_RESIDUAL * model.sigma * model.sigma || !admits(&pose) {
+                continue;
+            }
+            effort.fitted += 1;
+            let log_odds = first_look(query, map, &quad, &pose, model);
+            if log_odds > 0.0 {
+                let place = quad.iter().map(|&row| query.points[row as usize]).sum::<Vector3<f64>>() / 4.0;
+                found.push(Candidate { pose, log_odds, place, key: (quad, *target) });
+            }
+        }
+    });
+    effort
+}
+
+/// Reach of the code search in standard deviations of one axis; see the docs page for the share it finds.
+const RADIUS: f64 = 2.5;
+
+/// Seeds whose code has more neighbours in the map than this are passed over.
+const COMMON: usize = 48;
+
+/// Residual sum of a seed's fit over sigma^2: 95 % of chi^2 with 12 - 6 degrees of freedom.
+const MAX_RESIDUAL: f64 = 12.6;
+
+/// One round: `turns` seeds of every fruit, the best `keep` candidates refined around their places.
+pub(crate) fn round(
+    query: &Landscape,
+    map: &Landscape,
+    index: &SeedIndex,
+    model: &Model,
+    admits: &(impl Fn(&Pose) -> bool + Sync),
+    turns: std::ops::Range<u64>,
+    keep: usize,
+) -> (Vec<Hypothesis>, Effort) {
+    let rows: Vec<u32> = (0..query.len() as u32).collect();
+    let parts: Vec<(Vec<Candidate>, Effort)> = rows
+        .par_chunks(16)
+        .map(|rows| {
+            let mut found = Vec::new();
+            let mut effort = Effort::default();
+            for &row in rows {
+                for turn in turns.clone() {
+                    if let Some(seed) = seed_of(query, row, turn) {
+                        effort = effort + candidates_of(query, map, index, model, admits, seed, &mut found);
+                    }
+                }
+            }
+            (found, effort)
+        })
+        .collect();
+    let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
+    let mut candidates: Vec<Candidate> = parts.into_iter().flat_map(|part| part.0).collect();
+    candidates.sort_unstable_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key)));
+    candidates.truncate(keep);
+    let mut hypotheses: Vec<Hypothesis> = candidates
+        .par_chunks(8)
+        .map_init(Scratch::default, |scratch, part| {
+            part.iter()
+                .filter_map(|c| refine(query, map, &c.pose, &c.place, REACH * query.spacing, model, scratch))
+                .collect::<Vec<_>>()
+        })
+        .flatten_iter()
+        .collect();
+    hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+    (hypotheses, effort)
+}
+
+/// Radius of the region that weighs a refined hypothesis, in spacings.
+pub(crate) const REACH: f64 = 3.5;

@@ -1,0 +1,177 @@
+//! Exact neighbour search among points of a few dimensions: a balanced k-d tree with bucket leaves.
+
+/// A k-d tree over points of `D` single-precision coordinates.
+///
+/// Leaves hold up to [`LEAF`] points in the order of the tree, so that a leaf is scanned in one sweep.
+#[derive(Debug, Clone)]
+pub(crate) struct Tree<const D: usize> {
+    points: Vec<[f32; D]>,
+    /// Row in the caller's order of each point in the tree's order.
+    rows: Vec<u32>,
+    nodes: Vec<Node>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    split: f32,
+    axis: u8,
+    /// Index of the right child; the left one follows its parent. 0 marks a leaf.
+    right: u32,
+    start: u32,
+    end: u32,
+}
+
+const LEAF: usize = 12;
+
+impl<const D: usize> Tree<D> {
+    /// Builds the tree; the order of `points` decides the rows that queries return.
+    pub(crate) fn new(points: &[[f32; D]]) -> Self {
+        let mut rows: Vec<u32> = (0..points.len() as u32).collect();
+        let mut nodes = Vec::with_capacity(4 * points.len() / LEAF + 1);
+        if !points.is_empty() {
+            let end = rows.len();
+            build(points, &mut rows, 0, end, &mut nodes);
+        }
+        Self { points: rows.iter().map(|&row| points[row as usize]).collect(), rows, nodes }
+    }
+
+    /// Calls `visit(row, squared distance)` for every point within `radius`, in the order of the tree.
+    pub(crate) fn within(&self, centre: &[f32; D], radius: f32, mut visit: impl FnMut(u32, f32)) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let limit = radius * radius;
+        let mut stack = [(0u32, 0f32); 64];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let mut at = stack[depth].0;
+            loop {
+                let node = self.nodes[at as usize];
+                if node.right == 0 {
+                    for i in node.start as usize..node.end as usize {
+                        let d2 = squared_distance(&self.points[i], centre);
+                        if d2 <= limit {
+                            visit(self.rows[i], d2);
+                        }
+                    }
+                    break;
+                }
+                let offset = centre[node.axis as usize] - node.split;
+                let (near, far) = if offset < 0.0 { (at + 1, node.right) } else { (node.right, at + 1) };
+                if offset * offset <= limit {
+                    stack[depth] = (far, 0.0);
+                    depth += 1;
+                }
+                at = near;
+            }
+        }
+    }
+
+    /// The `count` nearest points, nearest first, ties by row: `(row, squared distance)`.
+    pub(crate) fn nearest(&self, centre: &[f32; D], count: usize, found: &mut Vec<(u32, f32)>) {
+        found.clear();
+        if self.nodes.is_empty() || count == 0 {
+            return;
+        }
+        let mut stack = [(0u32, 0f32); 64];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let (mut at, bound) = stack[depth];
+            let worst = |found: &Vec<(u32, f32)>| if found.len() < count { f32::INFINITY } else { found[count - 1].1 };
+            if bound > worst(found) {
+                continue;
+            }
+            loop {
+                let node = self.nodes[at as usize];
+                if node.right == 0 {
+                    for i in node.start as usize..node.end as usize {
+                        let entry = (self.rows[i], squared_distance(&self.points[i], centre));
+                        if entry.1 > worst(found) {
+                            continue;
+                        }
+                        let place = found.partition_point(|f| (f.1, f.0) < (entry.1, entry.0));
+                        if place < count {
+                            found.insert(place, entry);
+                            found.truncate(count);
+                        }
+                    }
+                    break;
+                }
+                let offset = centre[node.axis as usize] - node.split;
+                let (near, far) = if offset < 0.0 { (at + 1, node.right) } else { (node.right, at + 1) };
+                stack[depth] = (far, offset * offset);
+                depth += 1;
+                at = near;
+            }
+        }
+    }
+}
+
+#[inline]
+fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+    let mut sum = 0.0;
+    for d in 0..D {
+        let difference = a[d] - b[d];
+        sum += difference * difference;
+    }
+    sum
+}
+
+/// Splits at the median of the widest axis; leaves take their range as it is.
+fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, end: usize, nodes: &mut Vec<Node>) {
+    let at = nodes.len();
+    nodes.push(Node { split: 0.0, axis: 0, right: 0, start: start as u32, end: end as u32 });
+    if end - start <= LEAF {
+        return;
+    }
+    let (mut low, mut high) = ([f32::INFINITY; D], [f32::NEG_INFINITY; D]);
+    for &row in &rows[start..end] {
+        for d in 0..D {
+            low[d] = low[d].min(points[row as usize][d]);
+            high[d] = high[d].max(points[row as usize][d]);
+        }
+    }
+    let axis = (0..D).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+    if high[axis] <= low[axis] {
+        return; // all in one place: a leaf of any size is still exact
+    }
+    let middle = usize::midpoint(start, end);
+    let key = |row: u32| (points[row as usize][axis], row);
+    rows[start..end]
+        .select_nth_unstable_by(middle - start, |&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
+    let split = points[rows[middle] as usize][axis];
+    build(points, rows, start, middle, nodes);
+    let right = nodes.len() as u32;
+    build(points, rows, middle, end, nodes);
+    nodes[at] = Node { split, axis: axis as u8, right, ..nodes[at] };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn both_searches_equal_brute_force(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0f32), 1..200),
+            centre in prop::array::uniform3(-1.0..1.0f32),
+            radius in 0.01..1.0f32,
+        ) {
+            let tree = Tree::new(&points);
+            let mut all: Vec<_> =
+                points.iter().enumerate().map(|(i, p)| (i as u32, squared_distance(p, &centre))).collect();
+            all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            let mut nearest = Vec::new();
+            tree.nearest(&centre, 7, &mut nearest);
+            prop_assert_eq!(&nearest[..], &all[..all.len().min(7)]);
+            let mut within = Vec::new();
+            tree.within(&centre, radius, |row, d2| within.push((row, d2)));
+            within.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            all.retain(|entry| entry.1 <= radius * radius);
+            prop_assert_eq!(within, all);
+        }
+    }
+}

@@ -1,0 +1,223 @@
+"""Which fruit of the query is which fruit of the map: the Python face of the core's matcher."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pomona import _core
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+
+Method: TypeAlias = Literal["paper", "verified"]
+Scale: TypeAlias = Literal["metric", "free"]
+Cloud: TypeAlias = FruitCloud | ArrayLike
+Up: TypeAlias = Sequence[Sequence[float]]
+
+
+class Verdict(StrEnum):
+    """What a match says. All four are results; none is an error."""
+
+    FOUND = "Found"
+    TOO_FEW = "TooFew"
+    AMBIGUOUS = "Ambiguous"
+    NO_MATCH = "NoMatch"
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Registration, pairs and verdict of one query.
+
+    Attributes
+    ----------
+    status
+        The verdict.
+    map_from_query
+        (4, 4), the scale folded in; None where nothing was found.
+    scale
+        Length in the map over length in the query; None where nothing was found.
+    log_odds
+        Evidence against chance in nats; NaN where nothing was found.
+    pairs
+        (M, 2), row in the query and row in the map, one to one, sorted by query row.
+    probabilities
+        (M,), probability that the two are one fruit.
+    distances_m
+        (M,), distance after registration, metres of the map.
+    support
+        (M,), what speaks for the pair: votes (paper) or nats (verified).
+    alternatives
+        (4, 4) each: other registrations as good as the first; empty unless ambiguous.
+    noise_m
+        Relative noise of the two visits per axis, metres; NaN where nothing was found.
+    stages
+        What happened: stage and count, in order.
+    n_query, n_map
+        Fruits in the two clouds.
+    elapsed_s
+        Wall time of the search, and of making the index where it was made for this query.
+    """
+
+    status: Verdict
+    map_from_query: NDArray[np.float64] | None
+    scale: float | None
+    log_odds: float
+    pairs: NDArray[np.int64]
+    probabilities: NDArray[np.float64]
+    distances_m: NDArray[np.float64]
+    support: NDArray[np.float64]
+    alternatives: tuple[NDArray[np.float64], ...]
+    noise_m: float
+    stages: tuple[tuple[str, float], ...]
+    n_query: int
+    n_map: int
+    elapsed_s: float
+
+
+class Index:
+    """A map made ready once for many queries.
+
+    Parameters
+    ----------
+    map
+        A cloud, or (N, 3) metres.
+    scale
+        "metric" where both clouds are in metres, "free" where the ratio of their scales is unknown.
+    method
+        "verified", or "paper" for the published method.
+    config
+        Values of the core's tables that differ from `default_config()`; unknown keys are errors.
+    threads
+        Threads of the search; None takes all. The answer does not depend on it.
+
+    Raises
+    ------
+    PomonaError
+        An array or a setting is wrong.
+    """
+
+    def __init__(
+        self,
+        map: Cloud,
+        *,
+        scale: Scale = "metric",
+        method: Method = "verified",
+        config: Mapping[str, Any] | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self._map = _as_cloud(map)
+        overrides = json.dumps(dict(config or {}))
+        try:
+            self._core = _core.MapIndex(
+                _arrays(self._map), method=method, scale=scale, config=overrides, threads=threads
+            )
+        except ValueError as error:
+            raise PomonaError(f"map: {error}") from None
+
+    def match(self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None) -> Match:
+        """Find `query` in the map; arguments as in `pomona.match`."""
+        start = time.perf_counter()
+        cloud = _as_cloud(query)
+        try:
+            found = self._core.search(_arrays(cloud), noise_m=noise_m, up=_vertical(up))
+        except ValueError as error:
+            raise PomonaError(f"query: {error}") from None
+        return Match(
+            status=Verdict(found.status),
+            map_from_query=found.map_from_query,
+            scale=found.scale,
+            log_odds=float("nan") if found.log_odds is None else found.log_odds,
+            pairs=found.pairs,
+            probabilities=found.probabilities,
+            distances_m=found.distances_m,
+            support=found.support,
+            alternatives=tuple(np.array(matrix) for matrix, _ in found.alternatives),
+            noise_m=found.noise_m,
+            stages=tuple(found.stages),
+            n_query=len(cloud),
+            n_map=len(self._map),
+            elapsed_s=time.perf_counter() - start,
+        )
+
+
+def match(
+    query: Cloud,
+    map: Cloud,
+    *,
+    scale: Scale = "metric",
+    method: Method = "verified",
+    noise_m: float | None = None,
+    up: Up | None = None,
+    config: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+) -> Match:
+    """Say which fruit of `query` is which fruit of `map`, and where the query lies in the map.
+
+    Parameters
+    ----------
+    query, map
+        Clouds, or (N, 3) metres.
+    scale
+        "metric" where both clouds are in metres, "free" where the ratio of their scales is unknown.
+    method
+        "verified", or "paper" for the published method.
+    noise_m
+        Standard deviation per axis of the difference of the two visits; None: estimated.
+    up
+        The vertical in the query's and in the map's frame, where it is known.
+    config
+        Values of the core's tables that differ from `default_config()`; unknown keys are errors.
+    threads
+        Threads of the search; None takes all. The answer does not depend on it.
+
+    Raises
+    ------
+    PomonaError
+        An array or a setting is wrong. That there is no match is no error: see `Match.status`.
+    """
+    start = time.perf_counter()
+    index = Index(map, scale=scale, method=method, config=config, threads=threads)
+    found = index.match(query, noise_m=noise_m, up=up)
+    return replace(found, elapsed_s=time.perf_counter() - start)
+
+
+def default_config() -> dict[str, Any]:
+    """Return the core's settings with their defaults, a table per method."""
+    defaults: dict[str, Any] = json.loads(_core.default_config())
+    return defaults
+
+
+def _as_cloud(cloud: Cloud) -> FruitCloud:
+    if isinstance(cloud, FruitCloud):
+        return cloud
+    return FruitCloud(positions=np.asarray(cloud, np.float64))
+
+
+def _arrays(cloud: FruitCloud) -> dict[str, Any]:
+    """Return the arrays the core reads, contiguous."""
+    views = cloud.views
+    return {
+        "positions": np.ascontiguousarray(cloud.positions, np.float64),
+        "covariances": None if cloud.covariances is None else np.ascontiguousarray(cloud.covariances, np.float64),
+        "diameters_m": None if cloud.diameters_m is None else np.ascontiguousarray(cloud.diameters_m, np.float64),
+        "view_frames": None if views is None else np.ascontiguousarray(views.frames, np.int64),
+        "view_fruits": None if views is None else np.ascontiguousarray(views.fruits, np.int64),
+    }
+
+
+def _vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
+    if up is None:
+        return None
+    vectors = np.asarray(up, np.float64)
+    if vectors.shape == (3,):
+        vectors = np.stack((vectors, vectors))
+    if vectors.shape != (2, 3):
+        raise PomonaError(f"up: found an array of shape {vectors.shape}, expected (3,) or (2, 3)")
+    return vectors[0].tolist(), vectors[1].tolist()
