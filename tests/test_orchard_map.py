@@ -74,6 +74,13 @@ def test_known_fruits_keep_their_ids_and_new_ones_get_the_next(tmp_path: Path, s
     assert problems(path) == []
 
 
+def test_the_same_visits_make_the_same_file(grown: Path, tmp_path: Path, scenes: list[FruitCloud]) -> None:
+    again = tmp_path / "again.gpkg"
+    for month, cloud in enumerate(scenes, start=8):
+        add_session(again, visit(cloud, f"2024-{month:02d}-01"))
+    assert again.read_bytes() == grown.read_bytes()
+
+
 def test_the_map_moves_with_the_tree(grown: Path, scenes: list[FruitCloud]) -> None:
     orchard = OrchardMap(grown)
     first, second = orchard.visits()

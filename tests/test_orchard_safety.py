@@ -196,6 +196,23 @@ def test_a_full_disk_leaves_nothing_of_a_new_file(tmp_path: Path, visits: tuple[
         assert str(disk) in done.stderr
 
 
+def test_a_read_only_disk_is_read_and_not_written(tmp_path: Path, started: Path, visits: tuple[Path, Path]) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    orchard = disk / "orchard.gpkg"
+    done = on_a_small_disk(
+        disk,
+        4 * started.stat().st_size,
+        f"cp '{started}' '{orchard}'",
+        f"mount -o remount,ro '{disk}'",
+        f"'{POMONA}' map check '{orchard}'",
+        f"'{POMONA}' map add '{orchard}' '{visits[1]}'",
+    )
+    assert done.returncode == 2
+    assert done.stdout == "ok\n"
+    assert done.stderr == f"pomona: {orchard}: cannot be written: the file or its folder is read-only\n"
+
+
 def test_a_second_writer_waits_and_is_told(orchard: Path, started: Path, visits: tuple[Path, Path]) -> None:
     other = sqlite3.connect(orchard, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
