@@ -17,20 +17,27 @@ def read(tmp_path, *lines, numbers=(0, 1)):
 
 def test_boxes_of_each_frame(tmp_path):
     detector = read(tmp_path, HEADER, "0,10,20,30,45,0.9,a", "1,11,20,31,45,0.8,a", "0,50,60,70.5,80,1,b")
-    found = detector(Frame(number=0, time_s=0.0))
+    found = detector(Frame(number=0))
     assert found.boxes_px.tolist() == [[10, 20, 30, 45], [50, 60, 70.5, 80]]
     assert found.scores.tolist() == [0.9, 1.0]
     assert found.ids == ("a", "b")
-    assert len(detector(Frame(number=7, time_s=0.0))) == 0
+    assert len(detector(Frame(number=7))) == 0
     assert detector.with_ids
 
 
 def test_columns_in_any_order_and_others_ignored(tmp_path):
     detector = read(tmp_path, "class,ymax,xmax,ymin,xmin,frame", "apple,45,30,20,10,0")
-    found = detector(Frame(number=0, time_s=0.0))
+    found = detector(Frame(number=0))
     assert found.boxes_px.tolist() == [[10, 20, 30, 45]]
     assert found.scores.tolist() == [1.0]
     assert found.ids is None
+
+
+def test_a_single_frame_needs_no_frame_column(tmp_path):
+    detector = read(tmp_path, "id,xmin,ymin,xmax,ymax", "2118,10,20,30,45", numbers=(7,))
+    assert detector(Frame(number=7)).ids == ("2118",)
+    with pytest.raises(PomonaError, match="expected a header with frame"):
+        read(tmp_path, "id,xmin,ymin,xmax,ymax", "2118,10,20,30,45", numbers=(7, 8))
 
 
 def test_a_header_alone_is_no_fruits(tmp_path):
@@ -40,7 +47,7 @@ def test_a_header_alone_is_no_fruits(tmp_path):
 
 
 def test_a_box_partly_outside_is_cut_at_the_edge(tmp_path):
-    found = read(tmp_path, HEADER, "0,-5,20,30,500,0.9,a")(Frame(number=0, time_s=0.0))
+    found = read(tmp_path, HEADER, "0,-5,20,30,500,0.9,a")(Frame(number=0))
     assert found.boxes_px.tolist() == [[0, 20, 30, 480]]
 
 

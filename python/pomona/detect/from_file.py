@@ -1,4 +1,7 @@
-"""Detections from a table: `frame,xmin,ymin,xmax,ymax[,score][,id]`, one line a box."""
+"""Detections from a table: `frame,xmin,ymin,xmax,ymax[,score][,id]`, one line a box.
+
+A recording of a single frame needs no column `frame`.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +66,8 @@ class FileDetector:
         """
         frames: dict[int, list[_Box]] = {}
         known = set(numbers)
-        for number, box in _boxes(path, calibration):
+        only = next(iter(numbers)) if len(numbers) == 1 else None
+        for number, box in _boxes(path, calibration, only):
             if number not in known:
                 have = f"{min(known)} to {max(known)}" if known else "none"
                 raise PomonaError(f"{path}: line {box.line}: frame: found {number}, expected a frame there is ({have})")
@@ -81,34 +85,35 @@ class FileDetector:
         return all(found.ids is not None for found in self.by_frame.values())
 
 
-def _boxes(path: Path, calibration: Calibration) -> list[tuple[int, _Box]]:
+def _boxes(path: Path, calibration: Calibration, only: int | None) -> list[tuple[int, _Box]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
-            columns = _columns(path, next(rows, []))
-            return [_box(path, rows.line_num, columns, row, calibration) for row in rows if any(map(str.strip, row))]
+            columns = _columns(path, next(rows, []), BOX_COLUMNS if only is not None else ("frame", *BOX_COLUMNS))
+            filled = (row for row in rows if any(map(str.strip, row)))
+            return [_box(path, rows.line_num, columns, row, calibration, only) for row in filled]
     except FileNotFoundError:
         raise PomonaError(f"{path}: not found, expected boxes: frame,xmin,ymin,xmax,ymax,score[,id]") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise PomonaError(f"{path}: not a CSV text ({error})") from None
 
 
-def _columns(path: Path, header: list[str]) -> dict[str, int]:
+def _columns(path: Path, header: list[str], needed: tuple[str, ...]) -> dict[str, int]:
     columns = {name.strip(): index for index, name in enumerate(header)}
-    missing = [name for name in ("frame", *BOX_COLUMNS) if name not in columns]
+    missing = [name for name in needed if name not in columns]
     if missing:
         found = ",".join(header) or "an empty file"
         raise PomonaError(f"{path}: found {found}, expected a header with {', '.join(missing)}")
     return columns
 
 
-def _box(path: Path, line: int, columns: dict[str, int], row: list[str], calibration: Calibration) -> tuple[int, _Box]:
+def _box(
+    path: Path, line: int, columns: dict[str, int], row: list[str], calibration: Calibration, only: int | None
+) -> tuple[int, _Box]:
     where = f"{path}: line {line}"
     if len(row) != len(columns):
         raise PomonaError(f"{where}: found {len(row)} cells, expected {len(columns)} as in the header")
-    frame = _number(where, "frame", row[columns["frame"]])
-    if frame != int(frame):
-        raise PomonaError(f"{where}: frame: found {frame:g}, expected a whole number")
+    frame = _frame(where, row[columns["frame"]]) if "frame" in columns or only is None else only
     xmin, ymin, xmax, ymax = (_number(where, name, row[columns[name]]) for name in BOX_COLUMNS)
     for axis, low, high in (("x", xmin, xmax), ("y", ymin, ymax)):
         if low >= high:
@@ -122,7 +127,14 @@ def _box(path: Path, line: int, columns: dict[str, int], row: list[str], calibra
         raise PomonaError(f"{where}: score: found {score:g}, expected 0 to 1")
     corners_px = (max(xmin, 0.0), max(ymin, 0.0), min(xmax, float(width)), min(ymax, float(height)))
     name = row[columns["id"]].strip() if "id" in columns else ""
-    return int(frame), _Box(line, corners_px, score, name)
+    return frame, _Box(line, corners_px, score, name)
+
+
+def _frame(where: str, cell: str) -> int:
+    frame = _number(where, "frame", cell)
+    if frame != int(frame):
+        raise PomonaError(f"{where}: frame: found {frame:g}, expected a whole number")
+    return int(frame)
 
 
 def _number(where: str, name: str, cell: str) -> float:

@@ -75,13 +75,12 @@ class FolderRecording:
 
     def frames(self) -> Iterator[Frame]:
         """Give the frames in order of their numbers."""
-        poses = None if self.trajectory is None else self.trajectory.session_from_camera
-        times_s = np.arange(len(self), dtype=np.float64) if self.trajectory is None else self.trajectory.times_s
+        posed = self.trajectory
         for row, number in enumerate(self.numbers):
             yield Frame(
                 number=number,
-                time_s=float(times_s[row]),
-                session_from_camera=None if poses is None else poses[row],
+                time_s=None if posed is None else float(posed.times_s[row]),
+                session_from_camera=None if posed is None else posed.session_from_camera[row],
                 read_left=self._reader("left", number),
                 read_right=self._reader("right", number),
                 read_depth=self._reader("depth", number),

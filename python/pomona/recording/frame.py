@@ -27,8 +27,8 @@ class Frame:
     ----------
     number : int
         Frame number, unique in the recording.
-    time_s : float
-        Seconds, on the recording's own clock.
+    time_s : float or None
+        Seconds, on the recording's own clock, None where nobody noted it.
     session_from_camera : (4, 4) float64 or None
         Pose of the left camera, None where the recording has no poses.
     read_left, read_right : callable or None
@@ -38,7 +38,7 @@ class Frame:
     """
 
     number: int
-    time_s: float
+    time_s: float | None = None
     session_from_camera: NDArray[np.float64] | None = None
     read_left: Callable[[], Picture] | None = None
     read_right: Callable[[], Picture] | None = None
