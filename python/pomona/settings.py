@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 # Table of the file that holds what `pomona.match` is told by name; the other tables are the core's.
 _CALL_TABLE = "match"
-_CALL_NAMES = ("method", "scale", "noise_m", "up", "per_frame", "threads")
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,11 @@ class Settings:
 
         tables = {} if path is None else _read_toml(path)
         from_file = tables.pop(_CALL_TABLE, {})
-        known = {_CALL_TABLE: dict.fromkeys(_CALL_NAMES), **default_config()}
+        call = _defaults_of_match()
+        known = {_CALL_TABLE: call, **default_config()}
         _refuse_unknown(path, {_CALL_TABLE: from_file, **tables}, known)
         given = {name: value for name, value in flags.items() if value is not None}
-        return cls(call={**_defaults_of_match(), **from_file, **given}, overrides=tables)
+        return cls(call={**call, **from_file, **given}, overrides=tables)
 
     def match(self, query: FruitCloud, map: FruitCloud) -> Match:
         """Run `pomona.match` with these settings."""
@@ -69,10 +69,11 @@ class Settings:
 
 
 def _defaults_of_match() -> dict[str, Any]:
+    """Return what `pomona.match` is told by name, with its defaults, which live in its signature alone."""
     from pomona.matching import match
 
-    parameters = inspect.signature(match).parameters
-    return {name: parameters[name].default for name in _CALL_NAMES}
+    named = (p for p in inspect.signature(match).parameters.values() if p.kind is p.KEYWORD_ONLY)
+    return {parameter.name: parameter.default for parameter in named if parameter.name != "config"}
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
