@@ -30,6 +30,14 @@ def test_what_is_there_stays(shared_data, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["121804"]
 
 
+def test_another_day_is_said(shared_data, tmp_path):
+    captures = import_captures(shared_data / "kinect_apples", tmp_path / "out", date="2021-10-04")
+    assert open_recording(next(captures).folder).date == "2021-10-04T11:40:12"
+    with pytest.raises(PomonaError, match="date: found '4 October'"):
+        next(import_captures(shared_data / "kinect_apples", tmp_path / "other", date="4 October"))
+    assert not (tmp_path / "other").exists()
+
+
 def test_a_folder_without_captures_is_refused(tmp_path):
     with pytest.raises(PomonaError, match="no captures found"):
         list(import_captures(tmp_path, tmp_path / "out"))

@@ -18,13 +18,14 @@ def _import() -> None:
 def import_kinect_apples(
     source: Path = typer.Argument(metavar="DIR", help="Folder with HHMMSS_depth.png, HHMMSS_boxes.csv ..."),
     output: Path = typer.Argument(metavar="OUT", help="Folder for the recordings, one subfolder a capture."),
+    date: str | None = typer.Option(None, metavar="DAY", help="Day of the captures; else 2021-09-27, as published."),
 ) -> None:
     """Import the captures of one Fuji scene by an Azure Kinect (GRAP-UdL-AT/ak_sw_benchmarker).
 
     The intrinsics are nominal: f = 913 px, so diameters carry its error.
     """
-    from pomona.recording.kinect_apples import import_captures
+    from pomona.recording.kinect_apples import DATE, import_captures
 
-    for capture in import_captures(source, output):
+    for capture in import_captures(source, output, date or DATE):
         colour = "depth and colour" if capture.has_colour else "depth only, no colour picture in the data set"
         typer.echo(f"{capture.folder}: {capture.boxes} boxes, {colour}")

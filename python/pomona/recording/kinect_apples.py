@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import json
 import re
 import shutil
@@ -22,7 +23,7 @@ NOMINAL = Calibration(width=1920, height=1080, fx=913.0, fy=913.0, cx=960.0, cy=
 corner."""
 
 DATE = "2021-09-27"
-"""Day of all captures; their names are the time of the day."""
+"""Day of the published captures; their names are the time of the day."""
 
 DETECTION_COLUMNS = ("frame", "xmin", "ymin", "xmax", "ymax", "score", "id")
 
@@ -36,17 +37,25 @@ class Capture:
     has_colour: bool
 
 
-def import_captures(source: Path, output: Path) -> Iterator[Capture]:
+def import_captures(source: Path, output: Path, date: str = DATE) -> Iterator[Capture]:
     """Make a recording folder `output/HHMMSS` of each capture in `source`; each appears whole or not at all.
+
+    Parameters
+    ----------
+    source : Path
+        Folder with `HHMMSS_depth.png`, `HHMMSS_boxes.csv` and, for some captures, `HHMMSS_color.jpg`.
+    output : Path
+        Folder for the recordings; made where it does not exist.
+    date : str
+        Day of the captures, ISO 8601.
 
     Raises
     ------
     PomonaError
         When there is no capture, a file is missing or wrong, or a folder is already there.
     """
-    names = sorted(
-        match[1] for file in source.glob("*_depth.png") if (match := re.fullmatch(r"(\d{6})_depth", file.stem))
-    )
+    _moment(date, "")
+    names = sorted(file.name.removesuffix("_depth.png") for file in source.glob("?*_depth.png"))
     if not names:
         raise PomonaError(f"{source}: no captures found, expected HHMMSS_depth.png with HHMMSS_boxes.csv")
     taken = [output / name for name in names if (output / name).exists()]
@@ -56,12 +65,12 @@ def import_captures(source: Path, output: Path) -> Iterator[Capture]:
     for name in names:
         with tempfile.TemporaryDirectory(prefix=f".{name}.", dir=output) as partial:
             folder = Path(partial) / name
-            boxes, has_colour = _write(source, name, folder)
+            boxes, has_colour = _write(source, name, folder, date)
             folder.rename(output / name)
         yield Capture(output / name, boxes, has_colour)
 
 
-def _write(source: Path, name: str, folder: Path) -> tuple[int, bool]:
+def _write(source: Path, name: str, folder: Path, date: str) -> tuple[int, bool]:
     depth = source / f"{name}_depth.png"
     read_depth(depth, NOMINAL)
     (folder / "depth").mkdir(parents=True)
@@ -73,11 +82,21 @@ def _write(source: Path, name: str, folder: Path) -> tuple[int, bool]:
     NOMINAL.write(folder / "calibration.json")
     about = {
         "name": f"kinect-apples-{name}",
-        "date": f"{DATE}T{name[:2]}:{name[2:4]}:{name[4:]}",
+        "date": _moment(date, name),
         "source": "GRAP-UdL-AT/ak_sw_benchmarker",
     }
     (folder / "recording.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
     return _write_detections(source / f"{name}_boxes.csv", folder / "detections.csv"), colour.exists()
+
+
+def _moment(date: str, name: str) -> str:
+    """Put the day and the time in a capture's name together, where the name is a time."""
+    try:
+        day = datetime.date.fromisoformat(date)
+    except ValueError:
+        raise PomonaError(f"date: found {date!r}, expected a day as {DATE}") from None
+    time = re.fullmatch(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d)", name)
+    return day.isoformat() if time is None else f"{day.isoformat()}T{':'.join(time.groups())}"
 
 
 def _write_detections(boxes: Path, detections: Path) -> int:
