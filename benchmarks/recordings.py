@@ -67,16 +67,23 @@ def true_boxes(source: Path) -> Iterator[TrueBox]:
     recording, truth = open_recording(source), rendered_truth(source)
     row_of = {name: row for row, name in enumerate(truth.ids or ())}
     for frame in recording.frames():
-        ids = cv2.imread(str(source / "ids" / f"{frame.number:04d}.png"), cv2.IMREAD_UNCHANGED)
-        for number in np.unique(ids[ids > 0]):
-            y, x = np.nonzero(ids == number)
-            row = row_of[str(number)]
+        for name, x, y in visible_pixels(source, frame.number):
+            row = row_of[name]
             depth_m = in_camera(frame.session_from_camera, truth.positions[row])[2]
             radius_px = recording.calibration.fx * truth.diameters_m[row] / 2 / depth_m
             visible = len(x) / (np.pi * radius_px**2)
             if visible > MIN_VISIBLE and x.max() + 1 - x.min() >= MIN_WIDTH_PX:
                 box_px = (int(x.min()), int(y.min()), int(x.max()) + 1, int(y.max()) + 1)
-                yield TrueBox(frame.number, str(number), box_px, float(visible))
+                yield TrueBox(frame.number, name, box_px, float(visible))
+
+
+def visible_pixels(source: Path, frame: int) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64]]]:
+    """Give each fruit of a rendered frame with the columns and rows of the pixels that show it."""
+    ids = cv2.imread(str(source / "ids" / f"{frame:04d}.png"), cv2.IMREAD_UNCHANGED)
+    y, x = np.nonzero(ids)
+    names, first = np.unique(ids[y, x][(order := np.argsort(ids[y, x], kind="stable"))], return_index=True)
+    for name, columns, rows in zip(names, np.split(x[order], first[1:]), np.split(y[order], first[1:]), strict=True):
+        yield str(name), columns, rows
 
 
 def in_camera(session_from_camera: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -231,15 +231,14 @@ def test_poses_of_the_rendered_row_agree_with_scipy(shared_data):
 
 def test_the_pixel_convention_is_that_of_the_rendered_row(shared_data):
     """Discs are centred where the truth projects to when pixel centres are at one half, not at whole numbers."""
-    from benchmarks.recordings import in_camera, rendered_truth
+    from benchmarks.recordings import in_camera, rendered_truth, visible_pixels
 
     folder = shared_data / "rendered_row" / "2024-08-09"
     recording, truth = open_recording(folder), rendered_truth(folder)
     offsets = []
     for frame in list(recording.frames())[::4]:
-        ids = cv2.imread(str(folder / "ids" / f"{frame.number:04d}.png"), cv2.IMREAD_UNCHANGED)
-        for row, name in enumerate(truth.ids):
-            y, x = np.nonzero(ids == int(name))
+        for name, x, y in visible_pixels(folder, frame.number):
+            row = truth.ids.index(name)
             centre = in_camera(frame.session_from_camera, truth.positions[row])
             radius_px = recording.calibration.fx * truth.diameters_m[row] / 2 / centre[2]
             if len(x) > 0.95 * np.pi * radius_px**2:
