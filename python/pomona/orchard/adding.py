@@ -134,24 +134,17 @@ def _join(
     placement = Placement(found.map_from_query, settings, found.log_odds, found.noise_m)
     session_id = insert_session(connection, session, placement)
     rows, known_rows = found.pairs[:, 0], found.pairs[:, 1]
+    is_new = np.isin(np.arange(len(cloud_in_map)), rows, invert=True)
     fruit_ids = np.zeros(len(cloud_in_map), dtype=np.int64)
     fruit_ids[rows] = known_ids[known_rows]
-    is_new = np.ones(len(cloud_in_map), dtype=bool)
-    is_new[rows] = False
     fruit_ids[is_new] = insert_fruits(connection, session_id, session.date, cloud_in_map.select(is_new))
-
-    probabilities = np.full(len(cloud_in_map), np.nan)
-    probabilities[rows] = found.probabilities
-    distances_m = np.full(len(cloud_in_map), np.nan)
-    distances_m[rows] = found.distances_m
+    probabilities, distances_m = np.full((2, len(cloud_in_map)), np.nan)
+    probabilities[rows], distances_m[rows] = found.probabilities, found.distances_m
     insert_observations(connection, session_id, fruit_ids, cloud_in_map, probabilities, distances_m)
 
     _move_fruits(connection, session_id, session.date, cloud_in_map.select(rows), fruit_ids[rows])
     missed = _missed(known, known_rows)
-    if is_newest:
-        connection.executemany(
-            "UPDATE fruits SET state = 'missed' WHERE id = ?", ((i,) for i in known_ids[missed].tolist())
-        )
+    _count_misses(connection, known_ids[missed], is_newest=is_newest)
     update_layers(connection)
     return Added(fruit_ids, len(rows), int(is_new.sum()), len(missed), found)
 
@@ -189,6 +182,14 @@ def _move_fruits(
             (geom, date, session_id, size, fruit_id, date)
             for geom, size, fruit_id in zip(geopackage.points(matched_in_map.positions), sizes, ids, strict=True)
         ),
+    )
+
+
+def _count_misses(connection: sqlite3.Connection, fruit_ids: NDArray[np.int64], *, is_newest: bool) -> None:
+    """Count a miss; the state is that of the newest visit."""
+    connection.executemany(
+        "UPDATE fruits SET n_missed = n_missed + 1, state = CASE WHEN ? THEN 'missed' ELSE state END WHERE id = ?",
+        ((is_newest, fruit_id) for fruit_id in fruit_ids.tolist()),
     )
 
 

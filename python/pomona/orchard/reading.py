@@ -107,16 +107,22 @@ def observed_cloud(connection: sqlite3.Connection, session_id: int) -> FruitClou
 def fruits_in_map(connection: sqlite3.Connection) -> FruitCloud:
     """Return every fruit where it was last seen, with the covariance of that sighting."""
     rows = connection.execute(
-        f"""SELECT f.id, f.geom, f.diameter_m, f.state, f.last_seen, f.n_sessions, {COVARIANCE} FROM fruits f
+        f"""SELECT f.id, f.geom, f.diameter_m, f.state, f.last_seen, f.n_sessions, f.n_missed, {COVARIANCE}
+        FROM fruits f
         LEFT JOIN observations o ON o.fruit_id = f.id AND o.session_id = f.last_session_id ORDER BY f.id"""
     ).fetchall()
-    ids, geoms, diameters_m, states, last_seen, n_sessions, *cells = _columns(rows, 15)
+    ids, geoms, diameters_m, states, last_seen, n_sessions, n_missed, *cells = _columns(rows, 16)
     return FruitCloud(
         positions=geopackage.points_of(geoms),
         ids=tuple(map(str, ids)),
         diameters_m=_numbers(diameters_m),
         covariances=_covariances(cells),
-        extras={"state": tuple(states), "last_seen": tuple(last_seen), "n_sessions": tuple(map(str, n_sessions))},
+        extras={
+            "state": tuple(states),
+            "last_seen": tuple(last_seen),
+            "n_sessions": tuple(map(str, n_sessions)),
+            "n_missed": tuple(map(str, n_missed)),
+        },
     )
 
 

@@ -33,8 +33,8 @@ LAYERS = (
         "fruits",
         "POINT",
         """state TEXT NOT NULL CHECK (state IN ('seen', 'missed')), last_seen TEXT NOT NULL,
-        last_session_id INTEGER NOT NULL REFERENCES sessions(id), n_sessions INTEGER NOT NULL, diameter_m REAL,
-        tree_id INTEGER REFERENCES trees(id)""",
+        last_session_id INTEGER NOT NULL REFERENCES sessions(id), n_sessions INTEGER NOT NULL,
+        n_missed INTEGER NOT NULL DEFAULT 0, diameter_m REAL, tree_id INTEGER REFERENCES trees(id)""",
         "fruits where they were last seen; id is the fruit's for good",
     ),
     (
