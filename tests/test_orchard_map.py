@@ -199,6 +199,27 @@ def test_a_map_and_a_session_are_not_each_other(tmp_path: Path, grown: Path, sce
         add_session(tmp_path / "orchard.gpkg", visit(scenes[1].select([]), "2024-09-01"))
 
 
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("UPDATE pomona_format SET format_version = 2", "has format 2, this program reads up to 1: update pomona"),
+        ("DROP TABLE pomona_format", "is a GeoPackage but not one of pomona: it has no table pomona_format"),
+        ("PRAGMA application_id = 0", "is not a GeoPackage: application id 0x0, expected 'GPKG'"),
+    ],
+)
+def test_a_map_of_another_program_is_left_alone(
+    grown: Path, scenes: list[FruitCloud], change: str, reason: str
+) -> None:
+    connection = geopackage.connect(grown)
+    connection.execute(change)
+    connection.close()
+    before = grown.read_bytes()
+    with pytest.raises(PomonaError) as caught:
+        add_session(grown, visit(scenes[1], "2024-10-01"))
+    assert str(caught.value) == f"{grown}: {reason}"
+    assert grown.read_bytes() == before
+
+
 def test_nothing_is_left_of_a_map_that_could_not_be_started(
     tmp_path: Path, scenes: list[FruitCloud], monkeypatch: pytest.MonkeyPatch
 ) -> None:

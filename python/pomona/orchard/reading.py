@@ -6,6 +6,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,9 +75,7 @@ def load_session(path: str | Path, *, date: str | None = None, unit: Unit = "m")
     path = Path(path)
     if path.suffix.lower() == ".gpkg":
         session = read_session(path)
-        if date is None:
-            return session
-        return Session(**{**vars(session), "date": date})
+        return session if date is None else replace(session, date=date)
     cloud = FruitCloud.read(path, unit=unit)
     if date is None:
         raise PomonaError(f"{path}: a bare cloud has no date, give the day of the visit: --date YYYY-MM-DD")
