@@ -3,7 +3,7 @@ from typing import TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MapIndex", "Match", "__version__", "default_config"]
+__all__ = ["MapIndex", "Match", "__version__", "default_config", "describe"]
 
 __version__: str
 
@@ -45,7 +45,15 @@ class MapIndex:
         cls, map: _Arrays, *, method: str, scale: str, config: str, threads: int | None = None
     ) -> MapIndex: ...
     def search(
-        self, query: _Arrays, *, noise_m: float | None = None, up: tuple[list[float], list[float]] | None = None
+        self,
+        query: _Arrays,
+        *,
+        noise_m: float | None = None,
+        up: tuple[list[float], list[float]] | None = None,
+        per_frame: bool = False,
     ) -> Match: ...
 
 def default_config() -> str: ...
+def describe(
+    positions: NDArray[np.float64], k: int, n: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...

@@ -121,12 +121,14 @@ class Index:
         except ValueError as error:
             raise PomonaError(f"map: {error}") from None
 
-    def match(self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None) -> Match:
+    def match(
+        self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None, per_frame: bool = False
+    ) -> Match:
         """Find `query` in the map; arguments as in `pomona.match`."""
         start = time.perf_counter()
         cloud = _as_cloud(query)
         try:
-            found = self._core.search(_arrays(cloud), noise_m=noise_m, up=_vertical(up))
+            found = self._core.search(_arrays(cloud), noise_m=noise_m, up=_vertical(up), per_frame=per_frame)
         except ValueError as error:
             raise PomonaError(f"query: {error}") from None
         return Match(
@@ -155,6 +157,7 @@ def match(
     method: Method = "verified",
     noise_m: float | None = None,
     up: Up | None = None,
+    per_frame: bool = False,
     config: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Match:
@@ -172,6 +175,9 @@ def match(
         Standard deviation per axis of the difference of the two visits; None: estimated.
     up
         The vertical in the query's and in the map's frame, where it is known.
+    per_frame
+        Give each frame of the query a transform of its own and merge their pairs (paper only). The query must know
+        which frame saw which fruit.
     config
         Values of the core's tables that differ from `default_config()`; unknown keys are errors.
     threads
@@ -184,7 +190,7 @@ def match(
     """
     start = time.perf_counter()
     index = Index(map, scale=scale, method=method, config=config, threads=threads)
-    found = index.match(query, noise_m=noise_m, up=up)
+    found = index.match(query, noise_m=noise_m, up=up, per_frame=per_frame)
     return replace(found, elapsed_s=time.perf_counter() - start)
 
 

@@ -24,11 +24,6 @@ pub struct Arrays<'py> {
 impl Arrays<'_> {
     /// Copies the arrays into a cloud of the core.
     pub fn to_cloud(&self) -> PyResult<FruitCloud> {
-        if self.positions.shape()[1] != 3 {
-            let found = self.positions.shape()[1];
-            return Err(PyValueError::new_err(format!("positions: found {found} columns, expected 3 (x, y, z)")));
-        }
-        let positions = self.positions.as_array().rows().into_iter().map(|p| Point3::new(p[0], p[1], p[2])).collect();
         let covariances = match &self.covariances {
             Some(all) if all.shape()[1..] != [3, 3] => {
                 return Err(PyValueError::new_err("covariances: expected an array of shape (N, 3, 3)"));
@@ -51,11 +46,21 @@ impl Arrays<'_> {
             _ => None,
         };
         Ok(FruitCloud {
-            positions,
+            positions: points(&self.positions)?,
             covariances,
             diameters_m: self.diameters_m.as_ref().map(|all| all.as_array().to_vec()),
             ids: None,
             views,
         })
     }
+}
+
+/// Rows of an (N, 3) array.
+pub fn points(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Point3<f64>>> {
+    let rows = rows.as_array();
+    if rows.ncols() != 3 {
+        let found = rows.ncols();
+        return Err(PyValueError::new_err(format!("positions: found {found} columns, expected 3 (x, y, z)")));
+    }
+    Ok(rows.outer_iter().map(|p| Point3::new(p[0], p[1], p[2])).collect())
 }

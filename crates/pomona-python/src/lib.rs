@@ -1,6 +1,7 @@
 //! Python bindings of the pomona core: thin, no logic. One file per core module.
 
 mod cloud;
+mod descriptor;
 mod matching;
 
 use pyo3::prelude::*;
@@ -10,6 +11,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())
 }

@@ -127,17 +127,20 @@ impl PyMapIndex {
         Ok(Self { index, pool })
     }
 
-    #[pyo3(signature = (query, *, noise_m=None, up=None))]
+    #[pyo3(signature = (query, *, noise_m=None, up=None, per_frame=false))]
     fn search(
         &self,
         py: Python<'_>,
         query: Arrays<'_>,
         noise_m: Option<f64>,
         up: Option<([f64; 3], [f64; 3])>,
+        per_frame: bool,
     ) -> PyResult<PyMatch> {
         let cloud = query.to_cloud()?;
         let up = up.map(|(query, map)| [Vector3::from(query), Vector3::from(map)]);
-        let search = || self.index.search(&cloud, noise_m, up);
+        let search = || {
+            if per_frame { self.index.search_by_frame(&cloud, noise_m) } else { self.index.search(&cloud, noise_m, up) }
+        };
         let found = py.detach(|| match &self.pool {
             Some(pool) => pool.install(search),
             None => search(),

@@ -8,15 +8,22 @@
 //! into the map.
 
 pub mod assignment;
+pub mod clique;
 pub mod cloud;
+pub mod codebook;
+pub mod completion;
 pub mod config;
 pub mod constellation;
 pub mod descriptor;
 pub mod error;
+mod evidence;
 pub mod geometry;
 pub mod index;
 pub mod matching;
+mod paper;
+pub mod ransac;
 pub mod verified;
+pub mod voting;
 
 pub use cloud::{FruitCloud, Views};
 pub use config::Config;

@@ -40,8 +40,10 @@ pub struct Request {
     pub scale: Scale,
     /// Relative noise of the two visits per axis, standard deviation in metres; estimated where `None`.
     pub noise_m: Option<f64>,
-    /// The vertical in both clouds' frames, query then map; need not be of unit length.
+    /// The vertical in both clouds' frames, query then map; need not be of unit length. The paper's method does not use it.
     pub up: Option<[Vector3<f64>; 2]>,
+    /// One transform for each frame of the query, their pairs merged (paper only); or one for the whole cloud.
+    pub per_frame: bool,
 }
 
 /// One fruit found again.
@@ -51,7 +53,8 @@ pub struct Pair {
     pub query: usize,
     /// Row in the map.
     pub map: usize,
-    /// Probability that the two are one fruit.
+    /// Probability that the two are one fruit. Paper: of the residual under the noise, against a stranger at the density of
+    /// fruits about it.
     pub probability: f64,
     /// Distance after the registration that the pair belongs to, metres of the map.
     pub distance_m: f64,
@@ -64,7 +67,7 @@ pub struct Pair {
 pub struct Registration {
     /// Takes points of the query into the map.
     pub map_from_query: Similarity,
-    /// Evidence against chance, nats.
+    /// Evidence against chance, nats. Paper: log-odds of the pairs' residuals, summed over pairs.
     pub log_odds: f64,
 }
 
@@ -93,7 +96,7 @@ impl Match {
 }
 
 /// A map made ready for many queries.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct MapIndex {
     map: FruitCloud,
     config: Config,
@@ -102,8 +105,11 @@ pub struct MapIndex {
     prepared: Prepared,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 enum Prepared {
+    /// Fewer fruits than a constellation of the paper.
+    TooFew,
+    Paper(Box<crate::paper::Prepared>),
     Verified(Box<crate::verified::Prepared>),
 }
 
@@ -117,9 +123,8 @@ impl MapIndex {
         config.validate()?;
         let prepared = match method {
             Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(&map, scale))),
-            Method::Paper => {
-                return Err(Error::Setting { name: "method", reason: "paper is not part of this build".to_owned() });
-            }
+            Method::Paper if map.len() < config.constellation.k => Prepared::TooFew,
+            Method::Paper => Prepared::Paper(Box::new(crate::paper::Prepared::new(&map.positions, &config)?)),
         };
         Ok(Self { map, config, method, scale, prepared })
     }
@@ -129,14 +134,34 @@ impl MapIndex {
     /// # Errors
     /// A cloud or a value that is wrong. That there is no match is no error.
     pub fn search(&self, query: &FruitCloud, noise_m: Option<f64>, up: Option<[Vector3<f64>; 2]>) -> Result<Match> {
+        self.answer(query, &Request { method: self.method, scale: self.scale, noise_m, up, per_frame: false })
+    }
+
+    /// Finds `query` in the map frame by frame: each frame's fruits with a transform of their own, their pairs merged.
+    ///
+    /// # Errors
+    /// As [`Self::search`]; also where the query does not know which frame saw which fruit, or the method is not the
+    /// paper's.
+    pub fn search_by_frame(&self, query: &FruitCloud, noise_m: Option<f64>) -> Result<Match> {
+        let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: true };
+        self.answer(query, &request)
+    }
+
+    fn answer(&self, query: &FruitCloud, request: &Request) -> Result<Match> {
         query.validate()?;
-        let request = Request { method: self.method, scale: self.scale, noise_m, up };
         request.validate()?;
-        Ok(match &self.prepared {
-            Prepared::Verified(prepared) => {
-                crate::verified::search(prepared, &self.map, query, &request, &self.config.verified)
+        match &self.prepared {
+            Prepared::Paper(map) if query.len() >= self.config.constellation.k => {
+                map.search(query, request, &self.config)
             }
-        })
+            Prepared::Paper(_) | Prepared::TooFew => {
+                let stages = vec![("query fruits", query.len() as f64), ("map fruits", self.map.len() as f64)];
+                Ok(Match::without_answer(Verdict::TooFew, stages))
+            }
+            Prepared::Verified(prepared) => {
+                Ok(crate::verified::search(prepared, &self.map, query, request, &self.config.verified))
+            }
+        }
     }
 }
 
@@ -150,6 +175,11 @@ impl Request {
             let reason = "expected a finite vector that is not zero".to_owned();
             return Err(Error::Setting { name: "up", reason });
         }
+        if self.per_frame && self.method != Method::Paper {
+            // The verified method bends with the row by itself.
+            let reason = "expected the paper's method".to_owned();
+            return Err(Error::Setting { name: "per_frame", reason });
+        }
         Ok(())
     }
 }
@@ -159,5 +189,5 @@ impl Request {
 /// # Errors
 /// A cloud or a setting that is wrong. That there is no match is no error.
 pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, config: &Config) -> Result<Match> {
-    MapIndex::new(map.clone(), request.method, request.scale, *config)?.search(query, request.noise_m, request.up)
+    MapIndex::new(map.clone(), request.method, request.scale, *config)?.answer(query, request)
 }
