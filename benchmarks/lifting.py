@@ -165,6 +165,6 @@ def report(
     return (
         "Distance between the same fruits of two Kinect captures after a rigid motion, mm:\n\n"
         f"{rigid}\nDistance of fruits to their true place, and error of their diameter, mm:\n\n{true}\n"
-        "Not held out: how wide the votes are (`SURFACE_SIGMA`) was chosen on these captures, and how much leaves hide\n"
-        "(`HIDDEN`) measured on this row.\n"
+        "Not held out: how wide the votes are (`SURFACE_SIGMA`) was chosen on these captures, and how much leaves\n"
+        "hide (`HIDDEN`) measured on this row.\n"
     )

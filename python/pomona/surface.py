@@ -12,8 +12,8 @@ nearer, the row behind farther, and the best supported vote wins:
 
 with p_leaf > p_gap: a leaf in front is common, but nothing is seen through a fruit, so a depth behind the surface
 speaks against it. Tukey's biweight refines the winner. The size never comes from the curvature of the depth: depth
-cameras flatten small spheres (skin lets infrared in, filters smooth). A free sphere fit makes the apples of
-`kinect_apples` 25 mm too large, the outline 6 mm, most of it the nominal focal length.
+cameras flatten small spheres (skin lets infrared in, filters smooth). A sphere fitted to box and depth together
+made the apples of `kinect_apples` 25 mm too large on average; the box alone 6 mm, most of it the nominal focal length.
 
 A fruit hidden along one side of its box is shifted along it: the mean over the likelihood of the
 depths under the shifts.
