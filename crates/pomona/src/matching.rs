@@ -165,6 +165,22 @@ impl MapIndex {
     }
 }
 
+impl MapIndex {
+    /// Pairs of `query` and the map under a pose that is known: the final stage of the verified method alone.
+    ///
+    /// The verdict is always `Found`; the registration is the given pose refined on the pairs.
+    ///
+    /// # Errors
+    /// A cloud or a value that is wrong.
+    pub fn pairs_under(&self, query: &FruitCloud, pose: &Similarity, noise_m: Option<f64>) -> Result<Match> {
+        query.validate()?;
+        let request = Request { method: self.method, scale: self.scale, noise_m, up: None };
+        request.validate()?;
+        let Prepared::Verified(prepared) = &self.prepared;
+        Ok(crate::verified::pairs_under(prepared, &self.map, query, pose, &request, &self.config.verified))
+    }
+}
+
 impl Request {
     fn validate(&self) -> Result<()> {
         if let Some(noise) = self.noise_m.filter(|noise| !(noise.is_finite() && *noise > 0.0)) {

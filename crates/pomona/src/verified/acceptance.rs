@@ -23,8 +23,8 @@ impl Default for VerifiedConfig {
             false_alarm_rate: 1e-4,
             // Twelve of at most 120: at 45 % occlusion and one shared tree of five, ten true seeds are among them.
             seeds_per_fruit: 12,
-            // A wrong pair costs a ninth of what a right one is worth.
-            min_probability: 0.1,
+            // A wrong pair costs a third of what a right one is worth.
+            min_probability: 0.25,
         }
     }
 }

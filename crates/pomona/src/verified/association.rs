@@ -82,19 +82,22 @@ fn edges_of(
     share: f64,
     size: &impl Fn(u32, u32) -> f64,
 ) -> Vec<Edge> {
-    let volume_scale = overlap.pose.scale.powi(3);
+    let scale = overlap.pose.scale;
+    let volume_scale = scale.powi(3);
     let mut edges = Vec::new();
     for (row, prediction) in overlap.predictions.iter().enumerate() {
         let Some(Prediction { place, variance }) = *prediction else { continue };
-        // Fruits that the map does not know, per cubic metre of the map.
-        let new = (1.0 - share) * query.density[row] / volume_scale;
         let gate2 = GATE * GATE * variance;
         let first = edges.len();
         map.near(&place, gate2.sqrt(), |partner| {
             let d2 = (map.points[partner as usize] - place).norm_squared();
             if d2 <= gate2 {
+                let distance = d2.sqrt();
+                // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
+                let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
+                let new = (1.0 - share) * companions.max(map.floor);
                 let ratio = share / (1.0 - share) * gaussian(d2, variance) / new * size(row as u32, partner);
-                edges.push(Edge { query: row as u32, map: partner, ratio, distance: d2.sqrt() });
+                edges.push(Edge { query: row as u32, map: partner, ratio, distance });
             }
         });
         // Two cells of the grid may share a bucket, which then is visited twice.

@@ -3,7 +3,7 @@
 use super::acceptance::VerifiedConfig;
 use super::association::associate;
 use super::growth::{Overlap, grow, settle};
-use super::hypothesis::{Hypothesis, Model};
+use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::outline;
 use super::pose::Pose;
@@ -11,7 +11,8 @@ use super::search::{Effort, round};
 use super::seeds::SeedIndex;
 use super::size::Sizes;
 use crate::cloud::FruitCloud;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::matching::{Match, Pair, Registration, Request, Verdict};
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
@@ -34,6 +35,9 @@ const GROWN: usize = 6;
 
 /// A rival with this share of the best evidence makes the answer ambiguous.
 const RIVAL: f64 = 0.7;
+
+/// Two hypotheses that put a fruit within this many spacings of one place are the same.
+const SAME: f64 = 0.4;
 
 /// How far the vertical of a pose may lean from the one given: 10 degrees.
 const MAX_LEAN_RAD: f64 = 0.175;
@@ -76,13 +80,50 @@ pub(crate) fn search(
     search.answer(findings, map, query, stages)
 }
 
+/// Times that turned starts are tried.
+const POLISHES: usize = 3;
+
+/// Radius in spacings of the region that decides between turned starts.
+const POLISH_REACH: f64 = 5.0;
+
+/// The pose, and the pose turned about `middle` by 5 and 10 degrees either way about each axis of the map.
+fn turned(pose: &Pose, middle: &Vector3<f64>) -> impl Iterator<Item = Pose> {
+    let (pose, middle) = (*pose, *middle);
+    let fixed = pose.apply(&middle);
+    let turns = [-0.175, -0.087, 0.087, 0.175].into_iter().flat_map(|angle| {
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| Rotation3::new(axis * angle).into_inner())
+    });
+    std::iter::once(Matrix3::identity()).chain(turns).map(move |turn| {
+        let rotation = turn * pose.rotation;
+        Pose { rotation, translation: fixed - rotation * middle * pose.scale, scale: pose.scale }
+    })
+}
+
+/// Pairs of two clouds whose pose is known: the final stage alone.
+pub(crate) fn pairs_under(
+    prepared: &Prepared,
+    map: &FruitCloud,
+    query: &FruitCloud,
+    map_from_query: &Similarity,
+    request: &Request,
+    config: &VerifiedConfig,
+) -> Match {
+    let search = Search::new(prepared, query, request, config);
+    let pose = Pose::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
+    let sigma = request.noise_m.unwrap_or(search.model.sigma);
+    let place = search.query.points.first().copied().unwrap_or_default();
+    let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
+    let overlap = settle(&search.query, search.map, &seed, &Model { sigma, ..search.model });
+    search.answer(vec![Finding { overlap, seed }], map, query, Vec::new())
+}
+
 struct Search<'a> {
     query: Landscape,
     map: &'a Landscape,
     seeds: &'a SeedIndex,
     model: Model,
     config: VerifiedConfig,
-    up: Option<[nalgebra::Vector3<f64>; 2]>,
+    up: Option<[Vector3<f64>; 2]>,
 }
 
 type Stages = Vec<(&'static str, f64)>;
@@ -129,6 +170,9 @@ impl<'a> Search<'a> {
                 best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
             }
             findings.retain(|finding| finding.overlap.log_odds > threshold);
+            for finding in &mut findings {
+                self.polish(finding);
+            }
             if !findings.is_empty() {
                 break;
             }
@@ -174,7 +218,7 @@ impl<'a> Search<'a> {
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
     fn explains(&self, finding: &Finding, seed: &Hypothesis) -> bool {
-        let reach = self.query.spacing;
+        let reach = SAME * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&super::landscape::single(&seed.place), 8, &mut near);
         let same = near
@@ -189,6 +233,29 @@ impl<'a> Search<'a> {
             })
             .count();
         2 * same > near.len()
+    }
+
+    /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.
+    ///
+    /// A seed half a metre wide is turned by a few degrees by its noise. In a crown where fruits hang 8 cm apart the
+    /// fruits a metre away then meet their neighbours, and the refinement can settle there.
+    fn polish(&self, finding: &mut Finding) {
+        let mut scratch = Scratch::default();
+        for _ in 0..POLISHES {
+            let Overlap { pose, middle, sigma, .. } = finding.overlap;
+            let model = Model { sigma, ..self.model };
+            let best = turned(&pose, &middle)
+                .filter_map(|start| {
+                    refine(&self.query, self.map, &start, &middle, POLISH_REACH * self.query.spacing, &model, &mut scratch)
+                })
+                .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
+            let Some(seed) = best else { return };
+            let overlap = grow(&self.query, self.map, &seed, &self.model);
+            if overlap.log_odds < finding.overlap.log_odds + 0.5 {
+                return;
+            }
+            *finding = Finding { overlap, seed };
+        }
     }
 
     fn by_outline(&self) -> Option<Finding> {

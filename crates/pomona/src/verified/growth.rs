@@ -41,6 +41,8 @@ pub(crate) struct Overlap {
     pub(crate) log_odds: f64,
     /// Relative noise per axis, metres of the map.
     pub(crate) sigma: f64,
+    /// Centroid of the matched fruits, in the centred query.
+    pub(crate) middle: Vector3<f64>,
     /// Where each fruit of the query is expected; `None` outside the overlap.
     pub(crate) predictions: Vec<Option<Prediction>>,
 }
@@ -74,7 +76,17 @@ struct Growth<'a> {
     patch_places: Vec<Vector3<f64>>,
     /// The pose is known to hold everywhere and the noise is given.
     whole: bool,
+    /// Factor on the standard deviation of the predictions, to leave a seed's local optimum.
+    widening: f64,
+    /// Patches follow the common pose.
+    rigid: bool,
 }
+
+/// The first rounds look further than the noise.
+const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
+
+/// The first rounds fit one rigid pose: patches would bend towards a seed that is turned by a few degrees.
+const RIGID_ROUNDS: usize = 6;
 
 /// Grows a hypothesis as far as the evidence goes.
 pub(crate) fn grow(query: &Landscape, map: &Landscape, seed: &Hypothesis, model: &Model) -> Overlap {
@@ -82,12 +94,14 @@ pub(crate) fn grow(query: &Landscape, map: &Landscape, seed: &Hypothesis, model:
     let extent = growth.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
     let most = (extent / growth.edge) as usize * 2 + EXTRA_ROUNDS;
     let mut settled = 0;
-    for _ in 0..most {
+    for round in 0..most {
+        growth.widening = WIDENING.get(round).copied().unwrap_or(1.0);
+        growth.rigid = round < RIGID_ROUNDS;
         growth.predict();
         growth.pair_up();
         growth.refit();
         settled = if growth.spread() { 0 } else { settled + 1 };
-        if settled == 4 {
+        if settled == 4 && round > RIGID_ROUNDS + 2 {
             break;
         }
     }
@@ -142,13 +156,15 @@ impl<'a> Growth<'a> {
             owner: vec![None; map.len()],
             patch_places: vec![Vector3::zeros(); query.len()],
             whole: false,
+            widening: 1.0,
+            rigid: false,
         }
     }
 
     /// Where each fruit of the reached cells should lie, and how surely.
     fn predict(&mut self) {
         self.predictions.fill(None);
-        let sigma2 = self.sigma * self.sigma;
+        let sigma2 = (self.widening * self.sigma).powi(2);
         for cell in self.cells.iter().filter(|cell| cell.reached) {
             let wide = surroundings(&self.cells, cell);
             let known = wide.weight > 3.5;
@@ -244,6 +260,10 @@ impl<'a> Growth<'a> {
             self.pose = pose;
         }
         for i in 0..self.cells.len() {
+            if self.rigid {
+                self.cells[i].pose = self.pose;
+                continue;
+            }
             let wide = surroundings(&self.cells, &self.cells[i]);
             let mut parent = self.cells[i].pose;
             if wide.weight > 6.0 {
@@ -328,7 +348,9 @@ impl<'a> Growth<'a> {
                 self.predictions[row as usize] = None;
             }
         }
-        Overlap { pose: self.pose, log_odds, sigma: self.sigma, predictions: self.predictions }
+        let all = total(self.cells.iter().filter(|c| c.reached).map(|c| (&c.moments, 1.0)));
+        let middle = if all.weight > 0.0 { all.centroid() } else { Vector3::zeros() };
+        Overlap { middle, pose: self.pose, log_odds, sigma: self.sigma, predictions: self.predictions }
     }
 }
 

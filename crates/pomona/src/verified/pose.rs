@@ -25,6 +25,15 @@ impl Pose {
         Similarity { rotation, translation, scale: self.scale }
     }
 
+    /// The reverse of [`Pose::to_similarity`].
+    pub(crate) fn from_similarity(t: &Similarity, centre_query: &Vector3<f64>, centre_map: &Vector3<f64>) -> Self {
+        Self {
+            rotation: *t.rotation.matrix(),
+            translation: t.rotation * centre_query * t.scale + t.translation - centre_map,
+            scale: t.scale,
+        }
+    }
+
     #[cfg(test)]
     /// Angle of the rotation between two poses, radians.
     pub(crate) fn angle_to(&self, other: &Self) -> f64 {
