@@ -12,8 +12,8 @@ use super::seeds::SeedIndex;
 use super::size::Sizes;
 use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
-use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::matching::{Match, Pair, Registration, Request, Verdict};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 const MIN_FRUITS: usize = 5;
@@ -246,7 +246,15 @@ impl<'a> Search<'a> {
             let model = Model { sigma, ..self.model };
             let best = turned(&pose, &middle)
                 .filter_map(|start| {
-                    refine(&self.query, self.map, &start, &middle, POLISH_REACH * self.query.spacing, &model, &mut scratch)
+                    refine(
+                        &self.query,
+                        self.map,
+                        &start,
+                        &middle,
+                        POLISH_REACH * self.query.spacing,
+                        &model,
+                        &mut scratch,
+                    )
                 })
                 .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
             let Some(seed) = best else { return };

@@ -107,7 +107,9 @@ pub(crate) fn grow(query: &Landscape, map: &Landscape, seed: &Hypothesis, model:
     }
     growth.predict();
     growth.pair_up();
-    growth.finish()
+    let log_odds = growth.log_odds();
+    growth.reach_all();
+    growth.finish(log_odds)
 }
 
 /// Pairs under a pose that holds for the whole query, with the noise as it is given.
@@ -124,7 +126,8 @@ pub(crate) fn settle(query: &Landscape, map: &Landscape, whole: &Hypothesis, mod
     }
     growth.predict();
     growth.pair_up();
-    growth.finish()
+    let log_odds = growth.log_odds();
+    growth.finish(log_odds)
 }
 
 /// Rounds of pairing and fitting when the pose is known for the whole query.
@@ -340,8 +343,34 @@ impl<'a> Growth<'a> {
                 && cell.around.iter().map(|a| a.1 * self.cells[a.0 as usize].log_odds).sum::<f64>() > CONVINCING
     }
 
-    fn finish(mut self) -> Overlap {
-        let log_odds = self.cells.iter().filter(|cell| cell.reached).map(|cell| cell.log_odds).sum();
+    /// Evidence of the cells that growth reached.
+    fn log_odds(&self) -> f64 {
+        self.cells.iter().filter(|cell| cell.reached).map(|cell| cell.log_odds).sum()
+    }
+
+    /// Looks once at the cells that growth did not reach: a crown may be cut off by a gap without fruits.
+    ///
+    /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
+    fn reach_all(&mut self) {
+        for cell in self.cells.iter_mut().filter(|cell| !cell.reached) {
+            cell.reached = true;
+            cell.pose = self.pose;
+        }
+        self.predict();
+        self.pair_up();
+        let outside: Vec<usize> = (0..self.cells.len()).filter(|&i| !self.convincing(i)).collect();
+        for i in outside {
+            self.cells[i].reached = false;
+            self.cells[i].moments = Moments::default();
+        }
+        for _ in 0..2 {
+            self.refit();
+            self.predict();
+            self.pair_up();
+        }
+    }
+
+    fn finish(mut self, log_odds: f64) -> Overlap {
         let outside: Vec<usize> = (0..self.cells.len()).filter(|&i| !self.convincing(i)).collect();
         for i in outside {
             for &row in &self.cells[i].rows {
