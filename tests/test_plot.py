@@ -75,14 +75,14 @@ def test_draws_a_line_for_every_pair_and_says_the_verdict() -> None:
     assert np.allclose(aside[:, 0], 0.0)
     assert np.allclose(aside[:, 1], aside[0, 1])
     assert f"{aside[0, 1]:.1f} m aside" in figure.axes[0].get_ylabel()
-    assert figure.axes[0].get_title().startswith("Found: ")
+    assert figure.get_suptitle().startswith("Found: ")
     assert figure.axes[0].get_aspect() == 1.0
 
 
 def test_draws_both_clouds_where_nothing_was_found() -> None:
     figure = draw_match(FruitCloud(ROW), FruitCloud(ROW + 5.0), a_match(Verdict.NO_MATCH, 0, None))
     assert lines_of(figure) == []
-    assert figure.axes[0].get_title().startswith("NoMatch: ")
+    assert figure.get_suptitle().startswith("NoMatch: ")
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])

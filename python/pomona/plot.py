@@ -25,7 +25,7 @@ PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 _MAP_COLOUR = "#2a5d8f"
 _QUERY_COLOUR = "#c8502d"
 _UNMATCHED_COLOUR = "#b5b5b5"
-_COLOURS_OF_PROBABILITY = "viridis"
+_COLOURS_OF_PROBABILITY = "summer_r"  # from yellow to green, as the lines of the paper's figures
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     aside_m = _distance_aside(in_map, in_query)
     in_query[:, 1] += aside_m
 
-    figure = Figure(figsize=(10.0, 5.6), dpi=120, layout="constrained")
+    figure = Figure(figsize=_size_in_inches(np.concatenate([in_map, in_query])), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     _draw_pairs(figure, axes, in_query[match.pairs[:, 0]], in_map[match.pairs[:, 1]], match.probabilities)
     _draw_fruits(axes, in_map, match.pairs[:, 1], "map", "o", _MAP_COLOUR)
@@ -114,8 +114,8 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     axes.set_aspect("equal")
     axes.set_xlabel(f"{view.labels[0]} (m)")
     axes.set_ylabel(f"{view.labels[1]} (m)\nquery drawn {aside_m:.1f} m aside")
-    axes.set_title(_title(match))
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle(_title(match), fontsize="large")
+    figure.legend(loc="outside lower center", ncols=4 if figure.get_figwidth() > 9.0 else 2, frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     return figure
 
@@ -132,6 +132,13 @@ def _distance_aside(in_map: NDArray[np.float64], in_query: NDArray[np.float64]) 
         return 0.0
     height = max(np.ptp(in_map[:, 1]), np.ptp(in_query[:, 1]))
     return float(np.round(in_map[:, 1].max() - in_query[:, 1].min() + 0.5 * height, 1))
+
+
+def _size_in_inches(points: NDArray[np.float64]) -> tuple[float, float]:
+    """Fit the figure to what is drawn, so that a metre is equally long both ways without empty margins."""
+    width_m, height_m = np.ptp(points, axis=0) if len(points) else (1.0, 1.0)
+    inches_per_metre = min(8.5 / max(width_m, 0.1), 5.0 / max(height_m, 0.1))
+    return max(width_m * inches_per_metre + 1.6, 6.5), max(height_m * inches_per_metre + 1.4, 4.0)
 
 
 def _draw_pairs(
@@ -152,8 +159,8 @@ def _draw_pairs(
         array=probabilities[order],
         cmap=_COLOURS_OF_PROBABILITY,
         clim=(0.0, 1.0),
-        linewidths=0.8,
-        alpha=0.7,
+        linewidths=float(np.clip(300.0 / len(probabilities), 0.2, 0.8)),
+        alpha=0.8,
         zorder=1,
     )
     axes.add_collection(lines)
@@ -164,6 +171,7 @@ def _draw_fruits(
     axes: Axes, points: NDArray[np.float64], matched: NDArray[np.int64], side: str, marker: str, colour: str
 ) -> None:
     alone = np.setdiff1d(np.arange(len(points)), matched)
+    area = float(np.clip(8000.0 / max(len(points), 1), 5.0, 16.0))
     drawn = [
         (alone, _UNMATCHED_COLOUR, f"{side}: {len(alone)} without a partner", 2),
         (matched, colour, f"{side}: {len(matched)} found again", 3),
@@ -171,7 +179,15 @@ def _draw_fruits(
     for rows, fill, label, zorder in drawn:
         x, y = points[rows].T
         axes.scatter(
-            x, y, s=16, marker=marker, color=fill, edgecolors="white", linewidths=0.4, label=label, zorder=zorder
+            x,
+            y,
+            s=area,
+            marker=marker,
+            color=fill,
+            edgecolors="white",
+            linewidths=0.02 * area,
+            label=label,
+            zorder=zorder,
         )
 
 

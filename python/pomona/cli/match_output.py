@@ -49,15 +49,15 @@ def as_text(match: Match) -> str:
     """Return the answer for people: the verdict first, then the transform and the pairs."""
     lines = [f"{match.status.value}: {_MEANINGS[match.status.value]}"]
     if match.map_from_query is not None:
-        lines += _describe_transform(match.map_from_query, match.scale)
+        lines += _describe_transform(match.map_from_query)
     share = f" ({len(match.pairs) / match.n_query:.0%})" if match.n_query else ""
     lines.append(_line("fruits", f"{match.n_query} in the query, {match.n_map} in the map"))
     lines.append(_line("pairs", f"{len(match.pairs)}{share}"))
     if len(match.pairs):
         lines += _describe_pairs(match)
-    for number, alternative in enumerate(match.alternatives, start=1):
-        lines.append(_line(f"or ({number})", _describe_alternative(alternative)))
     lines.append(_line("time", f"{match.elapsed_s:.3f} s"))
+    for number, alternative in enumerate(match.alternatives, start=1):
+        lines += [f"or, as good ({number} of {len(match.alternatives)})", *_describe_transform(alternative)]
     return "\n".join(lines)
 
 
@@ -86,18 +86,18 @@ def _line(title: str, text: str) -> str:
     return f"  {title:<12} {text}"
 
 
-def _describe_transform(map_from_query: NDArray[np.float64], scale: float | None) -> list[str]:
+def _describe_transform(map_from_query: NDArray[np.float64]) -> list[str]:
     from scipy.spatial.transform import Rotation
 
     x, y, z = map_from_query[:3, 3]
-    factor = float(np.cbrt(np.linalg.det(map_from_query[:3, :3]))) if scale is None else scale
-    turn_deg = Rotation.from_matrix(map_from_query[:3, :3] / factor).as_rotvec(degrees=True)
+    scale = float(np.cbrt(np.linalg.det(map_from_query[:3, :3])))
+    turn_deg = Rotation.from_matrix(map_from_query[:3, :3] / scale).as_rotvec(degrees=True)
     angle_deg = float(np.linalg.norm(turn_deg))
     axis = turn_deg / angle_deg if angle_deg > 0.0 else np.array([0.0, 0.0, 1.0])
     return [
         _line("translation", f"x {x:+.3f}  y {y:+.3f}  z {z:+.3f} m"),
         _line("rotation", f"{angle_deg:.2f} deg about ({axis[0]:+.3f}, {axis[1]:+.3f}, {axis[2]:+.3f})"),
-        _line("scale", f"{factor:.5g}"),
+        _line("scale", f"{scale:.5g}"),
     ]
 
 
@@ -112,7 +112,3 @@ def _describe_pairs(match: Match) -> list[str]:
         _line("noise", f"{100.0 * match.noise_m:.1f} cm per axis"),
         _line("log-odds", f"{match.log_odds:.1f} nats"),
     ]
-
-
-def _describe_alternative(alternative: Any) -> str:
-    return str(alternative)
