@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Literal, TypeAlias
@@ -125,10 +125,39 @@ class Index:
         self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None, per_frame: bool = False
     ) -> Match:
         """Find `query` in the map; arguments as in `pomona.match`."""
+        return self._ask(
+            query, lambda core, arrays: core.search(arrays, noise_m=noise_m, up=_vertical(up), per_frame=per_frame)
+        )
+
+    def pairs_under(self, query: Cloud, map_from_query: ArrayLike, *, noise_m: float | None = None) -> Match:
+        """Pair `query` with the map under a pose that is known: the last stage of the verified method alone.
+
+        Parameters
+        ----------
+        query
+            A cloud, or (N, 3).
+        map_from_query
+            (4, 4), the scale folded in.
+        noise_m
+            Standard deviation per axis of the difference of the two visits; None: 2 cm in an orchard.
+
+        Raises
+        ------
+        PomonaError
+            An array is wrong, or the index is not one of the verified method.
+        """
+        pose = np.asarray(map_from_query, np.float64)
+        if pose.shape != (4, 4):
+            raise PomonaError(f"map_from_query: found an array of shape {pose.shape}, expected (4, 4)")
+        return self._ask(
+            query, lambda core, arrays: core.pairs_under(arrays, map_from_query=pose.tolist(), noise_m=noise_m)
+        )
+
+    def _ask(self, query: Cloud, question: Callable[[_core.MapIndex, Any], _core.Match]) -> Match:
         start = time.perf_counter()
         cloud = _as_cloud(query)
         try:
-            found = self._core.search(_arrays(cloud), noise_m=noise_m, up=_vertical(up), per_frame=per_frame)
+            found = question(self._core, _arrays(cloud))
         except ValueError as error:
             raise PomonaError(f"query: {error}") from None
         return Match(

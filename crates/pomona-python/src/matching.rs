@@ -3,7 +3,7 @@
 use crate::cloud::Arrays;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
-use pomona::{Config, MapIndex, Match, Method, Scale, Verdict};
+use pomona::{Config, MapIndex, Match, Method, Scale, Similarity, Verdict};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -146,6 +146,20 @@ impl PyMapIndex {
             None => search(),
         });
         found.map(PyMatch).map_err(wrong)
+    }
+
+    #[pyo3(signature = (query, *, map_from_query, noise_m=None))]
+    fn pairs_under(
+        &self,
+        py: Python<'_>,
+        query: Arrays<'_>,
+        map_from_query: [[f64; 4]; 4],
+        noise_m: Option<f64>,
+    ) -> PyResult<PyMatch> {
+        let cloud = query.to_cloud()?;
+        let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
+        let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
+        py.detach(|| self.index.pairs_under(&cloud, &pose, noise_m)).map(PyMatch).map_err(wrong)
     }
 }
 

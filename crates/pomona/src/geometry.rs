@@ -1,5 +1,6 @@
 //! Rigid and similarity transforms and their least-squares fits.
 
+use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Vector3};
 
 /// `p -> scale * rotation * p + translation`; rigid where `scale` is 1.
@@ -52,6 +53,29 @@ impl Similarity {
             translation: self.rotation * first.translation * self.scale + self.translation,
             scale: self.scale * first.scale,
         }
+    }
+
+    /// Takes a homogeneous matrix apart.
+    ///
+    /// # Errors
+    /// The matrix is not finite, mirrors, shears or has another last row than 0, 0, 0, 1 (to 1e-6).
+    pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self> {
+        let wrong = |reason: &str| Err(Error::Setting { name: "map_from_query", reason: reason.to_owned() });
+        let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+        let scale = linear.determinant().cbrt();
+        if !(scale.is_finite() && scale > 0.0) {
+            return wrong("found a mirrored or degenerate matrix, expected rotation, scale and translation");
+        }
+        let rotation = linear / scale;
+        if (rotation.transpose() * rotation - Matrix3::identity()).norm() > 1e-6 {
+            return wrong("found a sheared matrix, expected rotation, scale and translation");
+        }
+        let last = matrix.row(3);
+        if (last[0].abs() + last[1].abs() + last[2].abs() + (last[3] - 1.0).abs()) > 1e-6 {
+            return wrong("expected the last row 0, 0, 0, 1");
+        }
+        let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned();
+        Ok(Self { rotation: Rotation3::from_matrix_unchecked(rotation), translation, scale })
     }
 
     /// Homogeneous 4x4 matrix with the scale folded in.
@@ -144,6 +168,15 @@ mod tests {
             let target: Vec<_> = source.iter().map(|p| truth.apply(p)).collect();
             let found = fit(&source, &target, None, Scale::Free).expect("random points are not collinear");
             prop_assert!((found.to_matrix() - truth.to_matrix()).norm() < 1e-8);
+        }
+
+        #[test]
+        fn a_matrix_comes_apart_as_it_was_put_together(truth in similarity()) {
+            let found = Similarity::from_matrix(&truth.to_matrix()).expect("a similarity");
+            prop_assert!((found.to_matrix() - truth.to_matrix()).norm() < 1e-12 * truth.scale.max(1.0));
+            let mut mirrored = truth.to_matrix();
+            mirrored.column_mut(0).neg_mut();
+            prop_assert!(Similarity::from_matrix(&mirrored).is_err());
         }
 
         #[test]

@@ -166,17 +166,20 @@ impl MapIndex {
 }
 
 impl MapIndex {
-    /// Pairs of `query` and the map under a pose that is known: the final stage of the verified method alone.
+    /// Pairs of `query` and the map under `pose`, which is known: the final stage of the verified method alone.
     ///
     /// The verdict is always `Found`; the registration is the given pose refined on the pairs.
     ///
     /// # Errors
-    /// A cloud or a value that is wrong.
+    /// A cloud or a value that is wrong; an index of another method.
     pub fn pairs_under(&self, query: &FruitCloud, pose: &Similarity, noise_m: Option<f64>) -> Result<Match> {
         query.validate()?;
-        let request = Request { method: self.method, scale: self.scale, noise_m, up: None };
+        let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: false };
         request.validate()?;
-        let Prepared::Verified(prepared) = &self.prepared;
+        let Prepared::Verified(prepared) = &self.prepared else {
+            let reason = "pairs under a known pose need an index of the verified method".to_owned();
+            return Err(Error::Setting { name: "method", reason });
+        };
         Ok(crate::verified::pairs_under(prepared, &self.map, query, pose, &request, &self.config.verified))
     }
 }
