@@ -1,9 +1,11 @@
 """The ceiling: what geometry allows when the pose is known.
 
 Fruits of a cluster hang 7-10 cm apart, so that even the true pose leaves doubt about who is who. The oracle takes the
-true pose and the true noise and assigns by maximum likelihood. A pair at distance r costs r^2 / (2 sigma^2); leaving a
-fruit of each side alone costs as much as a pair at the gate, which 99 % of the true pairs pass:
-r_gate^2 = sigma^2 chi2_3(0.99), 3.37 sigma.
+true pose and the true noise and lets the last stage of the verified method pair the fruits.
+
+The gated assignment is a second oracle that shares no code with it: maximum likelihood. A pair at distance r costs
+r^2 / (2 sigma^2); leaving a fruit of each side alone costs as much as a pair at the gate, which 99 % of the true pairs
+pass: r_gate^2 = sigma^2 chi2_3(0.99), 3.37 sigma.
 """
 
 import numpy as np
@@ -14,13 +16,20 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.stats import chi2
 
+import pomona
 from pomona.synth.clouds import ScenePair
 
 GATE_CHI2 = float(chi2.ppf(0.99, df=3))
 
 
 def oracle_pairs(pair: ScenePair) -> NDArray[np.int64]:
-    """Return the oracle's pairs of rows, (M, 2) query, map."""
+    """Return the oracle's pairs of rows, (M, 2) query, map; the cell must have a pose without a mirror."""
+    index = pomona.Index(pair.map, scale=pair.cell.scale, threads=1)
+    return index.pairs_under(pair.query, pair.map_from_query, noise_m=pair.noise_m).pairs
+
+
+def gated_pairs(pair: ScenePair) -> NDArray[np.int64]:
+    """Return the pairs of rows of the gated assignment, (M, 2) query, map."""
     in_map = pair.query.positions @ pair.map_from_query[:3, :3].T + pair.map_from_query[:3, 3]
     return assign_in_gate(in_map, pair.map.positions, _true_sigma_m(pair, in_map))
 
