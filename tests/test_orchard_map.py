@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.orchard import OrchardMap, Session, add_session, load_session, problems, write_session
+from pomona.settings import Settings
 from pomona.synth.clouds import scene_pair
 
 
@@ -257,14 +258,16 @@ def test_check_finds(grown: Path, damage: str, line: str) -> None:
     assert any(line in problem for problem in problems(grown))
 
 
-def test_real_captures_give_one_identity_an_apple(tmp_path: Path, shared_data: Path) -> None:
+@pytest.mark.parametrize("method", ["verified", "paper"])
+def test_real_captures_give_one_identity_an_apple(tmp_path: Path, shared_data: Path, method: str) -> None:
     """Four captures of the same 25-26 apples and two balls; the laboratory's ids are the truth."""
     path = tmp_path / "orchard.gpkg"
     captures = sorted((shared_data / "kinect_apples").glob("*_fruits.csv"))
     for seed, capture in enumerate(captures):
         hour, minute, second = (capture.name[i : i + 2] for i in (0, 2, 4))
         session = load_session(capture, date=f"2021-09-27T{hour}:{minute}:{second}")
-        added = add_session(path, replace(session, cloud=turned(session.cloud, seed)))
+        turned_session = replace(session, cloud=turned(session.cloud, seed))
+        added = add_session(path, turned_session, settings=Settings.load(None, {"method": method}))
         assert added.is_added
     seen = OrchardMap(path).observations()
     identities, apples = defaultdict(set), defaultdict(set)
