@@ -16,8 +16,8 @@ $(UV):
 install: $(UV) ## build pomona and install it with its tools into .venv
 	$(UV) sync --frozen
 
-develop: $(UV) ## rebuild the extension quickly after an edit of Rust sources (dev profile)
-	$(UV) run --no-sync maturin develop --uv --quiet
+develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
+	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install
 
 demo: install ## the main job in half a minute: two dates of a row, one map, one picture
 	$(RUN) pomona demo
