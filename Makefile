@@ -14,7 +14,7 @@ $(UV):
 	.tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
 
 install: $(UV) ## build pomona and install it with its tools into .venv
-	$(UV) sync --frozen
+	$(UV) sync --frozen --inexact # keeps what `make docs` installed
 
 develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
 	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install

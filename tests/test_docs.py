@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from benchmarks.readme import END, START, table
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -83,3 +84,9 @@ def test_the_guide_that_says_what_is_where_names_what_is_there() -> None:
     named = set(re.findall(r"`((?:crates|python|tests|docs|benchmarks|testdata)/[\w./-]*)`", text))
     assert named
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+
+
+def test_the_table_of_accuracy_is_the_committed_benchmark() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert table()
+    assert START + table() + END in readme, "stale: run python -m benchmarks readme"
