@@ -235,7 +235,7 @@ def _as_cloud(cloud: Cloud) -> FruitCloud:
     return FruitCloud(positions=np.asarray(cloud, np.float64))
 
 
-def _arrays(cloud: FruitCloud) -> dict[str, Any]:
+def _arrays(cloud: FruitCloud) -> _core._Arrays:
     """Return the arrays the core reads, contiguous."""
     views = cloud.views
     return {
