@@ -1,15 +1,18 @@
 //! Exact search among points of a fixed dimension: codes of constellations (5, 8, 11 or 14 numbers) and fruits (3).
 //!
-//! A balanced k-d tree whose nodes keep the tight box of their points and whose leaves hold up to [`LEAF`] points
-//! coordinate by coordinate, so that one pass of vector instructions measures a whole leaf. Boxes and leaves are stored
-//! in single precision, about the middle of the points; every candidate that survives is measured again in double
-//! precision. The bound that prunes is widened by the largest possible rounding error, so the answer is exact. Of equal
-//! distances the smaller row wins, which makes the answer independent of the order of the search.
+//! A balanced k-d tree, sixteen children to a node and up to sixteen points to a leaf ([`LANES`]). Nodes keep the tight
+//! boxes of their children and leaves their points coordinate by coordinate, so that one pass of vector instructions
+//! measures all sixteen. Boxes and leaves are stored in single precision, about the middle of the points; every candidate
+//! that survives is measured again in double precision. The bound that prunes is widened by the largest possible rounding
+//! error, so the answer is exact. Of equal distances the smaller row wins, which makes the answer independent of the order
+//! of the search.
 
 use rayon::prelude::*;
 
-/// Points in a leaf at most: four vectors of four lanes, the width every x86-64 and aarch64 has.
-const LEAF: usize = 16;
+/// Children of a node and points of a leaf at most: four vectors of four lanes, the width every x86-64 and aarch64 has.
+const LANES: usize = 16;
+/// Binary splits from a node to its children.
+const SPLITS: u32 = LANES.ilog2();
 /// Below this many points a subtree is built on one thread; splitting smaller work costs more than it saves.
 const PARALLEL_BUILD: usize = 4096;
 /// Queries answered in one piece of work.
@@ -29,43 +32,55 @@ pub struct Neighbour {
 pub struct Index<const D: usize> {
     points: Vec<[f64; D]>,
     /// Row of each place of the leaves; `u32::MAX` pads.
-    rows: Vec<[u32; LEAF]>,
-    leaves: Vec<[[f32; LEAF]; D]>,
-    /// Boxes of the complete binary tree, the root first, the children of `i` at `2 i + 1` and `2 i + 2`.
-    boxes: Vec<Aabb<D>>,
+    rows: Vec<[u32; LANES]>,
+    leaves: Vec<[[f32; LANES]; D]>,
+    /// Inner nodes, the root first, level by level. Child `c` of the `i`-th node of a level is the `16 i + c`-th of the
+    /// next; below the last level are the leaves.
+    nodes: Vec<Children<D>>,
+    /// Where each level starts in `nodes`.
+    levels: Vec<usize>,
     middle: [f64; D],
     /// Largest distance of a coordinate from the middle.
     reach: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
+/// Boxes of the children of a node; absent children have boxes at infinity.
+#[derive(Debug, Clone)]
 #[repr(align(64))]
-struct Aabb<const D: usize> {
-    low: [f32; D],
-    high: [f32; D],
+struct Children<const D: usize> {
+    low: [[f32; LANES]; D],
+    high: [[f32; LANES]; D],
 }
 
-impl<const D: usize> Aabb<D> {
-    const EMPTY: Self = Self { low: [f32::INFINITY; D], high: [f32::NEG_INFINITY; D] };
+impl<const D: usize> Children<D> {
+    const NONE: Self = Self { low: [[f32::INFINITY; LANES]; D], high: [[f32::INFINITY; LANES]; D] };
 
+    /// Squared distances of a point from the boxes.
     #[inline]
-    fn distance_squared(&self, query: &[f32; D]) -> f32 {
-        let mut sum = 0.0;
-        for ((low, high), x) in self.low.iter().zip(&self.high).zip(query) {
-            let outside = (low - x).max(x - high).max(0.0);
-            sum += outside * outside;
+    fn distances_squared(&self, point: &[f32; D]) -> [f32; LANES] {
+        let mut sums = [0.0; LANES];
+        for ((lows, highs), x) in self.low.iter().zip(&self.high).zip(point) {
+            for ((sum, low), high) in sums.iter_mut().zip(lows).zip(highs) {
+                let outside = larger(larger(low - x, x - high), 0.0);
+                *sum += outside * outside;
+            }
         }
-        sum
+        sums
     }
 
-    fn union(&self, other: &Self) -> Self {
-        let mut union = *self;
+    fn set(&mut self, child: usize, (low, high): ([f32; D], [f32; D])) {
         for d in 0..D {
-            union.low[d] = union.low[d].min(other.low[d]);
-            union.high[d] = union.high[d].max(other.high[d]);
+            (self.low[d][child], self.high[d][child]) = (low[d], high[d]);
         }
-        union
     }
+}
+
+/// A node to look into, as its place in its level, and its squared distance.
+#[derive(Debug, Clone, Copy, Default)]
+struct Waiting {
+    level: u32,
+    place: u32,
+    distance: f32,
 }
 
 /// What a search keeps of the points it meets.
@@ -157,11 +172,12 @@ impl<const D: usize> Index<D> {
         let (low, high) = extent(&points, &order);
         let middle: [f64; D] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
         let reach = (0..D).map(|d| 0.5 * (high[d] - low[d])).fold(0.0, f64::max);
-        let levels = points.len().div_ceil(LEAF).next_power_of_two().ilog2();
-        split(&points, &mut order, levels);
-        let mut index = Self { points, rows: Vec::new(), leaves: Vec::new(), boxes: Vec::new(), middle, reach };
-        index.fill_leaves(&order, levels);
-        index.fill_boxes();
+        let splits = points.len().div_ceil(LANES).next_power_of_two().ilog2();
+        split(&points, &mut order, splits);
+        let (rows, leaves, nodes, levels) = Default::default();
+        let mut index = Self { points, rows, leaves, nodes, levels, middle, reach };
+        index.fill_leaves(&order, splits);
+        index.fill_nodes(splits);
         index
     }
 
@@ -180,14 +196,13 @@ impl<const D: usize> Index<D> {
         &self.points
     }
 
-    fn fill_leaves(&mut self, order: &[u32], levels: u32) {
-        let (n, n_leaves) = (order.len(), 1usize << levels);
+    fn fill_leaves(&mut self, order: &[u32], splits: u32) {
+        let mut ends = Vec::with_capacity(1 << splits);
+        leaf_ends(order.len(), splits, 0, &mut ends);
         let mut start = 0;
-        let mut ends = Vec::with_capacity(n_leaves);
-        leaf_ends(n, levels, 0, &mut ends);
         for end in ends {
-            let mut leaf = [[f32::INFINITY; LEAF]; D];
-            let mut rows = [u32::MAX; LEAF];
+            let mut leaf = [[f32::INFINITY; LANES]; D];
+            let mut rows = [u32::MAX; LANES];
             for (place, &row) in order[start..end].iter().enumerate() {
                 rows[place] = row;
                 let rounded = self.round(&self.points[row as usize]);
@@ -201,18 +216,26 @@ impl<const D: usize> Index<D> {
         }
     }
 
-    fn fill_boxes(&mut self) {
-        let inner = self.leaves.len() - 1;
-        self.boxes = vec![Aabb::EMPTY; inner + self.leaves.len()];
-        for (leaf, (coordinates, rows)) in (inner..).zip(self.leaves.iter().zip(&self.rows)) {
-            let filled = rows.iter().filter(|&&row| row != u32::MAX).count();
-            let side = |pick: fn(f32, f32) -> f32, start| {
-                std::array::from_fn(|d| coordinates[d][..filled].iter().copied().fold(start, pick))
-            };
-            self.boxes[leaf] = Aabb { low: side(f32::min, f32::INFINITY), high: side(f32::max, f32::NEG_INFINITY) };
+    /// All levels but the root have sixteen children to a node; the root takes the splits that are left over.
+    fn fill_nodes(&mut self, splits: u32) {
+        let depth = splits.div_ceil(SPLITS);
+        let mut size = 0;
+        for level in 0..depth {
+            self.levels.push(size);
+            size += 1usize << splits.saturating_sub(SPLITS * (depth - level));
         }
-        for node in (0..inner).rev() {
-            self.boxes[node] = self.boxes[2 * node + 1].union(&self.boxes[2 * node + 2]);
+        self.nodes = vec![Children::NONE; size];
+        let Some(&last) = self.levels.last() else { return };
+        for (i, leaf) in self.leaves.iter().enumerate() {
+            self.nodes[last + i / LANES].set(i % LANES, bounds(leaf, leaf));
+        }
+        for level in (1..depth as usize).rev() {
+            let (above, here) = (self.levels[level - 1], self.levels[level]);
+            for i in 0..self.levels.get(level + 1).unwrap_or(&size) - here {
+                let node = &self.nodes[here + i];
+                let around = bounds(&node.low, &node.high);
+                self.nodes[above + i / LANES].set(i % LANES, around);
+            }
         }
     }
 
@@ -289,74 +312,93 @@ impl<const D: usize> Index<D> {
 
     /// The leaf that a query falls into.
     fn home(&self, query: &[f64; D]) -> u32 {
-        let (query, inner) = (self.round(query), self.leaves.len() - 1);
-        let mut node = 0;
-        while node < inner {
-            let (left, right) = (2 * node + 1, 2 * node + 2);
-            let nearer_right = self.boxes[right].distance_squared(&query) < self.boxes[left].distance_squared(&query);
-            node = if nearer_right { right } else { left };
-        }
-        (node - inner) as u32
+        let query = self.round(query);
+        self.levels.iter().fold(0, |place, start| {
+            let distances = self.nodes[start + place as usize].distances_squared(&query);
+            let nearest = (0..LANES).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+            place * LANES as u32 + nearest as u32
+        })
     }
 
+    /// Depth first, the nearest child first.
+    #[inline]
     fn search(&self, query: &[f64; D], keep: &mut impl Keep) {
         let probe = self.probe(query);
-        let inner = self.leaves.len() - 1;
         let mut limit = probe.widen(keep.limit_squared());
-        // Depth of the tree at most 28 for 2^32 points; one waiting sibling per level.
-        let mut waiting = [(0usize, 0.0f32); 32];
-        let mut n_waiting = 0;
-        let (mut node, mut distance) = (0, 0.0);
-        loop {
-            if distance <= limit {
-                while node < inner {
-                    let left = self.boxes[2 * node + 1].distance_squared(&probe.rounded);
-                    let right = self.boxes[2 * node + 2].distance_squared(&probe.rounded);
-                    let nearer_right = right < left;
-                    let farther = left.max(right);
-                    if farther <= limit {
-                        waiting[n_waiting] = (2 * node + 2 - usize::from(nearer_right), farther);
-                        n_waiting += 1;
-                    }
-                    node = 2 * node + 1 + usize::from(nearer_right);
-                    distance = left.min(right);
-                    if distance > limit {
-                        break;
-                    }
-                }
-                if node >= inner && distance <= limit && self.scan(node - inner, &probe, limit, keep) {
+        // At most fifteen siblings wait at each of the seven levels that 2^32 points fill.
+        let mut waiting = [Waiting::default(); 8 * LANES];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let Waiting { level, place, distance } = waiting[count];
+            if distance > limit {
+                continue;
+            }
+            let Some(start) = self.levels.get(level as usize) else {
+                if self.scan(place as usize, &probe, limit, keep) {
                     limit = probe.widen(keep.limit_squared());
                 }
+                continue;
+            };
+            let distances = self.nodes[start + place as usize].distances_squared(&probe.rounded);
+            let first = count;
+            for (child, &distance) in distances.iter().enumerate() {
+                waiting[count] = Waiting { level: level + 1, place: place * LANES as u32 + child as u32, distance };
+                count += usize::from(distance <= limit && distance < f32::INFINITY);
             }
-            if n_waiting == 0 {
-                return;
-            }
-            n_waiting -= 1;
-            (node, distance) = waiting[n_waiting];
+            farthest_first(&mut waiting[first..count]);
         }
     }
 
     /// Measures a leaf; whether anything was offered.
     #[inline]
     fn scan(&self, leaf: usize, probe: &Probe<D>, limit: f32, keep: &mut impl Keep) -> bool {
-        let mut sums = [0.0f32; LEAF];
+        let mut sums = [0.0f32; LANES];
         for (coordinates, query) in self.leaves[leaf].iter().zip(&probe.rounded) {
             for (sum, x) in sums.iter_mut().zip(coordinates) {
                 let difference = x - query;
                 *sum += difference * difference;
             }
         }
-        if sums.iter().copied().fold(f32::INFINITY, f32::min) > limit {
-            return false;
-        }
         let rows = &self.rows[leaf];
-        for place in 0..LEAF {
-            if sums[place] <= limit && rows[place] != u32::MAX {
-                keep.offer(rows[place], distance_squared(probe.exact, &self.points[rows[place] as usize]));
-            }
+        let (mut near, mut count) = ([0; LANES], 0);
+        for (&row, &sum) in rows.iter().zip(&sums) {
+            near[count] = row;
+            count += usize::from(sum <= limit && sum < f32::INFINITY);
         }
-        true
+        for &row in &near[..count] {
+            keep.offer(row, distance_squared(probe.exact, &self.points[row as usize]));
+        }
+        count > 0
     }
+}
+
+/// One instruction, where `f32::max` takes four to treat NaN.
+#[inline]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Insertion sort: few survive the bound.
+#[inline]
+fn farthest_first(nodes: &mut [Waiting]) {
+    for i in 1..nodes.len() {
+        let node = nodes[i];
+        let mut place = i;
+        while place > 0 && nodes[place - 1].distance < node.distance {
+            nodes[place] = nodes[place - 1];
+            place -= 1;
+        }
+        nodes[place] = node;
+    }
+}
+
+/// Least and greatest of each coordinate, without the padding at infinity.
+fn bounds<const D: usize>(lows: &[[f32; LANES]; D], highs: &[[f32; LANES]; D]) -> ([f32; D], [f32; D]) {
+    let side = |all: &[[f32; LANES]; D], start: f32, pick: fn(f32, f32) -> f32| {
+        all.each_ref().map(|xs| xs.iter().copied().filter(|x| x.is_finite()).fold(start, pick))
+    };
+    (side(lows, f32::INFINITY, f32::min), side(highs, f32::NEG_INFINITY, f32::max))
 }
 
 fn distance_squared<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
