@@ -76,6 +76,17 @@ fn strangers_are_no_match() {
 }
 
 #[test]
+fn a_mirror_image_matches_by_chance_alone() {
+    let mut scene = visits(4, 0.0, 0.0);
+    for p in &mut scene.query.positions {
+        p.x = -p.x;
+    }
+    let found = solve(&scene.query, &scene.map);
+    let (precision, recall) = precision_recall(&found, &scene);
+    assert!(precision < 0.2 && recall < 0.05, "precision {precision}, recall {recall}");
+}
+
+#[test]
 fn the_order_of_rows_changes_nothing() {
     let scene = visits(5, 0.2, 0.01);
     let found = solve(&scene.query, &scene.map);

@@ -1,6 +1,8 @@
 //! A seeded row of fruits in clusters, and two visits to it. For tests and benchmarks of speed; the accuracy benchmark has
 //! the full generator.
 
+#![allow(dead_code, reason = "each test and benchmark uses a part")]
+
 use nalgebra::{Point3, Rotation3, Vector3};
 use pomona::{FruitCloud, Similarity};
 
