@@ -90,7 +90,7 @@ def match_pair(query: FruitCloud, map_: FruitCloud, name: str, method: str) -> l
     for condition, change in zip(CONDITIONS, changes, strict=True):
         scores, verdicts = [], []
         for seed in range(SEEDS):
-            rng = np.random.Generator(np.random.PCG64(seed))
+            rng = np.random.Generator(np.random.PCG64([seed, *map(int, name.split())]))
             seen, _ = moved(rng, change(rng))
             match = pomona.match(seen, map_, method=method, threads=1)
             scores.append(score_pairs(match.pairs.tolist(), seen.ids or (), map_.ids or ()))

@@ -100,10 +100,10 @@ def draw(rows: list[dict[str, object]]) -> None:
     clean = [row for row in rows if row["sigma_m"] == 0.0 and row["mean_m"] is not None]
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
     percent = [100 * row["occlusion"] for row in clean]
-    axes.plot(percent, [row["mean_m"] for row in clean], "o-", label="mean")
-    axes.plot(percent, [row["max_m"] for row in clean], ".:", color="0.5", label="largest")
-    axes.axhline(1e-3, color="tab:red", linewidth=1, label="1 mm")
-    axes.set(xlabel="occluded fruits (%)", ylabel="distance to the originals (m)", yscale="log")
+    axes.plot(percent, [1e3 * row["mean_m"] for row in clean], "o-", label="mean")
+    axes.plot(percent, [1e3 * row["max_m"] for row in clean], ".:", color="0.5", label="worst frame")
+    axes.axhline(1.0, color="tab:red", linewidth=1, label="1 mm")
+    axes.set(xlabel="occluded fruits (%)", ylabel="distance to the originals (mm)")
     axes.set_title("Without noise")
     axes.legend(frameon=False)
     figure.savefig(FOLDER / "robustness_occlusion.png", dpi=130)
@@ -113,16 +113,13 @@ def draw(rows: list[dict[str, object]]) -> None:
     colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(SIGMAS_M)))
     for sigma_m, colour in zip(SIGMAS_M, colours, strict=True):
         line = [row for row in rows if row["sigma_m"] == sigma_m and row["mean_m"] is not None]
-        axes.plot(
-            [100 * row["occlusion"] for row in line],
-            [row["mean_m"] for row in line],
-            "o-",
-            color=colour,
-            markersize=4,
-            label=f"{100 * sigma_m:g} cm",
-        )
-    axes.set(xlabel="occluded fruits (%)", ylabel="mean distance to the originals (m)", yscale="log")
-    axes.set_title("Occlusion and noise")
+        percent, mean_m = [100 * row["occlusion"] for row in line], [row["mean_m"] for row in line]
+        axes.plot(percent, mean_m, color=colour, label=f"{100 * sigma_m:g} cm")
+        # An open circle warns: one frame in ten or more got no answer, and the mean is over the others.
+        fills = [colour if row["registered"] > 0.9 * row["frames"] else "white" for row in line]
+        axes.scatter(percent, mean_m, s=20, c=fills, edgecolors=[colour], zorder=3)
+    axes.set(xlabel="occluded fruits (%)", ylabel="mean distance to the originals (m)", yscale="log", ylim=(1e-3, 0.2))
+    axes.set_title("Occlusion and noise (open circles: over 10 % of the frames got no answer)", fontsize=10)
     axes.legend(title="sigma", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(FOLDER / "robustness_noise.png", dpi=130)
     plt.close(figure)
