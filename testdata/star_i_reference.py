@@ -20,7 +20,8 @@ Z = np.array([0.0, 0.0, 1.0])
 W = (Z - (Z @ U) * U) / np.linalg.norm(Z - (Z @ U) * U)
 PAPER_BASIS = np.stack([U, W, np.cross(U, W)], axis=1)
 # Columns of R in the core's documentation: along AB, towards C, along the normal.
-CODE_BASIS = np.stack([U, np.array([-1.0, 1.0, 0.0]) / np.sqrt(2.0), np.array([-1.0, -1.0, 2.0]) / np.sqrt(6.0)], axis=1)
+TOWARDS_C = np.array([-1.0, 1.0, 0.0]) / np.sqrt(2.0)
+CODE_BASIS = np.stack([U, TOWARDS_C, np.cross(U, TOWARDS_C)], axis=1)
 MIN_RADIUS = 0.1
 
 
@@ -38,6 +39,7 @@ def paper_coordinates(points):
 
 
 def distance_from_line(points):
+    """Return the distance of each point from the line AB over |AB|."""
     along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
     return np.linalg.norm(np.cross(points - points[0], along), axis=1) / np.linalg.norm(points[1] - points[0])
 
@@ -76,6 +78,7 @@ def describe(points):
 
 
 def main():
+    """Write the cases beside this script."""
     random = np.random.default_rng(2602)
     named = [(f"{k} fruits, {i}", random.normal(size=(k, 3))) for k in (4, 5, 6, 7) for i in range(4)]
     cluster = np.array([4.1, -2.0, 1.3]) + 0.2 * random.normal(size=(5, 3))

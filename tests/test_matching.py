@@ -1,0 +1,97 @@
+"""`pomona.match` and `pomona.Index`: what both methods must keep to."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import pomona
+from pomona.matching import Match
+
+METHODS = ["paper", "verified"]
+TURN = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()
+SHIFT = np.array([3.0, -1.0, 0.5])
+
+
+def row(n: int = 120, seed: int = 0) -> NDArray[np.float64]:
+    """Fruits of two trees, no two nearer than 7 cm."""
+    random = np.random.default_rng(seed)
+    fruits: list[NDArray[np.float64]] = []
+    while len(fruits) < n:
+        fruit = random.uniform([0.0, -0.5, 0.5], [2.4, 0.5, 3.0])
+        if all(np.linalg.norm(fruit - other) > 0.07 for other in fruits):
+            fruits.append(fruit)
+    return np.array(fruits)
+
+
+def as_tuple(match: Match) -> tuple[object, ...]:
+    assert match.map_from_query is not None
+    return match.status, match.map_from_query.tolist(), match.pairs.tolist(), match.probabilities.tolist()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_moved_copy_is_found(method: str) -> None:
+    fruits = row()
+    match = pomona.match(fruits[::-1], fruits @ TURN.T + SHIFT, method=method)
+    assert match.status == "Found"
+    np.testing.assert_allclose(match.map_from_query[:3, :3], TURN, atol=1e-6)
+    np.testing.assert_allclose(match.map_from_query[:3, 3], SHIFT, atol=1e-6)
+    np.testing.assert_array_equal(match.pairs.sum(axis=1), len(fruits) - 1)
+    assert len(match.pairs) == match.n_query == match.n_map == len(fruits)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_threads_and_an_index_change_nothing(method: str) -> None:
+    fruits = row()
+    query = fruits[10:] + np.random.default_rng(1).normal(0.0, 0.01, (110, 3))
+    alone = as_tuple(pomona.match(query, fruits, method=method, threads=1))
+    assert as_tuple(pomona.match(query, fruits, method=method, threads=4)) == alone
+    assert as_tuple(pomona.Index(fruits, method=method).match(query)) == alone
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_strangers_are_no_match(method: str) -> None:
+    match = pomona.match(row(seed=1), row(seed=2), method=method)
+    assert match.status == "NoMatch"
+    assert match.map_from_query is None
+    assert match.pairs.shape == (0, 2)
+
+
+def test_votes_support_the_papers_pairs() -> None:
+    fruits = row()
+    match = pomona.match(fruits, fruits, method="paper")
+    assert match.support.min() >= 1.0
+    assert dict(match.stages)["assigned pairs"] == len(fruits)
+
+
+def test_frames_get_their_own_transforms() -> None:
+    fruits = row(200)
+    order = np.argsort(fruits[:, 0])
+    windows = [order[start : start + 60] for start in range(0, 141, 20)]
+    views = pomona.Views(frames=np.repeat(np.arange(len(windows)), 60), fruits=np.concatenate(windows))
+    query = pomona.FruitCloud(positions=fruits, views=views)
+    match = pomona.match(query, fruits @ TURN.T, method="paper", per_frame=True)
+    assert match.status == "Found"
+    assert dict(match.stages)["views"] == len(windows)
+    np.testing.assert_array_equal(match.pairs[:, 0], match.pairs[:, 1])
+    assert len(match.pairs) == len(fruits)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"per_frame": True}, "the query does not know which frame saw which fruit"),
+        ({"noise_m": -1.0}, "noise_m"),
+        ({"config": {"paper": {"inlier_mm": 80}}}, "inlier_mm"),
+        ({"config": {"constellation": {"k": 8}}}, "constellation.k: found 8, expected 4 to 7"),
+        ({"scale": "feet"}, "feet"),
+    ],
+)
+def test_wrong_settings_are_named(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(pomona.PomonaError, match=message):
+        pomona.match(row(), row(), method="paper", **arguments)
+
+
+def test_more_fruits_than_the_paper_can_hold_are_refused() -> None:
+    with pytest.raises(pomona.PomonaError, match="2000000 fruits of the map give up to 420000000 constellations"):
+        pomona.match(row(), np.zeros((2_000_000, 3)), method="paper")
