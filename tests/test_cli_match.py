@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ import pytest
 import typer.main
 
 from pomona.cli import app, main
-from pomona.cloud import FruitCloud
+from pomona.cloud import FruitCloud, Views
+from pomona.orchard import write_session
 from pomona.synth.clouds import scene_pair
 
 POMONA = Path(sys.executable).with_name("pomona")
@@ -310,3 +312,34 @@ def test_config_reads_back_what_it_prints(
     assert run_here("config", "--config", path).stdout == path.read_text()
     answer = json.loads(run_here("match", visits / "query.csv", visits / "map.csv", "--config", path, "--json").stdout)
     assert {**answer, "elapsed_s": 0} == {**found, "elapsed_s": 0}
+
+
+def test_an_ambiguous_answer_names_all_its_transforms(run_here: Run, tmp_path: Path) -> None:
+    pair = scene_pair("twins", seed=1)
+    pair.query.write(tmp_path / "query.csv")
+    pair.map.write(tmp_path / "map.csv")
+    done = run_here("match", tmp_path / "query.csv", tmp_path / "map.csv")
+    assert done.returncode == 1
+    assert done.stdout.startswith("Ambiguous: ")
+    assert "or, as good (1 of " in done.stdout
+    assert done.stdout.count("translation") >= 2
+
+
+def test_frame_by_frame_needs_to_know_who_saw_what(run_here: Run, visits: Path, tmp_path: Path) -> None:
+    flags = ("--method", "paper", "--per-frame")
+    assert_refused(run_here("match", visits / "query.csv", visits / "map.csv", *flags), "per_frame", "frame")
+    query = FruitCloud.read(visits / "query.csv")
+    # Four frames, each of which sees half of the fruits' extent along the first axis.
+    along = np.argsort(np.argsort(query.positions[:, 0])) / len(query)
+    seen = [np.flatnonzero((along >= start) & (along <= start + 0.5)) for start in (0.0, 0.2, 0.35, 0.5)]
+    views = Views(
+        frames=np.repeat(np.arange(4), [len(rows) for rows in seen]),
+        fruits=np.concatenate(seen),
+    )
+    session = tmp_path / "query.gpkg"
+    write_session(session, replace(query, views=views), name="query", date="2024-08-28", recording="made")
+    done = run_here("match", session, visits / "map.csv", *flags, "--json")
+    assert done.returncode == 0, done.stderr
+    matches = json.loads(done.stdout)["matches"]
+    assert len({match["query"] for match in matches}) == len({match["map"] for match in matches}) == len(matches)
+    assert np.mean([match["query"] == match["map"] for match in matches]) > 0.7
