@@ -13,8 +13,9 @@ $(UV):
 	$(PYTHON) -m venv .tools
 	.tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
 
+# Inexact, so that what `make docs` installed stays.
 install: $(UV) ## build pomona and install it with its tools into .venv
-	$(UV) sync --frozen --inexact # keeps what `make docs` installed
+	$(UV) sync --frozen --inexact
 
 develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
 	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install
