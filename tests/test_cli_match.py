@@ -252,6 +252,13 @@ def test_refuses_wrong_flags(run_here: Run, visits: Path, flags: list[str], name
         ("[paper]\nnonsense = 1\n", ["settings.toml", "paper.nonsense"]),
         ("paper = 1\n", ["settings.toml", "paper", "table"]),
         ("[match\n", ["settings.toml", "TOML"]),
+        ('[match]\nmethod = "magic"\n', ["settings.toml", "match.method", "magic", "paper"]),
+        ("[match]\nscale = 3\n", ["settings.toml", "match.scale", "3"]),
+        ("[match]\nnoise_m = true\n", ["settings.toml", "match.noise_m"]),
+        ("[match]\nthreads = -1\n", ["settings.toml", "match.threads", "-1"]),
+        ("[match]\nup = [0, 1]\n", ["settings.toml", "match.up", "[0, 1]"]),
+        ('[paper]\nmin_inliers = "x"\n', ["settings.toml", '"x"']),
+        ("[constellation]\nk = 9\n", ["settings.toml", "constellation.k", "9", "4 to 7"]),
     ],
 )
 def test_refuses_wrong_settings(
@@ -295,9 +302,10 @@ def test_config_prints_effective_values(run_here: Run, tmp_path: Path) -> None:
     defaults = tomllib.loads(run_here("config").stdout)
     assert defaults["match"]["method"] == "verified"
     path = tmp_path / "settings.toml"
-    path.write_text('[match]\nmethod = "paper"\nnoise_m = 0.03\n')
+    path.write_text('[match]\nmethod = "paper"\nnoise_m = 0.03\nup = [0, 1, 0]\n')
     from_file = tomllib.loads(run_here("config", "--config", path).stdout)
-    assert from_file["match"] == {**defaults["match"], "method": "paper", "noise_m": 0.03}
+    up = [[0, 1, 0], [0, 1, 0]]
+    assert from_file["match"] == {**defaults["match"], "method": "paper", "noise_m": 0.03, "up": up}
     flags_win = tomllib.loads(run_here("config", "--config", path, "--method", "verified", "--up", "0,0,1").stdout)
     assert flags_win["match"]["method"] == "verified"
     assert flags_win["match"]["noise_m"] == 0.03

@@ -51,6 +51,9 @@ class Settings:
         call = _defaults_of_match()
         known = {_CALL_TABLE: call, **default_config()}
         _refuse_unknown(path, {_CALL_TABLE: from_file, **tables}, known)
+        for name, value in from_file.items():
+            from_file[name] = _checked(path, name, value)
+        _refuse_wrong_values(path, tables)
         given = {name: value for name, value in flags.items() if value is not None}
         return cls(call={**call, **from_file, **given}, overrides=tables)
 
@@ -94,6 +97,46 @@ def _refuse_unknown(path: Path | None, found: Mapping[str, Any], known: Mapping[
             if not isinstance(value, dict):
                 raise PomonaError(f"{path}: {table}{name}: found {value!r}, expected a table")
             _refuse_unknown(path, value, expected, f"{table}{name}.")
+
+
+def _checked(path: Path | None, name: str, value: Any) -> Any:
+    """Return a value of the file's table for `pomona.match`; refuse one of another kind than its flag takes."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    match name:
+        case "method":
+            expected, fits = '"paper" or "verified"', value in ("paper", "verified")
+        case "scale":
+            expected, fits = '"metric" or "free"', value in ("metric", "free")
+        case "noise_m":
+            expected, fits = "a positive number of metres", is_number and value > 0
+        case "threads":
+            expected, fits = "a whole number from 1", is_number and isinstance(value, int) and value >= 1
+        case "per_frame":
+            expected, fits = "true or false", isinstance(value, bool)
+        case _:
+            expected, fits = "[x, y, z], or two of them: in the query, in the map", _is_direction(value)
+            if fits:
+                return [value, value]
+            fits = isinstance(value, list) and len(value) == 2 and all(map(_is_direction, value))
+    if not fits:
+        raise PomonaError(f"{path}: {_CALL_TABLE}.{name}: found {value!r}, expected {expected}")
+    return value
+
+
+def _is_direction(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 3 and all(type(x) in (int, float) for x in value)
+
+
+def _refuse_wrong_values(path: Path | None, tables: Mapping[str, Any]) -> None:
+    """Let the core look at its own tables, which it does when it prepares a map, be it of one fruit."""
+    from pomona.matching import Index
+
+    if not tables:
+        return
+    try:
+        Index([[0.0, 0.0, 0.0]], config=tables)
+    except PomonaError as error:
+        raise PomonaError(f"{path}: {str(error).removeprefix('map: ')}") from None
 
 
 def _merged(defaults: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
