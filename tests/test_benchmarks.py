@@ -5,7 +5,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 from benchmarks import cells, cells_report, kinect, results, season
-from benchmarks.clouds import similarity_fit
 from benchmarks.disturb import dropped, moved, with_false_points
 from benchmarks.oracle import GATE_CHI2, assign_in_gate, gated_pairs, oracle_pairs
 from benchmarks.pose import pose_error
@@ -130,12 +129,6 @@ def test_disturbances_keep_the_ids_of_the_fruits_that_stay() -> None:
         if name in there:
             np.testing.assert_allclose(position, there[name], atol=1e-12)
     assert sum(name in there for name in back.ids) == 14
-
-
-def test_a_similarity_fit_finds_the_similarity() -> None:
-    points = np.random.default_rng(1).normal(size=(9, 3))
-    true = pose((0.3, -1.0, 2.0), (4.0, 5.0, 6.0), scale=0.7)
-    np.testing.assert_allclose(similarity_fit(points, points @ true[:3, :3].T + true[:3, 3]), true, atol=1e-12)
 
 
 def test_season_lifts_apples_to_where_boxes_of_their_size_lie(tmp_path) -> None:
