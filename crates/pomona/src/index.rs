@@ -75,12 +75,31 @@ impl<const D: usize> Children<D> {
     }
 }
 
-/// A node to look into, as its place in its level, and its squared distance.
-#[derive(Debug, Clone, Copy, Default)]
-struct Waiting {
-    level: u32,
-    place: u32,
-    distance: f32,
+/// A node to look into, as one number that orders by squared distance: its bits (those of a float that is not negative
+/// order as it does), four bits of level, then the place in the level.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting(u64);
+
+impl Waiting {
+    #[inline]
+    fn new(distance: f32, level: usize, place: u32) -> Self {
+        Self(u64::from(distance.to_bits()) << 32 | (level as u64) << 28 | u64::from(place))
+    }
+
+    #[inline]
+    fn distance(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    #[inline]
+    fn level(self) -> usize {
+        (self.0 >> 28 & 0xf) as usize
+    }
+
+    #[inline]
+    fn place(self) -> u32 {
+        self.0 as u32 & 0x0fff_ffff
+    }
 }
 
 /// What a search keeps of the points it meets.
@@ -165,10 +184,11 @@ impl<const D: usize> Index<D> {
     /// Indexes `points`; rows of answers are rows of `points`.
     ///
     /// # Panics
-    /// If a coordinate is not finite or there are more than `u32::MAX - 1` points.
+    /// If a coordinate is not finite or there are 2^31 points or more.
     pub fn new(points: Vec<[f64; D]>) -> Self {
         assert!(points.iter().flatten().all(|x| x.is_finite()), "an indexed coordinate is not finite");
-        let mut order: Vec<u32> = (0..u32::try_from(points.len()).expect("fewer than 2^32 points")).collect();
+        assert!(points.len() < 1 << 31, "2^31 points or more");
+        let mut order: Vec<u32> = (0..points.len() as u32).collect();
         let (low, high) = extent(&points, &order);
         let middle: [f64; D] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
         let reach = (0..D).map(|d| 0.5 * (high[d] - low[d])).fold(0.0, f64::max);
@@ -325,34 +345,32 @@ impl<const D: usize> Index<D> {
     fn search(&self, query: &[f64; D], keep: &mut impl Keep) {
         let probe = self.probe(query);
         let mut limit = probe.widen(keep.limit_squared());
-        // At most fifteen siblings wait at each of the seven levels that 2^32 points fill.
+        // At most fifteen siblings wait at each of the seven levels that 2^31 points fill.
         let mut waiting = [Waiting::default(); 8 * LANES];
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let Waiting { level, place, distance } = waiting[count];
-            if distance > limit {
+            let (level, place) = (waiting[count].level(), waiting[count].place());
+            if waiting[count].distance() > limit {
                 continue;
             }
-            let Some(start) = self.levels.get(level as usize) else {
-                if self.scan(place as usize, &probe, limit, keep) {
-                    limit = probe.widen(keep.limit_squared());
-                }
+            let Some(start) = self.levels.get(level) else {
+                limit = self.scan(place as usize, &probe, limit, keep);
                 continue;
             };
             let distances = self.nodes[start + place as usize].distances_squared(&probe.rounded);
             let first = count;
-            for (child, &distance) in distances.iter().enumerate() {
-                waiting[count] = Waiting { level: level + 1, place: place * LANES as u32 + child as u32, distance };
-                count += usize::from(distance <= limit && distance < f32::INFINITY);
+            for child in lanes(below(&distances, limit)) {
+                waiting[count] = Waiting::new(distances[child], level + 1, place * LANES as u32 + child as u32);
+                count += 1;
             }
             farthest_first(&mut waiting[first..count]);
         }
     }
 
-    /// Measures a leaf; whether anything was offered.
+    /// Measures a leaf; returns the limit after it.
     #[inline]
-    fn scan(&self, leaf: usize, probe: &Probe<D>, limit: f32, keep: &mut impl Keep) -> bool {
+    fn scan(&self, leaf: usize, probe: &Probe<D>, mut limit: f32, keep: &mut impl Keep) -> f32 {
         let mut sums = [0.0f32; LANES];
         for (coordinates, query) in self.leaves[leaf].iter().zip(&probe.rounded) {
             for (sum, x) in sums.iter_mut().zip(coordinates) {
@@ -360,17 +378,35 @@ impl<const D: usize> Index<D> {
                 *sum += difference * difference;
             }
         }
-        let rows = &self.rows[leaf];
-        let (mut near, mut count) = ([0; LANES], 0);
-        for (&row, &sum) in rows.iter().zip(&sums) {
-            near[count] = row;
-            count += usize::from(sum <= limit && sum < f32::INFINITY);
+        for place in lanes(below(&sums, limit)) {
+            if sums[place] <= limit {
+                let row = self.rows[leaf][place];
+                keep.offer(row, distance_squared(probe.exact, &self.points[row as usize]));
+                limit = probe.widen(keep.limit_squared());
+            }
         }
-        for &row in &near[..count] {
-            keep.offer(row, distance_squared(probe.exact, &self.points[row as usize]));
-        }
-        count > 0
+        limit
     }
+}
+
+/// Bit `i` tells whether lane `i` is within the limit; lanes at infinity are padding and never are.
+#[inline]
+fn below(distances: &[f32; LANES], limit: f32) -> u32 {
+    let limit = if limit < f32::INFINITY { limit } else { f32::MAX };
+    let within = distances.map(|distance| u32::from(distance <= limit));
+    (0..LANES).fold(0, |bits, lane| bits | within[lane] << lane)
+}
+
+/// The lanes whose bit is set, ascending.
+#[inline]
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
 }
 
 /// One instruction, where `f32::max` takes four to treat NaN.
@@ -379,17 +415,14 @@ fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Insertion sort: few survive the bound.
+/// Sorts the few that survive the bound by exchanges without branches.
 #[inline]
 fn farthest_first(nodes: &mut [Waiting]) {
     for i in 1..nodes.len() {
-        let node = nodes[i];
-        let mut place = i;
-        while place > 0 && nodes[place - 1].distance < node.distance {
-            nodes[place] = nodes[place - 1];
-            place -= 1;
+        for j in (1..=i).rev() {
+            let (a, b) = (nodes[j - 1], nodes[j]);
+            (nodes[j - 1], nodes[j]) = (a.max(b), a.min(b));
         }
-        nodes[place] = node;
     }
 }
 
