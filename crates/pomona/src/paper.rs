@@ -155,8 +155,7 @@ impl Prepared {
         let Some(map_from_query) = registration else {
             return Ok(Match::without_answer(Verdict::NoMatch, stages));
         };
-        let votes = sum_votes(&ballots);
-        Ok(self.answer(&fruits, &merged, &votes, map_from_query, request, stages))
+        Ok(self.answer(&fruits, &merged, &ballots, map_from_query, request, stages))
     }
 
     /// The settings with lengths in the unit of the map, and the gates narrowed to a known noise.
@@ -240,7 +239,7 @@ impl Prepared {
         &self,
         query: &Ordered,
         merged: &[(usize, usize, f64)],
-        votes: &BTreeMap<(usize, usize), u32>,
+        ballots: &[Ballot],
         map_from_query: Similarity,
         request: &Request,
         stages: Vec<(&'static str, f64)>,
@@ -251,6 +250,7 @@ impl Prepared {
         let mut pairs: Vec<_> = merged
             .iter()
             .map(|&(q, m, distance_m)| {
+                let votes: u32 = ballots.iter().map(|ballot| ballot.votes.of(q, m)).sum();
                 let odds = self.evidence.odds(&self.fruits.positions[m], distance_m, noise_m);
                 log_odds += odds.ln_1p();
                 Pair {
@@ -258,7 +258,7 @@ impl Prepared {
                     map: self.fruits.rows[m],
                     probability: odds / (1.0 + odds),
                     distance_m,
-                    support: votes.get(&(q, m)).copied().map_or(0.0, f64::from),
+                    support: f64::from(votes),
                 }
             })
             .collect();
@@ -294,15 +294,6 @@ fn merge(locals: &[Local], n_query: usize, n_map: usize) -> Vec<(usize, usize, f
     let partners = assign(n_query, n_map, &gains);
     let mean = |key: &(usize, usize)| seen[key].1 / seen[key].0;
     partners.iter().enumerate().filter_map(|(q, m)| m.map(|m| (q, m, mean(&(q, m))))).collect()
-}
-
-/// Votes over all views.
-fn sum_votes(ballots: &[Ballot]) -> BTreeMap<(usize, usize), u32> {
-    let mut sum = BTreeMap::new();
-    for vote in ballots.iter().flat_map(|ballot| ballot.votes.iter()) {
-        *sum.entry((vote.query as usize, vote.map as usize)).or_default() += vote.count;
-    }
-    sum
 }
 
 fn median_spacing(tree: &Index<3>) -> f64 {
