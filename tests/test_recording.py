@@ -141,7 +141,7 @@ def test_a_calibration_that_is_no_json_is_refused(folder):
     (folder / "calibration.json").write_text("[600]")
     refused(folder, "calibration.json", "found a JSON list")
     (folder / "calibration.json").unlink()
-    refused(folder, "calibration.json", "not found")
+    refused(folder, "calibration: found none", "calibration.json")
 
 
 @pytest.mark.parametrize(

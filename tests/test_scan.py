@@ -182,18 +182,30 @@ def test_frames_with_boxes_without_ids_are_refused(pomona, tmp_path):
 def test_a_recording_without_depth_is_refused(pomona, row, tmp_path):
     (row / "depth").rename(row / "left")
     output = tmp_path / "fruits.csv"
-    assert_refused(pomona("scan", row, "-o", output), output, "frame 0 has no depth", "depth/")
+    assert_refused(pomona("scan", row, "-o", output), output, "found left pictures, expected depth")
 
 
-def test_a_corrupt_picture_leaves_the_old_session_as_it_was(pomona, row, tmp_path):
+def test_a_corrupt_picture_in_the_middle_is_skipped_counted_and_named(pomona, row, tmp_path):
+    picture = row / "depth" / "0001.png"
+    picture.write_bytes(picture.read_bytes()[:500])
+    done = pomona("scan", row, "-o", tmp_path / "fruits.csv", "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["n_skipped_frames"] == 1
+    assert done.stderr.count("\n") == 1
+    assert "skipped 1 of 3 frames" in done.stderr
+    assert "0001.png" in done.stderr
+    assert FruitCloud.read(tmp_path / "fruits.csv").n_views.tolist() == [2, 2, 2]
+
+
+def test_a_recording_that_cannot_be_read_leaves_the_old_session_as_it_was(pomona, row, tmp_path):
     output = tmp_path / "session.gpkg"
     assert pomona("scan", row, "-o", output).returncode == 0
     before = output.read_bytes()
-    picture = row / "depth" / "0002.png"
-    picture.write_bytes(picture.read_bytes()[:500])
+    for picture in (row / "depth").iterdir():
+        picture.write_bytes(picture.read_bytes()[:500])
     done = pomona("scan", row, "-o", output)
     assert done.returncode == 2
-    assert "0002.png" in done.stderr
+    assert "0000.png" in done.stderr
     assert output.read_bytes() == before
     assert sorted(file.name for file in tmp_path.iterdir()) == [row.name, "session.gpkg"]
 
@@ -223,7 +235,7 @@ def test_a_wrong_output_is_refused_before_the_work(pomona, row, tmp_path):
 
 
 def test_info_says_what_is_there(pomona, row):
-    assert "frames       3" in pomona("info", row).stdout
+    assert "frames         3" in pomona("info", row).stdout
     found = json.loads(pomona("info", row, "--json").stdout)
     assert (found["frames"], found["poses"], found["pictures"]) == (3, True, {"depth": 3})
 

@@ -16,9 +16,10 @@ from pomona.detect import Detections, Detector
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.fusion import fuse_centres, fuse_diameters
 from pomona.recording import Frame, Recording
+from pomona.recording.pictures import UnreadablePictureError
 from pomona.trajectory import Trajectory
 
-__all__ = ["Survey", "scan"]
+__all__ = ["Survey", "require_depth", "scan"]
 
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, sightings so far."""
@@ -43,12 +44,15 @@ class Survey:
         Boxes seen.
     refused : Counter of Refusal
         Boxes that gave no fruit, by reason.
+    skipped : dict
+        Number of each frame whose picture could not be read, and why.
     """
 
     cloud: FruitCloud
     trajectory: Trajectory
     detections: int
     refused: Counter[Refusal]
+    skipped: dict[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +101,54 @@ def scan(recording: Recording, detector: Detector, *, progress: Progress | None 
     Raises
     ------
     PomonaError
-        When depth, poses or ids are missing or a picture cannot be read.
+        When depth, poses or ids are missing, or no picture can be read. Single ones that cannot are skipped and told.
     """
+    require_depth(recording)
     trajectory = _trajectory(recording)
     sightings, seen, refused = _Sightings(), 0, Counter[Refusal]()
+    skipped: dict[int, str] = {}
     for done, frame in enumerate(recording.frames(), start=1):
         detections = detector(frame)
-        lifted = _lift(recording, frame, detections)
+        try:
+            lifted = _lift(recording, frame, detections)
+        except UnreadablePictureError as error:
+            skipped[frame.number] = str(error)
+            continue
         sightings.add(frame, trajectory.session_from_camera[done - 1], _names(recording, detections, lifted), lifted)
         seen += len(detections)
         refused += lifted.refused
         if progress is not None:
             progress(done, len(recording), len(sightings))
+    _tell_skipped(recording, skipped)
     _check_sizes(recording, sightings)
-    return Survey(_fused(sightings), trajectory, seen, refused)
+    return Survey(_fused(sightings), trajectory, seen, refused, skipped)
+
+
+def require_depth(recording: Recording) -> None:
+    """Refuse a recording without depth before anything is decoded.
+
+    Raises
+    ------
+    PomonaError
+        One line.
+    """
+    pictures = recording.description()["pictures"]
+    if "depth" not in pictures:
+        found = " and ".join(pictures)
+        raise PomonaError(
+            f"{recording.path}: found {found} pictures, expected depth: depth from stereo is not there yet"
+        )
+
+
+def _tell_skipped(recording: Recording, skipped: dict[int, str]) -> None:
+    """Say how many frames could not be read, and the first of them; a scan of nothing is no scan."""
+    if not skipped:
+        return
+    first = next(iter(skipped.values()))
+    if len(skipped) == len(recording):
+        raise PomonaError(first)
+    message = f"{recording.path}: skipped {len(skipped)} of {len(recording)} frames that cannot be read, first {first}"
+    warnings.warn(message, PomonaWarning, stacklevel=3)
 
 
 def _trajectory(recording: Recording) -> Trajectory:

@@ -19,7 +19,9 @@ SUFFIXES = (".gpkg", ".csv", ".ply")
 
 
 def scan(
-    recording: Path = typer.Argument(metavar="RECORDING", help="Recording folder with calibration.json and depth/."),
+    recording: Path = typer.Argument(
+        metavar="RECORDING", help="Recording with depth: a recording folder or a TUM RGB-D folder."
+    ),
     output: Path = typer.Option(..., "-o", "--output", help="Session to write: .gpkg, or its fruits as .csv or .ply."),
     detections: Path | None = typer.Option(
         None, metavar="CSV", help="Boxes: frame,xmin,ymin,xmax,ymax,score[,id]; else detections.csv in the folder."
@@ -28,19 +30,24 @@ def scan(
     date: str | None = typer.Option(
         None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; else the recording's."
     ),
+    calibration: Path | None = typer.Option(
+        None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Lift the boxes of RECORDING to fruits in 3D, with diameters and covariances, and write the session.
 
-    More than one frame needs poses_tum.txt and an id for each box.
+    More than one frame needs poses and an id for each box.
     """
     from pomona.detect.from_file import FileDetector
     from pomona.recording import open_recording
+    from pomona.survey import require_depth
     from pomona.survey import scan as scan_recording
 
     _require_writable(output)
     _require_date(date)
-    opened = open_recording(recording)
+    opened = open_recording(recording, calibration=calibration)
+    require_depth(opened)
     boxes = detections or recording / "detections.csv"
     detector = FileDetector.read(boxes, opened.calibration, opened.numbers)
     with _progress(opened) as progress:
@@ -143,6 +150,7 @@ def _summary(recording: Recording, survey: Survey, output: Path) -> dict[str, An
         "output": str(output),
         "recording": str(recording.path),
         "n_frames": len(recording),
+        "n_skipped_frames": len(survey.skipped),
         "n_boxes": survey.detections,
         "n_refused": {reason.value: count for reason, count in sorted(survey.refused.items())},
         "n_fruits": len(survey.cloud),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["Calibration"]
+__all__ = ["Calibration", "checked_baseline_m"]
 
 FOCAL_RANGE_WIDTHS = (0.2, 20.0)
 """Focal length in picture widths: 0.2 is a field of view of 136 degrees, 20 one of 3; outside, the unit is wrong."""
@@ -55,8 +55,8 @@ class Calibration:
     depth_unit_m: float = 0.001
 
     @classmethod
-    def read(cls, path: str | Path) -> Calibration:
-        """Read `calibration.json` of a recording folder.
+    def read(cls, path: str | Path, *, depth_unit_m: float = 0.001) -> Calibration:
+        """Read `calibration.json`; `depth_unit_m` counts where the file does not say it.
 
         Raises
         ------
@@ -65,7 +65,7 @@ class Calibration:
         """
         fields = _read_object(Path(path))
         try:
-            return _checked(fields)
+            return _checked({"depth_unit_m": depth_unit_m, **fields})
         except PomonaError as error:
             raise PomonaError(f"{path}: {error}") from None
 
@@ -89,11 +89,38 @@ class Calibration:
         """Width and height."""
         return self.width, self.height
 
+    def depth_error_m(self, depth_m: float, disparity_error_px: float) -> float | None:
+        """Error of a stereo depth: Z^2 / (f B) times the error of the disparity; None without a baseline."""
+        if self.baseline_m is None:
+            return None
+        return depth_m**2 / (self.fx * self.baseline_m) * disparity_error_px
+
     def rays(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
         """Give the directions (x, y, 1) in the camera of picture points (..., 2)."""
         x = (points_px[..., 0] - self.cx) / self.fx
         y = (points_px[..., 1] - self.cy) / self.fy
         return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
+def checked_baseline_m(where: str, baseline_m: float) -> float:
+    """Refuse a baseline that is missing, turned round or in millimetres, and say which.
+
+    Raises
+    ------
+    PomonaError
+        One line that begins with `where`.
+    """
+    low_m, high_m = BASELINE_RANGE_M
+    expected = f"expected {low_m:g} to {high_m:g} (metres)"
+    if baseline_m == 0:
+        raise PomonaError(f"{where}: no baseline: found 0, {expected}")
+    if low_m <= -baseline_m <= high_m:
+        raise PomonaError(f"{where}: found the right camera on the left: swap left and right")
+    if low_m <= abs(baseline_m) / 1000 <= high_m:
+        raise PomonaError(f"{where}: found a baseline of {abs(baseline_m):g}, {expected}: it looks like millimetres")
+    if not low_m <= baseline_m <= high_m:
+        raise PomonaError(f"{where}: found a baseline of {baseline_m:g}, {expected}")
+    return baseline_m
 
 
 def _read_object(path: Path) -> dict[str, Any]:
@@ -117,7 +144,7 @@ def _checked(fields: dict[str, Any]) -> Calibration:
     if fields.get("rectified", True) is not True:
         raise PomonaError(f"rectified: found {fields['rectified']!r}, expected true: rectify the pictures first")
     if fields.get("baseline_m") is not None:
-        _within(fields, "baseline_m", *BASELINE_RANGE_M, "metres")
+        _baseline_m(fields)
     if fields.get("depth_unit_m") is not None:
         _within(fields, "depth_unit_m", *DEPTH_UNIT_RANGE_M, "metres per step")
     return Calibration(
@@ -130,6 +157,14 @@ def _checked(fields: dict[str, Any]) -> Calibration:
         baseline_m=fields.get("baseline_m"),
         depth_unit_m=fields.get("depth_unit_m") or 0.001,
     )
+
+
+def _baseline_m(fields: dict[str, Any]) -> None:
+    low_m, high_m = BASELINE_RANGE_M
+    found = _number(fields, "baseline_m")
+    hint = ": it looks like millimetres" if low_m <= found / 1000 <= high_m else ""
+    if not low_m <= found <= high_m:
+        raise PomonaError(f"baseline_m: found {found:g}, expected {low_m:g} to {high_m:g} (metres){hint}")
 
 
 def _number(fields: dict[str, Any], name: str) -> float:

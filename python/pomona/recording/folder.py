@@ -15,14 +15,16 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.recording.description import describe
 from pomona.recording.frame import Frame
-from pomona.recording.pictures import read_colour, read_depth
+from pomona.recording.pictures import numbered_pictures
 from pomona.recording.poses import read_tum
+from pomona.recording.rectification import Optics
+from pomona.recording.rectified_pictures import read_rectified, size_of_first
+from pomona.recording.rig_files import find_optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["FolderRecording"]
-
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 _ISO_DATE = re.compile(r"(\d{4}-\d{2}-\d{2})(?:[T_ ](\d{2})[:-]?(\d{2})(?:[:-]?(\d{2}))?)?")
 
@@ -38,7 +40,7 @@ class FolderRecording:
     """
 
     path: Path
-    calibration: Calibration
+    optics: Optics
     numbers: tuple[int, ...]
     pictures: dict[str, dict[int, Path]]
     trajectory: Trajectory | None
@@ -46,29 +48,40 @@ class FolderRecording:
     date: str | None
 
     @classmethod
-    def open(cls, folder: Path) -> FolderRecording:
+    def open(cls, folder: Path, calibration: Path | None = None) -> FolderRecording:
         """Open a folder; nothing is decoded yet.
+
+        Parameters
+        ----------
+        folder : Path
+            With `left/`, `right/`, `depth/`.
+        calibration : Path, optional
+            File or folder of the calibration; else `calibration.json` in the folder, else another kind there.
 
         Raises
         ------
         PomonaError
             When the calibration, the pictures or the poses are missing or do not fit together.
         """
-        calibration = Calibration.read(folder / "calibration.json")
-        pictures = {kind: _pictures(folder / kind) for kind in ("left", "right", "depth") if (folder / kind).is_dir()}
+        kinds = (kind for kind in ("left", "right", "depth") if (folder / kind).is_dir())
+        pictures = {kind: numbered_pictures(folder / kind) for kind in kinds}
         numbers = _numbers(folder, pictures)
-        if "right" in pictures and calibration.baseline_m is None:
-            raise PomonaError(f"{folder / 'calibration.json'}: baseline_m: missing, expected metres: there is a right/")
+        optics = _optics(folder, pictures, calibration)
         about = _about(folder)
         return cls(
             path=folder,
-            calibration=calibration,
+            optics=optics,
             numbers=numbers,
             pictures=pictures,
-            trajectory=_trajectory(folder / "poses_tum.txt", numbers),
+            trajectory=_trajectory(folder / "poses_tum.txt", numbers, optics),
             name=str(about.get("name") or folder.resolve().name),
             date=_date(folder, about),
         )
+
+    @property
+    def calibration(self) -> Calibration:
+        """The rectified left camera."""
+        return self.optics.calibration
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -88,47 +101,24 @@ class FolderRecording:
 
     def inputs(self) -> Iterator[Path]:
         """Give calibration, poses, detections and depth pictures."""
-        for name in ("calibration.json", "recording.json", "poses_tum.txt", "detections.csv"):
+        yield from self.optics.inputs
+        for name in ("recording.json", "poses_tum.txt", "detections.csv"):
             if (self.path / name).is_file():
                 yield self.path / name
         yield from self.pictures.get("depth", {}).values()
 
     def description(self) -> dict[str, Any]:
         """Say what was found."""
-        return {
-            "recording": str(self.path),
-            "name": self.name,
-            "date": self.date,
-            "frames": len(self),
-            "width": self.calibration.width,
-            "height": self.calibration.height,
-            "fx": self.calibration.fx,
-            "fy": self.calibration.fy,
-            "baseline_m": self.calibration.baseline_m,
-            "pictures": {kind: len(files) for kind, files in self.pictures.items()},
-            "poses": self.trajectory is not None,
-            "detections": (self.path / "detections.csv").is_file(),
-        }
+        times_s = None if self.trajectory is None else self.trajectory.times_s.tolist()
+        counts = {kind: len(files) for kind, files in self.pictures.items()}
+        boxes = (self.path / "detections.csv").is_file()
+        return describe(self, "recording folder", times_s, counts, detections=boxes)
 
     def _reader(self, kind: str, number: int) -> Any:
         file = self.pictures.get(kind, {}).get(number)
         if file is None:
             return None
-        return functools.partial(read_depth if kind == "depth" else read_colour, file, self.calibration)
-
-
-def _pictures(folder: Path) -> dict[int, Path]:
-    """Map frame numbers to picture files; names are numbers, as 0007.png."""
-    found: dict[int, Path] = {}
-    for file in sorted(folder.iterdir()):
-        if file.name.startswith(".") or file.suffix.lower() not in PICTURE_SUFFIXES:
-            continue
-        if not (file.stem.isascii() and file.stem.isdecimal()):
-            raise PomonaError(f"{file}: found the name {file.stem!r}, expected a frame number, for example 0007.png")
-        if int(file.stem) in found:
-            raise PomonaError(f"{file}: frame {int(file.stem)} is there twice, also as {found[int(file.stem)].name}")
-        found[int(file.stem)] = file
-    return dict(sorted(found.items()))
+        return functools.partial(read_rectified, kind, file, self.optics)
 
 
 def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, ...]:
@@ -145,12 +135,26 @@ def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, .
     return tuple(numbers)
 
 
-def _trajectory(path: Path, numbers: tuple[int, ...]) -> Trajectory | None:
+def _optics(folder: Path, pictures: dict[str, dict[int, Path]], calibration: Path | None) -> Optics:
+    own = folder / "calibration.json"
+    if calibration is None and own.is_file():
+        optics = Optics.of(Calibration.read(own), own)
+    else:
+        files = next(files for files in pictures.values() if files)
+        size_px = size_of_first(tuple(files.values()))
+        optics = find_optics(folder, size_px, stereo="right" in pictures, given=calibration)
+    if "right" in pictures and optics.calibration.baseline_m is None:
+        raise PomonaError(f"{own}: baseline_m: missing, expected metres: there is a right/")
+    return optics
+
+
+def _trajectory(path: Path, numbers: tuple[int, ...], optics: Optics) -> Trajectory | None:
     if not path.is_file():
         return None
     times_s, session_from_camera = read_tum(path)
     if len(times_s) != len(numbers):
         raise PomonaError(f"{path}: found {len(times_s)} poses, expected one for each of the {len(numbers)} frames")
+    session_from_camera[:, :3, :3] = session_from_camera[:, :3, :3] @ optics.rectified_from_left.T
     return Trajectory(np.array(numbers, np.int64), times_s, session_from_camera)
 
 

@@ -7,27 +7,59 @@ from pathlib import Path
 from pomona.errors import PomonaError
 from pomona.recording.frame import Recording
 
-__all__ = ["open_recording"]
+__all__ = ["ACCEPTED", "open_recording"]
+
+ACCEPTED = (
+    "a recording folder (left/ or depth/ with calibration.json), a KITTI, TUM RGB-D or EuRoC folder, "
+    "a side-by-side video, or a folder with left.mp4 and right.mp4"
+)
+"""For messages and the help."""
 
 
-def open_recording(path: str | Path) -> Recording:
+def open_recording(path: str | Path, *, calibration: str | Path | None = None) -> Recording:
     """Open a recording and check what can be checked without decoding it.
 
     Parameters
     ----------
     path : str or Path
-        A recording folder: `calibration.json` beside `depth/` or `left/`.
+        One of `ACCEPTED`; the kind is recognised by its files.
+    calibration : str or Path, optional
+        File or folder with the calibration, where it does not lie beside the pictures.
 
     Raises
     ------
     PomonaError
         When there is no recording at `path`, or it is not complete.
     """
-    folder = Path(path)
-    if not folder.exists():
-        raise PomonaError(f"{path}: not found, expected a recording folder")
-    if not folder.is_dir():
-        raise PomonaError(f"{path}: found a file, expected a recording folder with calibration.json and depth/")
+    place, given = Path(path), None if calibration is None else Path(calibration)
+    if not place.exists():
+        raise PomonaError(f"{path}: not found, expected {ACCEPTED}")
+    from pomona.recording.video import VIDEO_SUFFIXES, left_and_right, open_video
+
+    if not place.is_dir():
+        if place.suffix.lower() not in VIDEO_SUFFIXES:
+            raise PomonaError(f"{path}: found a file, expected {ACCEPTED}")
+        return open_video(place, given)
+    return _open_layout(place, given) or (open_video(place, given) if left_and_right(place) else _refuse(place))
+
+
+def _open_layout(folder: Path, calibration: Path | None) -> Recording | None:
+    """Open a folder of pictures, None where it is none."""
+    from pomona.recording import euroc, kitti, tum_rgbd
     from pomona.recording.folder import FolderRecording
 
-    return FolderRecording.open(folder)
+    if euroc.recognises(folder):
+        return euroc.open_euroc(folder, calibration)
+    if tum_rgbd.recognises(folder):
+        return tum_rgbd.open_tum_rgbd(folder, calibration)
+    if kitti.recognises(folder):
+        return kitti.open_kitti(folder, calibration)
+    if any((folder / kind).is_dir() for kind in ("left", "right", "depth")):
+        return FolderRecording.open(folder, calibration)
+    return None
+
+
+def _refuse(folder: Path) -> Recording:
+    inside = sorted(entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if not entry.name.startswith("."))
+    found = ", ".join(inside[:5]) + (" ..." if len(inside) > 5 else "") or "nothing"
+    raise PomonaError(f"{folder}: no pictures found: found {found}, expected {ACCEPTED}")

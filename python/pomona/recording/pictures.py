@@ -11,7 +11,35 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 
-__all__ = ["read_colour", "read_depth"]
+__all__ = ["UnreadablePictureError", "numbered_pictures", "picture_size", "read_colour", "read_depth"]
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+class UnreadablePictureError(PomonaError):
+    """One picture is missing, cut off or corrupt; the rest of the recording may be well."""
+
+
+def numbered_pictures(folder: Path) -> dict[int, Path]:
+    """Map frame numbers to picture files in ascending order; names are numbers, as 0007.png."""
+    found: dict[int, Path] = {}
+    for file in sorted(folder.iterdir()):
+        if file.name.startswith(".") or file.suffix.lower() not in PICTURE_SUFFIXES:
+            continue
+        if not (file.stem.isascii() and file.stem.isdecimal()):
+            raise PomonaError(f"{file}: found the name {file.stem!r}, expected a frame number, for example 0007.png")
+        if int(file.stem) in found:
+            raise PomonaError(f"{file}: frame {int(file.stem)} is there twice, also as {found[int(file.stem)].name}")
+        found[int(file.stem)] = file
+    return dict(sorted(found.items()))
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height of a picture file."""
+    import cv2
+
+    height, width = _decode(path, cv2.IMREAD_UNCHANGED).shape[:2]
+    return width, height
 
 
 def read_colour(path: Path, calibration: Calibration) -> NDArray[np.uint8]:
@@ -44,12 +72,12 @@ def _decode(path: Path, flags: int) -> NDArray[Any]:
     try:
         encoded = np.fromfile(path, np.uint8)
     except OSError as error:
-        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UnreadablePictureError(f"{path}: cannot be read: {error.strerror}") from None
     if path.suffix.lower() == ".png" and not _png_ends(encoded):
-        raise PomonaError(f"{path}: the PNG is cut off or not a PNG")
+        raise UnreadablePictureError(f"{path}: the PNG is cut off or not a PNG")
     picture = cv2.imdecode(encoded, flags) if len(encoded) else None
     if picture is None:
-        raise PomonaError(f"{path}: not a picture, or a corrupt one")
+        raise UnreadablePictureError(f"{path}: not a picture, or a corrupt one")
     return np.asarray(picture)
 
 
@@ -61,5 +89,5 @@ def _png_ends(encoded: NDArray[np.uint8]) -> bool:
 def _require_size(path: Path, picture: NDArray[Any], calibration: Calibration) -> None:
     height, width = picture.shape[:2]
     if (width, height) != calibration.size_px:
-        expected = f"{calibration.width}x{calibration.height} as in calibration.json"
+        expected = f"{calibration.width}x{calibration.height} as in the calibration"
         raise PomonaError(f"{path}: found {width}x{height} pixels, expected {expected}")

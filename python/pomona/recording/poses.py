@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["read_tum"]
+__all__ = ["read_tum", "transforms"]
 
 UNIT_TOLERANCE = 1e-2
 """Quaternions are written with few digits; one that is 1 % off unit length is something else."""
@@ -30,10 +30,15 @@ def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if (np.diff(table[:, 0]) <= 0).any():
         late = int(np.argmax(np.diff(table[:, 0]) <= 0)) + 1
         raise PomonaError(f"{path}: pose {late + 1}: time {table[late, 0]:g} s does not come after the one before")
-    poses = np.tile(np.eye(4), (len(table), 1, 1))
-    poses[:, :3, :3] = _rotations(table[:, 4:])
-    poses[:, :3, 3] = table[:, 1:4]
-    return table[:, 0], poses
+    return table[:, 0], transforms(table[:, 4:], table[:, 1:4])
+
+
+def transforms(quaternions: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rigid transforms (F, 4, 4) of (F, 4) quaternions x, y, z, w and (F, 3) positions."""
+    poses = np.tile(np.eye(4), (len(positions), 1, 1))
+    poses[:, :3, :3] = _rotations(quaternions)
+    poses[:, :3, 3] = positions
+    return poses
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:

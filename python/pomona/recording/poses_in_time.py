@@ -1,0 +1,73 @@
+"""Poses at the times of the pictures, between those that a tracking system wrote down."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError, PomonaWarning
+
+__all__ = ["posed_rows", "poses_at"]
+
+LONGEST_GAP_S = 0.1
+"""Over a longer gap a hand-held camera does not move evenly."""
+
+
+def poses_at(
+    times_s: NDArray[np.float64], known_s: NDArray[np.float64], known: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Interpolate poses: positions linearly, rotations along the shortest arc.
+
+    Parameters
+    ----------
+    times_s : (F,) float64
+        When poses are wanted.
+    known_s, known : (K,) and (K, 4, 4) float64
+        Poses and their times, ascending.
+
+    Returns
+    -------
+    poses : (F, 4, 4) float64
+        Of the rows that have one; the identity elsewhere.
+    has_pose : (F,) bool
+        False outside the known times, and inside gaps over `LONGEST_GAP_S`.
+    """
+    from scipy.spatial.transform import Rotation, Slerp
+
+    poses = np.tile(np.eye(4), (len(times_s), 1, 1))
+    if len(known_s) == 0:
+        return poses, np.zeros(len(times_s), bool)
+    after = np.searchsorted(known_s, times_s).clip(0, len(known_s) - 1)
+    before = np.where(known_s[after] == times_s, after, after - 1).clip(0)
+    has_pose = (known_s[before] <= times_s) & (times_s <= known_s[after])
+    has_pose &= known_s[after] - known_s[before] <= LONGEST_GAP_S
+    wanted_s = times_s[has_pose]
+    if len(known_s) == 1:
+        poses[has_pose] = known[0]
+    elif len(wanted_s):
+        poses[has_pose, :3, :3] = Slerp(known_s, Rotation.from_matrix(known[:, :3, :3]))(wanted_s).as_matrix()
+        for axis in range(3):
+            poses[has_pose, axis, 3] = np.interp(wanted_s, known_s, known[:, axis, 3])
+    return poses, has_pose
+
+
+def posed_rows(path: Path, has_pose: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows that have a pose; says how many have none.
+
+    Raises
+    ------
+    PomonaError
+        When none has.
+    """
+    missing = int((~has_pose).sum())
+    if missing == len(has_pose):
+        raise PomonaError(f"{path}: found no pose at the time of any picture, expected the same clock")
+    if missing:
+        message = (
+            f"{path}: {missing} of {len(has_pose)} frames have no pose within {LONGEST_GAP_S:g} s and are left out"
+        )
+        warnings.warn(message, PomonaWarning, stacklevel=4)
+    return np.flatnonzero(has_pose)

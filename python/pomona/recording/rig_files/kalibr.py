@@ -1,0 +1,46 @@
+"""Kalibr's camchain: `cam0`, `cam1` with `T_cn_cnm1`, the place of cam0 in cam1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pomona.errors import PomonaError
+from pomona.recording.rig import Camera, Rig, camera_matrix
+from pomona.recording.rig_files.fields import array_of, distortion_of
+from pomona.recording.rig_files.yaml_subset import read_documents
+
+__all__ = ["pinhole", "read", "recognises"]
+
+
+def recognises(fields: Mapping[str, Any]) -> bool:
+    """Whether a YAML mapping is a camchain."""
+    return isinstance(fields.get("cam0"), Mapping) and "intrinsics" in fields["cam0"]
+
+
+def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
+    """Read cam0 as the left camera and cam1 as the right one."""
+    path = paths[0]
+    chain = read_documents(path)[0]
+    left = pinhole(f"{path}: cam0", chain["cam0"], "distortion_coeffs")
+    if not isinstance(chain.get("cam1"), Mapping):
+        return Rig((path,), left)
+    right = pinhole(f"{path}: cam1", chain["cam1"], "distortion_coeffs")
+    if right.fisheye != left.fisheye:
+        raise PomonaError(f"{path}: found a fisheye beside another lens, expected two of one kind")
+    return Rig((path,), left, right, array_of(f"{path}: cam1", chain["cam1"], "T_cn_cnm1", (4, 4)))
+
+
+def pinhole(where: str, fields: Mapping[str, Any], coefficients: str) -> Camera:
+    """Read a pinhole as Kalibr and EuRoC write it: intrinsics fx fy cx cy, distortion, resolution."""
+    if fields.get("camera_model", "pinhole") != "pinhole":
+        raise PomonaError(f"{where}: camera_model: found {fields['camera_model']!r}, expected 'pinhole'")
+    fx, fy, cx, cy = array_of(where, fields, "intrinsics", (4,)).tolist()
+    model = fields.get("distortion_model")
+    values = array_of(where, fields, coefficients, (-1,)) if coefficients in fields else np.zeros(0)
+    distortion, fisheye = distortion_of(where, model, values)
+    width, height = array_of(where, fields, "resolution", (2,)).astype(int).tolist()
+    return Camera(camera_matrix(fx, fy, cx, cy), distortion, fisheye, (width, height))

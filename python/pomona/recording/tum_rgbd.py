@@ -1,0 +1,110 @@
+"""TUM's RGB-D layout: `rgb.txt` and `depth.txt` list pictures by time, `groundtruth.txt` the poses."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.listed import ListedRecording
+from pomona.recording.poses import read_tum
+from pomona.recording.poses_in_time import posed_rows, poses_at
+from pomona.recording.rectified_pictures import size_of_first
+from pomona.recording.rig_files import find_optics
+from pomona.trajectory import Trajectory
+
+__all__ = ["open_tum_rgbd", "recognises"]
+
+FARTHEST_S = 0.02
+"""Colour and depth that are farther apart in time are not of one instant: TUM's own tools take 20 ms too."""
+
+DEPTH_UNIT_M = 1 / 5000
+"""Of the layout's depth pictures, where the calibration does not say another."""
+
+
+def recognises(folder: Path) -> bool:
+    """Whether a folder has this layout."""
+    return (folder / "depth.txt").is_file() and (folder / "rgb.txt").is_file()
+
+
+def open_tum_rgbd(folder: Path, calibration: Path | None = None) -> ListedRecording:
+    """Open a folder; a frame's number is its row in `rgb.txt`, from 0.
+
+    Raises
+    ------
+    PomonaError
+        When lists, calibration or poses are missing or do not fit together.
+    """
+    colour_s, colour = _list(folder / "rgb.txt")
+    depth_s, depth = _list(folder / "depth.txt")
+    rows = _associated(folder, colour_s, depth_s)
+    optics = find_optics(folder, size_of_first(colour), stereo=False, given=calibration, depth_unit_m=DEPTH_UNIT_M)
+    listing, poses = [folder / "rgb.txt", folder / "depth.txt"], None
+    truth = folder / "groundtruth.txt"
+    if truth.is_file():
+        poses, has_pose = poses_at(colour_s[rows[:, 0]], *read_tum(truth))
+        posed = posed_rows(truth, has_pose)
+        rows, poses = rows[posed], poses[posed]
+        listing.append(truth)
+    times_s = colour_s[rows[:, 0]]
+    return ListedRecording(
+        path=folder,
+        kind="TUM RGB-D folder",
+        optics=optics,
+        numbers=tuple(rows[:, 0].tolist()),
+        times_s=times_s,
+        pictures={"left": tuple(colour[row] for row in rows[:, 0]), "depth": tuple(depth[row] for row in rows[:, 1])},
+        trajectory=None if poses is None else Trajectory(rows[:, 0], times_s, poses),
+        listing=tuple(listing),
+    )
+
+
+def _list(path: Path) -> tuple[NDArray[np.float64], tuple[Path, ...]]:
+    """Read lines of `time file`; `#` starts a comment."""
+    times_s: list[float] = []
+    files: list[Path] = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError:
+        raise PomonaError(f"{path}: not text, expected lines of time and file") from None
+    for number, line in enumerate(lines, start=1):
+        words = line.partition("#")[0].split(maxsplit=1)
+        if not words:
+            continue
+        try:
+            time_s, file = float(words[0]), words[1].strip()
+        except (ValueError, IndexError):
+            raise PomonaError(f"{path}: line {number}: found {line[:40]!r}, expected a time and a file") from None
+        if not np.isfinite(time_s) or (times_s and time_s <= times_s[-1]):
+            before = f"{times_s[-1]:.6f} s" if times_s else "anything"
+            raise PomonaError(f"{path}: line {number}: time {time_s:.6f} s does not come after {before}")
+        times_s.append(time_s)
+        files.append(path.parent / file)
+    return np.array(times_s), tuple(files)
+
+
+def _associated(folder: Path, colour_s: NDArray[np.float64], depth_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rows (colour, depth) of pictures that are each other's nearest in time; says how many colour ones are left."""
+    if not (len(colour_s) and len(depth_s)):
+        raise PomonaError(f"{folder}: found {len(colour_s)} pictures in rgb.txt and {len(depth_s)} in depth.txt")
+    nearest_depth, nearest_colour = _nearest(colour_s, depth_s), _nearest(depth_s, colour_s)
+    rows = np.arange(len(colour_s))
+    mutual = nearest_colour[nearest_depth] == rows
+    near = np.abs(depth_s[nearest_depth] - colour_s) <= FARTHEST_S
+    kept = rows[mutual & near]
+    if len(kept) == 0:
+        raise PomonaError(f"{folder}: found no colour and depth within {FARTHEST_S:g} s, expected one clock")
+    if len(kept) < len(rows):
+        left_out = f"{len(rows) - len(kept)} of {len(rows)} colour pictures"
+        message = f"{folder}: {left_out} have no depth within {FARTHEST_S:g} s and are left out"
+        warnings.warn(message, PomonaWarning, stacklevel=3)
+    return np.stack([kept, nearest_depth[kept]], axis=1)
+
+
+def _nearest(of_s: NDArray[np.float64], among_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    after = np.searchsorted(among_s, of_s).clip(0, len(among_s) - 1)
+    before = (after - 1).clip(0)
+    return np.where(np.abs(among_s[before] - of_s) <= np.abs(among_s[after] - of_s), before, after)

@@ -1,0 +1,159 @@
+"""Stereo video: one file with left and right side by side, or two files; decoded frame by frame through PyAV."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.recording.calibration import Calibration
+from pomona.recording.description import describe
+from pomona.recording.frame import Frame
+from pomona.recording.rectification import Optics
+from pomona.recording.rig_files import find_optics
+from pomona.recording.video_file import VideoFile, VideoPicture
+
+__all__ = ["VIDEO_SUFFIXES", "VideoRecording", "left_and_right", "open_video"]
+
+VIDEO_SUFFIXES = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".ts", ".m4v")
+
+
+@dataclass(frozen=True, eq=False)
+class VideoRecording:
+    """One or two video files; see `Recording` for what it gives.
+
+    Attributes
+    ----------
+    left, right : VideoFile
+        The same file when the pictures are side by side.
+    """
+
+    path: Path
+    optics: Optics
+    left: VideoFile
+    right: VideoFile
+
+    trajectory = None
+
+    @property
+    def side_by_side(self) -> bool:
+        """Whether one file holds both pictures."""
+        return self.left is self.right
+
+    @property
+    def calibration(self) -> Calibration:
+        """The rectified left camera."""
+        return self.optics.calibration
+
+    @property
+    def name(self) -> str:
+        """The file's or folder's name."""
+        return self.path.resolve().stem if self.path.is_file() else self.path.resolve().name
+
+    @property
+    def date(self) -> str | None:
+        """When the camera says it was made."""
+        return self.left.created
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """From 0, in order of time."""
+        return tuple(range(len(self)))
+
+    def __len__(self) -> int:
+        return len(self.left.times_s)
+
+    def frames(self) -> Iterator[Frame]:
+        """Decode frame by frame; a frame that cannot be decoded says so when its pictures are asked for."""
+        width = self.calibration.width
+        left_of, right_of = (slice(0, width), slice(width, 2 * width)) if self.side_by_side else (slice(None),) * 2
+        lefts = self.left.pictures()
+        pairs = (
+            ((picture, picture) for picture in lefts)
+            if self.side_by_side
+            else zip(lefts, self.right.pictures(), strict=True)
+        )
+        for row, (left, right) in enumerate(pairs):
+            yield Frame(
+                number=row,
+                time_s=float(self.left.times_s[row]),
+                read_left=functools.partial(_columns, left, left_of, self.optics.left),
+                read_right=functools.partial(_columns, right, right_of, self.optics.right),
+            )
+
+    def inputs(self) -> Iterator[Path]:
+        """Give the videos and the calibration."""
+        yield from dict.fromkeys((self.left.path, self.right.path, *self.optics.inputs))
+
+    def description(self) -> dict[str, Any]:
+        """Say what was found."""
+        kind = "side-by-side video" if self.side_by_side else "left and right video"
+        counts = {"left": len(self), "right": len(self)}
+        return describe(self, kind, self.left.times_s.tolist(), counts, detections=False)
+
+
+def _columns(
+    picture: VideoPicture, columns: slice, rectify: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
+    return rectify(np.ascontiguousarray(picture.read()[:, columns]))
+
+
+def left_and_right(folder: Path) -> tuple[Path, ...]:
+    """Videos of a folder: (left, right) by name, else all there are."""
+    videos = tuple(sorted(file for file in folder.iterdir() if file.suffix.lower() in VIDEO_SUFFIXES))
+    stems = {file.stem.lower(): file for file in videos}
+    return (stems["left"], stems["right"]) if len(videos) == 2 and {"left", "right"} <= stems.keys() else videos
+
+
+def open_video(path: Path, calibration: Path | None = None) -> VideoRecording:
+    """Open a file that is side by side, or a folder with `left.mp4` and `right.mp4` or one file side by side.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    calibration : Path, optional
+        File or folder; else the one in the folder of the videos.
+
+    Raises
+    ------
+    PomonaError
+        When PyAV, a video or the calibration is missing, the videos differ in size, length or time, or times go back.
+    """
+    files = (path,) if path.is_file() else left_and_right(path)
+    place = path.parent if path.is_file() else path
+    if len(files) == 1:
+        both = VideoFile.open(files[0])
+        if both.size_px[0] % 2:
+            raise PomonaError(f"{path}: found a width of {both.size_px[0]}, expected left and right side by side")
+        left, right, size_px = both, both, (both.size_px[0] // 2, both.size_px[1])
+    elif len(files) == 2 and files[0].stem.lower() == "left":
+        left, right = (VideoFile.open(file) for file in files)
+        size_px = left.size_px
+        _require_pair(left, right)
+    else:
+        raise PomonaError(f"{path}: found {len(files)} videos, expected left and right, or one side by side")
+    return VideoRecording(path, find_optics(place, size_px, stereo=True, given=calibration), left, right)
+
+
+def _require_pair(left: VideoFile, right: VideoFile) -> None:
+    where = f"{left.path} and {right.path.name}"
+    if left.size_px != right.size_px:
+        sizes = " and ".join("{}x{}".format(*video.size_px) for video in (left, right))
+        raise PomonaError(f"{where}: found {sizes} pixels, expected equal sizes")
+    if len(left.times_s) != len(right.times_s):
+        counts = f"{len(left.times_s)} and {len(right.times_s)}"
+        raise PomonaError(f"{where}: found {counts} frames, expected equal lengths")
+    apart_s = np.abs((left.times_s - left.times_s[0]) - (right.times_s - right.times_s[0]))
+    half_s = float(np.median(np.diff(left.times_s))) / 2 if len(left.times_s) > 1 else np.inf
+    row = int(np.argmax(apart_s))
+    if apart_s[row] > half_s:
+        raise PomonaError(
+            f"{where}: frame {row} was taken {apart_s[row]:.3f} s apart, expected under half a frame: {half_s:.3f} s"
+        )

@@ -1,0 +1,187 @@
+"""One video file: its times at once, its pictures one after the other."""
+
+from __future__ import annotations
+
+import datetime
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.pictures import UnreadablePictureError
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.frame import VideoFrame
+
+__all__ = ["VideoFile", "VideoPicture"]
+
+CUT_OFF_FRAMES = 2
+"""A header may promise the length in rounded time: a video is cut off when more than this is missing."""
+
+
+@dataclass(eq=False)
+class VideoPicture:
+    """A picture of a video, turned into BGR once, when it is first asked for."""
+
+    where: str
+    frame: VideoFrame | None
+    _bgr: NDArray[np.uint8] | None = None
+
+    def read(self) -> NDArray[np.uint8]:
+        """Give (H, W, 3) uint8, BGR."""
+        if self.frame is None:
+            raise UnreadablePictureError(f"{self.where}: the picture is corrupt")
+        if self._bgr is None:
+            self._bgr = np.asarray(self.frame.to_ndarray(format="bgr24"), np.uint8)
+        return self._bgr
+
+
+@dataclass(frozen=True, eq=False)
+class VideoFile:
+    """A video whose packets were listed, and not decoded.
+
+    Attributes
+    ----------
+    stamps : tuple of int
+        Presentation times in the file's own unit, ascending: exact, one for each picture.
+    times_s : (F,) float64
+        The same in seconds.
+    created : str or None
+        When it was made, where the file says it.
+    """
+
+    path: Path
+    size_px: tuple[int, int]
+    stamps: tuple[int, ...]
+    times_s: NDArray[np.float64]
+    created: str | None
+
+    @classmethod
+    def open(cls, path: Path) -> VideoFile:
+        """Read the header and the packets' times.
+
+        Raises
+        ------
+        PomonaError
+            When PyAV is not installed, the file is no video, holds no picture, or its times go back.
+        """
+        with _opened(path) as container:
+            stream = container.streams.video[0]
+            stamps = _stamps(path, container)
+            seconds = float(stream.time_base or 0)
+            times_s = np.array(stamps, np.float64) * seconds
+            _warn_when_cut_off(path, container, times_s)
+            return cls(path, (stream.width, stream.height), stamps, times_s, _created(container))
+
+    def pictures(self) -> Iterator[VideoPicture]:
+        """Decode picture by picture, one for each time; those that cannot be decoded raise when they are read."""
+        rows = {stamp: row for row, stamp in enumerate(self.stamps)}
+        upcoming = 0
+        with _opened(self.path) as container:
+            for frame in _decoded(container):
+                row = rows.get(frame.pts if frame.pts is not None else -1, -1)
+                if row < upcoming:
+                    continue
+                yield from (self._picture(missing, None) for missing in range(upcoming, row))
+                yield self._picture(row, None if frame.is_corrupt else frame)
+                upcoming = row + 1
+        yield from (self._picture(missing, None) for missing in range(upcoming, len(self.stamps)))
+
+    def _picture(self, row: int, frame: VideoFrame | None) -> VideoPicture:
+        return VideoPicture(f"{self.path}: frame {row} at {self.times_s[row]:.3f} s", frame)
+
+
+def _opened(path: Path) -> InputContainer:
+    try:
+        import av
+    except ImportError:
+        raise PomonaError(f"{path}: a video needs PyAV, which is not installed: pip install 'pomona[video]'") from None
+    try:
+        container = av.open(str(path))
+    except (av.error.FFmpegError, OSError) as error:
+        what = getattr(error, "strerror", None) or str(error)
+        raise PomonaError(f"{path}: not a video, or one that was cut off before its index ({what})") from None
+    if not container.streams.video:
+        container.close()
+        raise PomonaError(f"{path}: found no pictures in it, expected a video")
+    return container
+
+
+def _stamps(path: Path, container: InputContainer) -> tuple[int, ...]:
+    """Presentation times of all packets, ascending; packets come in the order of decoding."""
+    import av
+
+    stamps: list[int] = []
+    decoded_at: list[int] = []
+    packets = container.demux(container.streams.video[0])
+    while True:
+        try:
+            packet = next(packets, None)
+        except av.error.FFmpegError:
+            break
+        if packet is None:
+            break
+        stamp = packet.pts if packet.pts is not None else packet.dts
+        if packet.size and not packet.is_discard and stamp is not None:
+            stamps.append(stamp)
+            decoded_at.append(packet.dts if packet.dts is not None else stamp)
+    if not stamps:
+        raise PomonaError(f"{path}: found no picture with a time, expected a video that is not cut off")
+    back = np.flatnonzero(np.diff(decoded_at) < 0)
+    if len(back):
+        unit_s = float(container.streams.video[0].time_base or 0)
+        later, earlier = (decoded_at[int(back[0]) + step] * unit_s for step in (0, 1))
+        raise PomonaError(f"{path}: frame {int(back[0]) + 1}: time goes back from {later:.3f} s to {earlier:.3f} s")
+    if len(set(stamps)) < len(stamps):
+        raise PomonaError(f"{path}: found two frames of the same time, expected ascending times")
+    return tuple(sorted(stamps))
+
+
+def _decoded(container: InputContainer) -> Iterator[Any]:
+    """Pictures in order of time; packets that the decoder refuses are passed over."""
+    import av
+
+    stream = container.streams.video[0]
+    stream.thread_type = "AUTO"
+    # Without it H.264 fills what is lost from other pictures, and does not say so.
+    stream.codec_context.options = {"err_detect": "explode"}
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+        except av.error.FFmpegError:
+            return
+        if packet is None:
+            return
+        try:
+            yield from packet.decode()
+        except av.error.FFmpegError:
+            continue
+
+
+def _warn_when_cut_off(path: Path, container: InputContainer, times_s: NDArray[np.float64]) -> None:
+    """Compare with the length that the header promises."""
+    found = len(times_s)
+    promises = [int(container.streams.video[0].frames or 0)]
+    if container.duration and found > 1:
+        end_s = ((container.start_time or 0) + container.duration) / 1e6
+        promises.append(found - 1 + round((end_s - times_s[-1]) / float(np.median(np.diff(times_s)))))
+    # AVI counts ticks of its clock as frames, so the smaller promise is the true one.
+    promised = min((promise for promise in promises if promise), default=0)
+    if promised - found > CUT_OFF_FRAMES:
+        message = f"{path}: cut off: found {found} of {promised} frames; what is there is used"
+        warnings.warn(message, PomonaWarning, stacklevel=4)
+
+
+def _created(container: InputContainer) -> str | None:
+    noted = container.metadata.get("creation_time")
+    try:
+        return None if noted is None else datetime.datetime.fromisoformat(noted).replace(tzinfo=None).isoformat()
+    except ValueError:
+        return None
