@@ -6,7 +6,7 @@ use super::growth::{Overlap, grow, settle};
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::outline;
-use super::pose::Pose;
+use super::pose::{Moments, Pose};
 use super::search::{Effort, round};
 use super::seeds::SeedIndex;
 use super::size::Sizes;
@@ -29,6 +29,9 @@ const SHARP: f64 = 0.18;
 
 /// Rounds of the search: seeds per fruit and candidates that are refined.
 const ROUNDS: [(u64, usize); 3] = [(1, 32), (4, 48), (u64::MAX, 64)];
+
+/// Small clouds try at least this many seeds: all of them in a cloud of twelve.
+const FEW_SEEDS: u64 = 1500;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
@@ -79,6 +82,9 @@ pub(crate) fn search(
     let (findings, stages) = search.run();
     search.answer(findings, map, query, stages)
 }
+
+/// Fruits within this many standard deviations of one line fix no turn about it.
+const FLAT: f64 = 3.0;
 
 /// Times that turned starts are tried.
 const POLISHES: usize = 3;
@@ -153,12 +159,13 @@ impl<'a> Search<'a> {
     /// Rounds of seeds until a pose is accepted, then the outline.
     fn run(&self) -> (Vec<Finding>, Stages) {
         let mut effort = Effort::default();
+        let last = self.config.seeds_per_fruit.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
         let mut turn = 0;
         let mut best: Option<f64> = None;
         let mut findings = Vec::new();
         let (mut refined, mut grown) = (0, 0);
         for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
-            let end = turns.min(self.config.seeds_per_fruit);
+            let end = turns.min(last);
             let admits = |pose: &Pose| self.admits(pose);
             let (hypotheses, spent) = round(&self.query, self.map, self.seeds, &self.model, &admits, turn..end, keep);
             turn = end;
@@ -169,7 +176,7 @@ impl<'a> Search<'a> {
             for finding in &findings {
                 best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
             }
-            findings.retain(|finding| finding.overlap.log_odds > threshold);
+            findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
             for finding in &mut findings {
                 self.polish(finding);
             }
@@ -177,7 +184,8 @@ impl<'a> Search<'a> {
                 break;
             }
             // After the first round, before the long ones: what shows the same trees is found here at any noise.
-            if let Some(found) = (index == 0).then(|| self.by_outline()).flatten() {
+            let outline = (index == 0).then(|| self.by_outline()).flatten();
+            if let Some(found) = outline.filter(|found| self.turns_are_fixed(found)) {
                 findings.push(found);
                 break;
             }
@@ -233,6 +241,23 @@ impl<'a> Search<'a> {
             })
             .count();
         2 * same > near.len()
+    }
+
+    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
+    fn turns_are_fixed(&self, finding: &Finding) -> bool {
+        let mut moments = Moments::default();
+        for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
+            if let Some(at) = prediction {
+                moments.add(p, &at.place, 1.0);
+            }
+        }
+        if moments.weight <= 0.0 {
+            return false;
+        }
+        let mut spread = moments.spread().symmetric_eigenvalues();
+        spread.as_mut_slice().sort_by(f64::total_cmp);
+        let noise = finding.overlap.sigma / finding.overlap.pose.scale;
+        spread[1] > FLAT * FLAT * noise * noise
     }
 
     /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.

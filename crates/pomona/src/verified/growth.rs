@@ -5,7 +5,7 @@
 //! where pairs are few. What the patches leave over is smoothed between neighbouring fruits, in the measure in which
 //! neighbours' residuals agree. Growth goes from cell to neighbouring cell and stops where the evidence turns.
 
-use super::hypothesis::{GATE, Hypothesis, Model};
+use super::hypothesis::{GATE, Hypothesis, Model, PRIOR_FREEDOMS, gaussian};
 use super::landscape::{CellHasher, Landscape};
 use super::pose::{Moments, Pose};
 use nalgebra::Vector3;
@@ -64,6 +64,7 @@ struct Growth<'a> {
     map: &'a Landscape,
     model: Model,
     cells: Vec<Cell>,
+    index: CellIndex,
     edge: f64,
     pose: Pose,
     sigma: f64,
@@ -80,6 +81,8 @@ struct Growth<'a> {
     widening: f64,
     /// Patches follow the common pose.
     rigid: bool,
+    /// Degrees of freedom of the expected noise.
+    freedoms: f64,
 }
 
 /// The first rounds look further than the noise.
@@ -136,7 +139,7 @@ const WHOLE_ROUNDS: usize = 4;
 impl<'a> Growth<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Self {
         let edge = CELL * query.spacing;
-        let mut cells = cells_of(query, edge, &seed.pose);
+        let (mut cells, index) = cells_of(query, edge, &seed.pose);
         for cell in &mut cells {
             cell.reached = (cell.centre - seed.place).norm() < super::search::REACH * query.spacing;
         }
@@ -150,6 +153,7 @@ impl<'a> Growth<'a> {
             map,
             model: *model,
             cells,
+            index,
             edge,
             pose: seed.pose,
             sigma: seed.sigma,
@@ -161,6 +165,7 @@ impl<'a> Growth<'a> {
             whole: false,
             widening: 1.0,
             rigid: false,
+            freedoms: PRIOR_FREEDOMS,
         }
     }
 
@@ -311,7 +316,7 @@ impl<'a> Growth<'a> {
         // Residuals about the patches hold noise and shared displacement; the gate cuts 3 % off.
         let mean = squares / (3.0 * weights - 6.0).max(weights);
         let prior = self.model.sigma * self.model.sigma;
-        let noise = (12.0 * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean)) / (12.0 + 3.0 * weights);
+        let noise = (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean)) / (self.freedoms + 3.0 * weights);
         self.sigma = noise.sqrt();
     }
 
@@ -343,15 +348,57 @@ impl<'a> Growth<'a> {
                 && cell.around.iter().map(|a| a.1 * self.cells[a.0 as usize].log_odds).sum::<f64>() > CONVINCING
     }
 
-    /// Evidence of the cells that growth reached.
+    /// Evidence of the cells that growth reached, both sides counted (see `hypothesis::other_side`), under the share of
+    /// fruits seen again that suits it best.
     fn log_odds(&self) -> f64 {
-        self.cells.iter().filter(|cell| cell.reached).map(|cell| cell.log_odds).sum()
+        let here: Vec<(f64, f64)> = self
+            .predictions
+            .iter()
+            .zip(&self.partners)
+            .filter_map(|(prediction, partner)| prediction.map(|at| (at, partner)))
+            .map(|(at, partner)| {
+                let ratio = partner.map_or(f64::NAN, |(row, ..)| {
+                    let d2 = (self.map.points[row as usize] - at.place).norm_squared();
+                    gaussian(d2, at.variance) / self.map.density[row as usize]
+                });
+                (ratio, self.map.support(&at.place))
+            })
+            .collect();
+        let there = self.unmatched_map_supports();
+        SHARES_SEEN_AGAIN
+            .iter()
+            .map(|share| {
+                let of_query: f64 = here
+                    .iter()
+                    .map(|&(ratio, support)| {
+                        let odds = if ratio.is_nan() { 1.0 - share * support } else { 1.0 - share + share * ratio };
+                        odds.ln() + share * support
+                    })
+                    .sum();
+                of_query + there.iter().map(|support| (1.0 - share * support).ln()).sum::<f64>()
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// For the fruits of the map without a partner that lie in the reached cells: how surely the query looked there.
+    fn unmatched_map_supports(&self) -> Vec<f64> {
+        self
+            .map
+            .points
+            .iter()
+            .zip(&self.owner)
+            .filter(|(_, owner)| owner.is_none())
+            .map(|(p, _)| self.pose.apply_inverse(p))
+            .filter(|place| self.index.get(&key_of(place, self.edge)).is_some_and(|&cell| self.cells[cell].reached))
+            .map(|place| self.query.support(&place))
+            .collect()
     }
 
     /// Looks once at the cells that growth did not reach: a crown may be cut off by a gap without fruits.
     ///
     /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
     fn reach_all(&mut self) {
+        self.freedoms = PAIR_FREEDOMS;
         for cell in self.cells.iter_mut().filter(|cell| !cell.reached) {
             cell.reached = true;
             cell.pose = self.pose;
@@ -383,6 +430,13 @@ impl<'a> Growth<'a> {
     }
 }
 
+/// Shares of fruits seen again that are tried: heavy occlusion to a bare tree.
+const SHARES_SEEN_AGAIN: [f64; 4] = [0.35, 0.55, 0.75, 0.9];
+
+/// Degrees of freedom of the expected noise when pairs are made: few pairs fit themselves more closely than the fruits
+/// that are still to be paired.
+const PAIR_FREEDOMS: f64 = 12.0;
+
 /// Width of the kernel that smooths displacements, in spacings: a branch's reach.
 const SMOOTHING: f64 = 1.0;
 
@@ -401,11 +455,17 @@ fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
     total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
 }
 
-fn cells_of(query: &Landscape, edge: f64, pose: &Pose) -> Vec<Cell> {
-    let mut index: HashMap<[i64; 3], usize, BuildHasherDefault<CellHasher>> = HashMap::default();
+type CellIndex = HashMap<[i64; 3], usize, BuildHasherDefault<CellHasher>>;
+
+fn key_of(p: &Vector3<f64>, edge: f64) -> [i64; 3] {
+    [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
+}
+
+fn cells_of(query: &Landscape, edge: f64, pose: &Pose) -> (Vec<Cell>, CellIndex) {
+    let mut index = CellIndex::default();
     let mut cells: Vec<Cell> = Vec::new();
     for (row, p) in query.points.iter().enumerate() {
-        let key = [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64);
+        let key = key_of(p, edge);
         let at = *index.entry(key).or_insert_with(|| {
             cells.push(Cell {
                 key,
@@ -440,5 +500,5 @@ fn cells_of(query: &Landscape, edge: f64, pose: &Pose) -> Vec<Cell> {
         }
         cells[i].around = around;
     }
-    cells
+    (cells, index)
 }

@@ -26,7 +26,7 @@ impl Model {
         (1.0 - self.detection + self.detection * gaussian(d2, variance) / density).ln()
     }
 
-    /// Log-odds of a fruit without a partner at a place of `support`.
+    /// Log-odds of a fruit without a partner at a place of `support`; of a fruit of either visit.
     #[inline]
     pub(crate) fn miss(&self, support: f64) -> f64 {
         (1.0 - self.detection * support).ln()
@@ -158,6 +158,9 @@ pub(crate) fn refine(
         if moments.weight < 3.5 {
             return answer;
         }
+        if step + 1 == STEPS {
+            log_odds += other_side(query, map, &pose, place, reach, model, scratch);
+        }
         answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
         if step + 1 == STEPS {
             break;
@@ -167,12 +170,36 @@ pub(crate) fn refine(
         freedom = 1.0 / moments.weight;
         inertia = moments.weight * moments.spread().trace() * 2.0 / 3.0;
         if step >= 2 {
-            // Twelve degrees of freedom of prior keep few pairs from shrinking the noise to their own fit.
             let freedoms = (3.0 * moments.weight - 6.0).max(0.0);
-            sigma = ((12.0 * model.sigma * model.sigma + residual) / (12.0 + freedoms)).sqrt();
+            sigma = ((PRIOR_FREEDOMS * model.sigma * model.sigma + residual) / (PRIOR_FREEDOMS + freedoms)).sqrt();
         }
     }
     answer
+}
+
+/// The other half of the evidence: fruits of the map that the query should have seen, and how many pairs were due.
+///
+/// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
+/// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
+/// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
+fn other_side(
+    query: &Landscape,
+    map: &Landscape,
+    pose: &Pose,
+    place: &Vector3<f64>,
+    reach: f64,
+    model: &Model,
+    scratch: &Scratch,
+) -> f64 {
+    let due: f64 =
+        scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>() * model.detection;
+    let mut missing = 0.0;
+    map.tree.within(&super::landscape::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
+        if scratch.owner[row as usize].0 != scratch.stamp {
+            missing += model.miss(query.support(&pose.apply_inverse(&map.points[row as usize])));
+        }
+    });
+    due + missing
 }
 
 /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
@@ -210,3 +237,6 @@ fn pair_up(
         scratch.partners.push(entry);
     }
 }
+
+/// Degrees of freedom of the noise that is expected: they keep few pairs from shrinking the noise to their own fit.
+pub(crate) const PRIOR_FREEDOMS: f64 = 1.0;

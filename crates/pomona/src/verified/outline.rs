@@ -20,6 +20,9 @@ pub(crate) fn hypothesis(
     scale: Scale,
     admits: &impl Fn(&Pose) -> bool,
 ) -> Option<Hypothesis> {
+    if query.len().min(map.len()) < MIN_FRUITS {
+        return None;
+    }
     let ((axes_query, extent_query), (axes_map, extent_map)) = (axes(query)?, axes(map)?);
     let ratio = match scale {
         Scale::Metric => 1.0,
@@ -41,6 +44,9 @@ pub(crate) fn hypothesis(
     let (sigma, log_odds) = sharpest(query, map, &pose);
     (log_odds > threshold(query)).then(|| Hypothesis { pose, log_odds, place: middle(query), sigma })
 }
+
+/// Fewer fruits than this have no outline.
+const MIN_FRUITS: usize = 50;
 
 /// Evidence in nats above which an outline is accepted: five standard deviations of its sum under chance.
 ///

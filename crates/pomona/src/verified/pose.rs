@@ -17,6 +17,12 @@ impl Pose {
         self.rotation * p * self.scale + self.translation
     }
 
+    /// The place in the query that lies at `p` in the map.
+    #[inline]
+    pub(crate) fn apply_inverse(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.tr_mul(&(p - self.translation)) / self.scale
+    }
+
     /// Pose in the clouds' own frames.
     pub(crate) fn to_similarity(self, centre_query: &Vector3<f64>, centre_map: &Vector3<f64>) -> Similarity {
         let mut rotation = Rotation3::from_matrix_unchecked(self.rotation);

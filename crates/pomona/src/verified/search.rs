@@ -120,6 +120,7 @@ fn candidates_of(
 /// Reach of the code search in standard deviations of one axis; see the docs page for the share it finds.
 const RADIUS: f64 = 2.5;
 
+
 /// Seeds whose code has more neighbours in the map than this are passed over.
 const COMMON: usize = 48;
 
