@@ -122,6 +122,7 @@ impl MapIndex {
         map.validate()?;
         config.validate()?;
         let prepared = match method {
+            Method::Verified if map.len() > crate::verified::MAX_FRUITS => return Err(too_many(map.len())),
             Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(&map, scale))),
             Method::Paper if map.len() < config.constellation.k => Prepared::TooFew,
             Method::Paper => Prepared::Paper(Box::new(crate::paper::Prepared::new(&map.positions, &config)?)),
@@ -158,6 +159,7 @@ impl MapIndex {
                 let stages = vec![("query fruits", query.len() as f64), ("map fruits", self.map.len() as f64)];
                 Ok(Match::without_answer(Verdict::TooFew, stages))
             }
+            Prepared::Verified(_) if query.len() > crate::verified::MAX_FRUITS => Err(too_many(query.len())),
             Prepared::Verified(prepared) => {
                 Ok(crate::verified::search(prepared, &self.map, query, request, &self.config.verified))
             }
@@ -182,6 +184,12 @@ impl MapIndex {
         };
         Ok(crate::verified::pairs_under(prepared, &self.map, query, pose, &request, &self.config.verified))
     }
+}
+
+fn too_many(found: usize) -> Error {
+    let expected = crate::verified::MAX_FRUITS;
+    let reason = format!("found {found} fruits in one cloud, the verified method expects at most {expected}");
+    Error::Setting { name: "method", reason }
 }
 
 impl Request {

@@ -7,7 +7,7 @@ use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::outline;
 use super::pose::{Moments, Pose};
-use super::search::{Effort, round};
+use super::search::{Candidate, Effort, refined, round};
 use super::seeds::SeedIndex;
 use super::size::Sizes;
 use crate::cloud::FruitCloud;
@@ -17,6 +17,9 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 const MIN_FRUITS: usize = 5;
+
+/// Fruits of one cloud at the most: the map's seeds take some 10 kB a fruit.
+pub(crate) const MAX_FRUITS: usize = 300_000;
 
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
 const SEED_SIGMA: f64 = 0.075;
@@ -37,7 +40,10 @@ const FEW_SEEDS: u64 = 1500;
 const GROWN: usize = 6;
 
 /// A rival with this share of the best evidence makes the answer ambiguous.
-const RIVAL: f64 = 0.7;
+const RIVAL: f64 = 0.55;
+
+/// Candidates that are refined in search of a rival once a pose is accepted.
+const RIVAL_CANDIDATES: usize = 24;
 
 /// Two hypotheses that put a fruit within this many spacings of one place are the same.
 const SAME: f64 = 0.4;
@@ -79,12 +85,22 @@ pub(crate) fn search(
         return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
     }
     let search = Search::new(prepared, query, request, config);
-    let (findings, stages) = search.run();
+    let (mut findings, mut stages) = search.run();
+    if findings.first().is_some_and(|best| search.fits_better_mirrored(best)) {
+        stages.push(("mirrored", 1.0));
+        findings.clear();
+    }
     search.answer(findings, map, query, stages)
 }
 
 /// Fruits within this many standard deviations of one line fix no turn about it.
 const FLAT: f64 = 3.0;
+
+/// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
+const MIRRORED: f64 = 1.3;
+
+/// A pose that explains this share of the query is no accident of a flat crown.
+const WHOLE: f64 = 0.7;
 
 /// Times that turned starts are tried.
 const POLISHES: usize = 3;
@@ -163,24 +179,27 @@ impl<'a> Search<'a> {
         let mut turn = 0;
         let mut best: Option<f64> = None;
         let mut findings = Vec::new();
-        let (mut refined, mut grown) = (0, 0);
+        let (mut tried, mut grown) = (0, 0);
         for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
             let end = turns.min(last);
             let admits = |pose: &Pose| self.admits(pose);
-            let (hypotheses, spent) = round(&self.query, self.map, self.seeds, &self.model, &admits, turn..end, keep);
+            let (hypotheses, rest, spent) =
+                round(&self.query, self.map, self.seeds, &self.model, &admits, turn..end, keep);
             turn = end;
             effort = effort + spent;
-            refined += hypotheses.len();
+            tried += hypotheses.len();
             let threshold = self.config.threshold(effort.fitted);
             grown += self.grow_distinct(&hypotheses, &mut findings);
             for finding in &findings {
                 best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
             }
             findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
-            for finding in &mut findings {
-                self.polish(finding);
-            }
             if !findings.is_empty() {
+                grown += self.look_for_rivals(&rest, &mut findings);
+                findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
+                for finding in &mut findings {
+                    self.polish(finding);
+                }
                 break;
             }
             // After the first round, before the long ones: what shows the same trees is found here at any noise.
@@ -198,7 +217,7 @@ impl<'a> Search<'a> {
             ("query_codes", effort.codes as f64),
             ("candidates", effort.candidates as f64),
             ("fitted", effort.fitted as f64),
-            ("refined", refined as f64),
+            ("refined", tried as f64),
             ("grown", f64::from(grown)),
             ("threshold_nats", self.config.threshold(effort.fitted)),
             ("best_nats", best.unwrap_or(f64::NAN)),
@@ -214,7 +233,7 @@ impl<'a> Search<'a> {
             if grown as usize == GROWN {
                 break;
             }
-            if findings.iter().any(|finding| self.explains(finding, seed)) {
+            if findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
                 continue;
             }
             let overlap = grow(&self.query, self.map, seed, &self.model);
@@ -224,33 +243,53 @@ impl<'a> Search<'a> {
         grown
     }
 
+    /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
+    /// the true one may have more of the best.
+    fn look_for_rivals(&self, rest: &[Candidate], findings: &mut Vec<Finding>) -> u32 {
+        let others: Vec<Candidate> = rest
+            .iter()
+            .filter(|candidate| {
+                !findings.iter().any(|finding| self.explains(finding, &candidate.place, &candidate.pose))
+            })
+            .take(RIVAL_CANDIDATES)
+            .copied()
+            .collect();
+        self.grow_distinct(&refined(&self.query, self.map, &others, &self.model), findings)
+    }
+
     /// Whether a finding puts the fruits around the seed where the seed puts them.
-    fn explains(&self, finding: &Finding, seed: &Hypothesis) -> bool {
+    fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Pose) -> bool {
         let reach = SAME * self.query.spacing;
         let mut near = Vec::new();
-        self.query.tree.nearest(&super::landscape::single(&seed.place), 8, &mut near);
+        self.query.tree.nearest(&super::landscape::single(place), 8, &mut near);
         let same = near
             .iter()
             .filter(|(row, _)| {
                 let p = self.query.points[*row as usize];
-                let place = match finding.overlap.predictions[*row as usize] {
+                let found = match finding.overlap.predictions[*row as usize] {
                     Some(prediction) => prediction.place,
                     None => finding.seed.pose.apply(&p),
                 };
-                (place - seed.pose.apply(&p)).norm() < reach * seed.pose.scale
+                (found - pose.apply(&p)).norm() < reach * pose.scale
             })
             .count();
         2 * same > near.len()
     }
 
-    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
-    fn turns_are_fixed(&self, finding: &Finding) -> bool {
+    /// Sums over the fruits of the overlap and their predictions.
+    fn overlap_moments(&self, finding: &Finding) -> Moments {
         let mut moments = Moments::default();
         for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
             if let Some(at) = prediction {
                 moments.add(p, &at.place, 1.0);
             }
         }
+        moments
+    }
+
+    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
+    fn turns_are_fixed(&self, finding: &Finding) -> bool {
+        let moments = self.overlap_moments(finding);
         if moments.weight <= 0.0 {
             return false;
         }
@@ -258,6 +297,27 @@ impl<'a> Search<'a> {
         spread.as_mut_slice().sort_by(f64::total_cmp);
         let noise = finding.overlap.sigma / finding.overlap.pose.scale;
         spread[1] > FLAT * FLAT * noise * noise
+    }
+
+    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does.
+    ///
+    /// Where a crown is flat, a mirrored row matches by a half-turn; the rest of the row tells.
+    fn fits_better_mirrored(&self, finding: &Finding) -> bool {
+        let explained = finding.overlap.predictions.iter().flatten().count();
+        if explained as f64 > WHOLE * self.query.len() as f64 {
+            return false;
+        }
+        let moments = self.overlap_moments(finding);
+        let eigen = moments.spread().symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
+        let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
+        let translation = pose.apply(&middle) - rotation * middle * pose.scale;
+        let seed =
+            Hypothesis { pose: Pose { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
+        let mut mirrored = Finding { overlap: grow(&self.query, self.map, &seed, &self.model), seed };
+        self.polish(&mut mirrored);
+        mirrored.overlap.log_odds > MIRRORED * log_odds
     }
 
     /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.

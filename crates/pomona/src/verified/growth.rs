@@ -316,7 +316,8 @@ impl<'a> Growth<'a> {
         // Residuals about the patches hold noise and shared displacement; the gate cuts 3 % off.
         let mean = squares / (3.0 * weights - 6.0).max(weights);
         let prior = self.model.sigma * self.model.sigma;
-        let noise = (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean)) / (self.freedoms + 3.0 * weights);
+        let noise = (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean))
+            / (self.freedoms + 3.0 * weights);
         self.sigma = noise.sqrt();
     }
 
@@ -382,8 +383,7 @@ impl<'a> Growth<'a> {
 
     /// For the fruits of the map without a partner that lie in the reached cells: how surely the query looked there.
     fn unmatched_map_supports(&self) -> Vec<f64> {
-        self
-            .map
+        self.map
             .points
             .iter()
             .zip(&self.owner)

@@ -191,8 +191,8 @@ fn other_side(
     model: &Model,
     scratch: &Scratch,
 ) -> f64 {
-    let due: f64 =
-        scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>() * model.detection;
+    let due: f64 = scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>()
+        * model.detection;
     let mut missing = 0.0;
     map.tree.within(&super::landscape::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
         if scratch.owner[row as usize].0 != scratch.stamp {

@@ -23,4 +23,4 @@ mod size;
 mod space;
 
 pub use acceptance::VerifiedConfig;
-pub(crate) use decision::{Prepared, pairs_under, search};
+pub(crate) use decision::{MAX_FRUITS, Prepared, pairs_under, search};

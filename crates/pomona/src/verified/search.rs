@@ -120,14 +120,13 @@ fn candidates_of(
 /// Reach of the code search in standard deviations of one axis; see the docs page for the share it finds.
 const RADIUS: f64 = 2.5;
 
-
 /// Seeds whose code has more neighbours in the map than this are passed over.
 const COMMON: usize = 48;
 
 /// Residual sum of a seed's fit over sigma^2: 95 % of chi^2 with 12 - 6 degrees of freedom.
 const MAX_RESIDUAL: f64 = 12.6;
 
-/// One round: `turns` seeds of every fruit, the best `keep` candidates refined around their places.
+/// One round: `turns` seeds of every fruit, the best `keep` candidates refined, and the other candidates in order.
 pub(crate) fn round(
     query: &Landscape,
     map: &Landscape,
@@ -136,7 +135,7 @@ pub(crate) fn round(
     admits: &(impl Fn(&Pose) -> bool + Sync),
     turns: std::ops::Range<u64>,
     keep: usize,
-) -> (Vec<Hypothesis>, Effort) {
+) -> (Vec<Hypothesis>, Vec<Candidate>, Effort) {
     let rows: Vec<u32> = (0..query.len() as u32).collect();
     let parts: Vec<(Vec<Candidate>, Effort)> = rows
         .par_chunks(16)
@@ -156,7 +155,12 @@ pub(crate) fn round(
     let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
     let mut candidates: Vec<Candidate> = parts.into_iter().flat_map(|part| part.0).collect();
     candidates.sort_unstable_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key)));
-    candidates.truncate(keep);
+    let rest = candidates.split_off(keep.min(candidates.len()));
+    (refined(query, map, &candidates, model), rest, effort)
+}
+
+/// Candidates refined around their places, most evidence first.
+pub(crate) fn refined(query: &Landscape, map: &Landscape, candidates: &[Candidate], model: &Model) -> Vec<Hypothesis> {
     let mut hypotheses: Vec<Hypothesis> = candidates
         .par_chunks(8)
         .map_init(Scratch::default, |scratch, part| {
@@ -167,7 +171,7 @@ pub(crate) fn round(
         .flatten_iter()
         .collect();
     hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-    (hypotheses, effort)
+    hypotheses
 }
 
 /// Radius of the region that weighs a refined hypothesis, in spacings.
