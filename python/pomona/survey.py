@@ -135,9 +135,7 @@ def require_depth(recording: Recording) -> None:
     pictures = recording.description()["pictures"]
     if "depth" not in pictures:
         found = " and ".join(pictures)
-        raise PomonaError(
-            f"{recording.path}: found {found} pictures, expected depth: depth from stereo is not there yet"
-        )
+        raise PomonaError(f"{recording.path}: found {found} pictures, expected depth: stereo is not measured yet")
 
 
 def _tell_skipped(recording: Recording, skipped: dict[int, str]) -> None:
