@@ -2,15 +2,18 @@
 
 import json
 import shutil
+import sys
 
 import cv2
 import numpy as np
 import pytest
 
 from pomona import PomonaError, PomonaWarning
+from pomona.cli import main
 from pomona.cli.scan import SUFFIXES
 from pomona.cloud import FruitCloud
 from pomona.detect.from_file import FileDetector
+from pomona.orchard import load_session
 from pomona.recording import open_recording
 from pomona.recording.check import unreadable_frames
 from pomona.survey import scan
@@ -180,17 +183,17 @@ def test_a_tum_recording_is_scanned(tum):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_command_scans_a_tum_recording(tum, tmp_path, suffix, monkeypatch):
-    import sys
-
-    from pomona.cli import main
-
+def test_the_command_scans_a_tum_recording(pomona, tum, tmp_path, suffix):
     output = tmp_path / f"session{suffix}"
-    monkeypatch.setattr(sys, "argv", ["pomona", "scan", str(tum), "-o", str(output)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 0
-    assert suffix == ".gpkg" or len(FruitCloud.read(output)) == 3
+    code, printed, told = pomona("scan", tum, "-o", output)
+    assert (code, told) == (0, "")
+    assert "3 fruits" in printed
+    if suffix == ".gpkg":
+        session = load_session(output)
+        assert (session.cloud.ids, session.date) == (tuple(FRUITS), "2024-08-09")
+        assert "groundtruth.txt" in session.input_hashes
+    else:
+        assert FruitCloud.read(output).ids == tuple(FRUITS)
 
 
 def test_tum_pictures_without_a_partner_are_left_out_and_told(tum):
@@ -263,6 +266,49 @@ def test_euroc_gives_pairs_and_poses(euroc):
     np.testing.assert_allclose([f.session_from_camera[0, 3] for f in frames], [0, 0.05, 0.1], atol=1e-6)
     assert frames[0].read_left().shape == (48, 64, 3)
     assert len(open_recording(euroc / "mav0")) == 3
+
+
+@pytest.fixture
+def pomona(monkeypatch, capsys):
+    """The command line, in this process: exit code, stdout, stderr."""
+
+    def run_main(*arguments):
+        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return ended.value.code, printed.out, printed.err
+
+    return run_main
+
+
+def test_info_prints_what_shows_a_wrong_unit(pomona, kitti):
+    code, printed, _ = pomona("info", kitti)
+    assert code == 0
+    # 1.5 m squared / (707 px * 0.537 m) * 0.5 px
+    assert "depth_error_m  0.00296 (at 1.5 m, disparity to 0.5 px)" in printed
+    assert "kind           KITTI folder" in printed
+    found = json.loads(pomona("info", kitti, "--json")[1])
+    assert found["depth_error_m"] == pytest.approx(1.5**2 / 379.8145 * 0.5)
+    assert (found["frames"], found["pictures"]) == (5, {"left": 5, "right": 5})
+
+
+def test_info_checks_every_picture(pomona, kitti):
+    assert pomona("info", kitti, "--check")[0] == 0
+    picture = kitti / "image_r" / "000002.png"
+    picture.write_bytes(picture.read_bytes()[:5000])
+    code, printed, _ = pomona("info", kitti, "--check")
+    assert code == 1
+    assert "unreadable     1\n" in printed
+    assert "000002.png: the PNG is cut off" in printed
+    assert json.loads(pomona("info", kitti, "--check", "--json")[1])["unreadable"][0]["frame"] == 2
+
+
+def test_scan_refuses_stereo_without_depth_in_one_line(pomona, kitti, tmp_path):
+    code, printed, told = pomona("scan", kitti, "-o", tmp_path / "fruits.csv")
+    assert (code, printed, told.count("\n")) == (2, "", 1)
+    assert "found left and right pictures, expected depth" in told
+    assert not (tmp_path / "fruits.csv").exists()
 
 
 def test_euroc_pictures_are_rectified(euroc):

@@ -25,6 +25,8 @@ Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, sightings so far."""
 
 
+POSE_FILES = "poses_tum.txt, in a TUM RGB-D folder groundtruth.txt"
+
 PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
 """The smallest berries and the largest melons."""
 
@@ -154,7 +156,7 @@ def _trajectory(recording: Recording) -> Trajectory:
     if recording.trajectory is not None:
         return recording.trajectory
     if len(recording) > 1:
-        raise PomonaError(f"{recording.path}: found {len(recording)} frames without poses, expected poses_tum.txt")
+        raise PomonaError(f"{recording.path}: found {len(recording)} frames without poses, expected {POSE_FILES}")
     return Trajectory(np.array(recording.numbers, np.int64), np.zeros(1), np.eye(4)[None])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import functools
 import json
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame
 from pomona.recording.pictures import numbered_pictures
@@ -25,8 +25,6 @@ from pomona.recording.rig_files import find_optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["FolderRecording"]
-
-_ISO_DATE = re.compile(r"(\d{4}-\d{2}-\d{2})(?:[T_ ](\d{2})[:-]?(\d{2})(?:[:-]?(\d{2}))?)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,13 +181,4 @@ def _date(folder: Path, about: dict[str, Any]) -> str | None:
                 f"{where}: date: found {about['date']!r}, expected ISO 8601, as 2021-09-27T11:40:12"
             ) from None
         return str(about["date"])
-    found = _ISO_DATE.search(folder.resolve().name)
-    if found is None:
-        return None
-    day, hour, minute, second = found.groups()
-    text = day if hour is None else f"{day}T{hour}:{minute}:{second or '00'}"
-    try:
-        datetime.datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    return text
+    return date_in_name(folder.resolve().name)

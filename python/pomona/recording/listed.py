@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
+from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame
 from pomona.recording.rectification import Optics
@@ -49,7 +50,6 @@ class ListedRecording:
     pictures: Mapping[str, tuple[Path, ...]]
     trajectory: Trajectory | None
     listing: tuple[Path, ...]
-    date: str | None = None
 
     @property
     def calibration(self) -> Calibration:
@@ -60,6 +60,11 @@ class ListedRecording:
     def name(self) -> str:
         """The folder's name."""
         return self.path.resolve().name
+
+    @property
+    def date(self) -> str | None:
+        """The date in the folder's name."""
+        return date_in_name(self.name)
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -1,4 +1,4 @@
-"""From a path to the recording in it; each kind of recording is imported when it is met."""
+"""From a path to the recording in it; the libraries of a kind are imported when they are needed."""
 
 from __future__ import annotations
 

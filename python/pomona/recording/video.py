@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame
 from pomona.recording.rectification import Optics
@@ -58,8 +59,8 @@ class VideoRecording:
 
     @property
     def date(self) -> str | None:
-        """When the camera says it was made."""
-        return self.left.created
+        """When the file says it was made, else the date in the name."""
+        return self.left.created or date_in_name(self.name)
 
     @property
     def numbers(self) -> tuple[int, ...]:
