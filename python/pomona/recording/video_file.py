@@ -130,14 +130,15 @@ def _stamps(path: Path, container: InputContainer) -> tuple[int, ...]:
         stamp = packet.pts if packet.pts is not None else packet.dts
         if packet.size and not packet.is_discard and stamp is not None:
             stamps.append(stamp)
-            decoded_at.append(packet.dts if packet.dts is not None else stamp)
+            if packet.dts is not None:  # Matroska does not note them where pictures are reordered
+                decoded_at.append(packet.dts)
     if not stamps:
         raise PomonaError(f"{path}: found no picture with a time, expected a video that is not cut off")
     back = np.flatnonzero(np.diff(decoded_at) < 0)
     if len(back):
         unit_s = float(container.streams.video[0].time_base or 0)
         later, earlier = (decoded_at[int(back[0]) + step] * unit_s for step in (0, 1))
-        raise PomonaError(f"{path}: frame {int(back[0]) + 1}: time goes back from {later:.3f} s to {earlier:.3f} s")
+        raise PomonaError(f"{path}: packet {int(back[0]) + 1}: time goes back from {later:.3f} s to {earlier:.3f} s")
     if len(set(stamps)) < len(stamps):
         raise PomonaError(f"{path}: found two frames of the same time, expected ascending times")
     return tuple(sorted(stamps))
