@@ -154,6 +154,7 @@ def test_a_corrupt_picture_in_the_middle_is_counted_and_named(row, codec, name):
         assert list(bad) == [5]
     assert all(f"{name}: frame {number} at {number / 10:.3f} s" in line for number, line in bad.items())
     assert [frame.number for frame in recording.frames()] == list(range(12))
+    assert unreadable_frames(recording) == bad
 
 
 def test_times_that_go_back_are_refused(row):

@@ -149,7 +149,8 @@ def _decoded(container: InputContainer) -> Iterator[Any]:
     import av
 
     stream = container.streams.video[0]
-    stream.thread_type = "AUTO"
+    # With threads a damaged stream gives other pictures from run to run.
+    stream.codec_context.thread_count = 1
     # Without it H.264 fills what is lost from other pictures, and does not say so.
     stream.codec_context.options = {"err_detect": "explode"}
     packets = container.demux(stream)
