@@ -66,3 +66,22 @@ const STRETCH: f64 = 1.77;
 
 /// Tries that a first round is charged with at least: the first tries are the likeliest.
 const LEAST_TRIES: u64 = 150;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_tries_and_fewer_false_alarms_ask_for_more() {
+        let config = VerifiedConfig::default();
+        assert!(config.threshold(100_000) > config.threshold(1_000));
+        let strict = VerifiedConfig { false_alarm_rate: 1e-6, ..config };
+        assert!(strict.threshold(1_000) > config.threshold(1_000));
+    }
+
+    #[test]
+    fn settings_outside_their_range_are_named() {
+        let wrong = VerifiedConfig { false_alarm_rate: 0.0, ..VerifiedConfig::default() };
+        assert!(wrong.validate().expect_err("zero is no rate").to_string().contains("false_alarm_rate"));
+    }
+}

@@ -4,6 +4,7 @@ use super::growth::{Overlap, Prediction};
 use super::hypothesis::gaussian;
 use super::landscape::Landscape;
 use crate::assignment::assign;
+use nalgebra::{Matrix3, Vector3};
 
 /// Edges reach to `P(chi^2_3 > 14.8)` = 0.2 %.
 const GATE: f64 = 3.85;
@@ -87,16 +88,18 @@ fn edges_of(
     let mut edges = Vec::new();
     for (row, prediction) in overlap.predictions.iter().enumerate() {
         let Some(Prediction { place, variance }) = *prediction else { continue };
-        let gate2 = GATE * GATE * variance;
         let first = edges.len();
-        map.near(&place, gate2.sqrt(), |partner| {
-            let d2 = (map.points[partner as usize] - place).norm_squared();
-            if d2 <= gate2 {
-                let distance = d2.sqrt();
+        let own = query.covariances.as_ref().map(|all| overlap.pose.turned(&all[row]));
+        map.near(&place, GATE * (WIDEST * variance).sqrt(), |partner| {
+            let offset = map.points[partner as usize] - place;
+            let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
+            let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
+            if mahalanobis2 <= GATE * GATE {
+                let distance = offset.norm();
                 // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
                 let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
                 let new = (1.0 - share) * companions.max(map.floor);
-                let ratio = share / (1.0 - share) * gaussian(d2, variance) / new * size(row as u32, partner);
+                let ratio = share / (1.0 - share) * density / new * size(row as u32, partner);
                 edges.push(Edge { query: row as u32, map: partner, ratio, distance });
             }
         });
@@ -115,6 +118,32 @@ fn edges_of(
     }
     edges
 }
+
+/// Squared Mahalanobis distance of a residual, and its density per cubic metre.
+///
+/// The residuals of all pairs say how large the noise is, the fruits' own covariances which way it points: stereo
+/// centroids are long along the viewing ray. `uncertain` is the sum of the two covariances; a tenth of the variance stays
+/// isotropic, for what the recording does not know of (sag, growth).
+fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
+    let isotropic = || {
+        let d2 = offset.norm_squared();
+        (d2 / variance, gaussian(d2, variance))
+    };
+    let Some(shape) = uncertain else { return isotropic() };
+    let mean = shape.trace() / 3.0;
+    if mean <= 0.0 {
+        return isotropic();
+    }
+    let share = (mean / variance).min(0.9);
+    let covariance = shape * (share * variance / mean) + Matrix3::identity() * ((1.0 - share) * variance);
+    let Some(factor) = covariance.cholesky() else { return isotropic() };
+    let mahalanobis2 = offset.dot(&factor.solve(offset));
+    let norm = (2.0 * std::f64::consts::PI).powf(-1.5) / factor.l().diagonal().product();
+    (mahalanobis2, norm * (-0.5 * mahalanobis2).exp())
+}
+
+/// Variance along the longest axis over the mean variance, at the most.
+const WIDEST: f64 = 3.0;
 
 /// Marginal probability of each edge under one-to-one association.
 fn belief_propagation(edges: &[Edge], n_query: usize, n_map: usize) -> Vec<f64> {
@@ -148,4 +177,43 @@ fn belief_propagation(edges: &[Edge], n_query: usize, n_map: usize) -> Vec<f64> 
         sums[edge.query as usize] += edge.ratio * back;
     }
     edges.iter().zip(&to_query).map(|(edge, back)| edge.ratio * back / sums[edge.query as usize]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Marginals by summing over all one-to-one sets of pairs.
+    fn exact(edges: &[Edge]) -> Vec<f64> {
+        let mut sums = vec![0.0; edges.len()];
+        let mut total = 0.0;
+        for set in 0u32..1 << edges.len() {
+            let chosen: Vec<usize> = (0..edges.len()).filter(|i| set >> i & 1 == 1).collect();
+            let clash = chosen.iter().enumerate().any(|(at, &i)| {
+                chosen[at + 1..].iter().any(|&j| edges[i].query == edges[j].query || edges[i].map == edges[j].map)
+            });
+            if clash {
+                continue;
+            }
+            let weight: f64 = chosen.iter().map(|&i| edges[i].ratio).product();
+            total += weight;
+            for i in chosen {
+                sums[i] += weight;
+            }
+        }
+        sums.iter().map(|sum| sum / total).collect()
+    }
+
+    #[test]
+    fn marginals_are_exact_on_a_tree_and_close_on_a_loop() {
+        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
+        let tree = [edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)];
+        for (found, truth) in belief_propagation(&tree, 2, 2).iter().zip(exact(&tree)) {
+            assert!((found - truth).abs() < 1e-6, "{found} {truth}");
+        }
+        let cycle = [edge(0, 0, 5.0), edge(0, 1, 2.0), edge(1, 0, 1.0), edge(1, 1, 3.0)];
+        for (found, truth) in belief_propagation(&cycle, 2, 2).iter().zip(exact(&cycle)) {
+            assert!((found - truth).abs() < 0.05, "{found} {truth}");
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::space::Tree;
 use crate::cloud::FruitCloud;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Neighbours kept per fruit: enough for the seeds (the nearest ten) and for the first look at a hypothesis.
 pub(crate) const NEIGHBOURS: usize = 24;
@@ -17,6 +17,8 @@ pub(crate) struct Landscape {
     pub(crate) rows: Vec<u32>,
     /// Positions about the mean, metres.
     pub(crate) points: Vec<Vector3<f64>>,
+    /// Covariance of each point, square metres, where the cloud has them.
+    pub(crate) covariances: Option<Vec<Matrix3<f64>>>,
     /// The nearest [`NEIGHBOURS`] other fruits of each fruit, nearest first; shorter lists in small clouds.
     pub(crate) neighbours: Vec<Vec<u32>>,
     /// Typical distance to the sixth-nearest fruit: the unit of length of the cloud, metres.
@@ -64,7 +66,8 @@ impl Landscape {
         let companions = Companions::new(&points, &neighbours, spacing);
         let grid = Grid::new(&points, 0.6 * spacing);
         let support = Support::new(&points, spacing);
-        Self { centre, rows, points, neighbours, spacing, density, floor, tree, companions, grid, support }
+        let covariances = cloud.covariances.as_ref().map(|all| rows.iter().map(|&row| all[row as usize]).collect());
+        Self { centre, rows, points, covariances, neighbours, spacing, density, floor, tree, companions, grid, support }
     }
 
     pub(crate) fn len(&self) -> usize {

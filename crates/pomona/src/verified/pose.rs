@@ -17,6 +17,11 @@ impl Pose {
         self.rotation * p * self.scale + self.translation
     }
 
+    /// A covariance of the query as the map sees it.
+    pub(crate) fn turned(&self, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+        self.rotation * covariance * self.rotation.transpose() * (self.scale * self.scale)
+    }
+
     /// The place in the query that lies at `p` in the map.
     #[inline]
     pub(crate) fn apply_inverse(&self, p: &Vector3<f64>) -> Vector3<f64> {

@@ -176,3 +176,17 @@ pub(crate) fn refined(query: &Landscape, map: &Landscape, candidates: &[Candidat
 
 /// Radius of the region that weighs a refined hypothesis, in spacings.
 pub(crate) const REACH: f64 = 3.5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_walk_through_all_triples_once() {
+        let mut triples: Vec<[u64; 3]> = (0..120).map(unrank).collect();
+        assert!(triples.iter().all(|t| t[0] < t[1] && t[1] < t[2] && t[2] < 10));
+        triples.sort_unstable();
+        triples.dedup();
+        assert_eq!(triples.len(), 120);
+    }
+}

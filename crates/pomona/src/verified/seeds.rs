@@ -183,3 +183,45 @@ pub(crate) fn shuffled(key: u64) -> u64 {
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    fn four() -> impl Strategy<Value = Vec<Vector3<f64>>> {
+        prop::collection::vec(prop::array::uniform3(-0.5..0.5f64).prop_map(Vector3::from), 4)
+    }
+
+    proptest! {
+        #[test]
+        fn the_code_ignores_pose_and_order(points in four(), turn in prop::array::uniform3(-3.0..3.0f64)) {
+            let rotation = Rotation3::new(Vector3::from(turn));
+            let moved: Vec<_> = points.iter().map(|p| rotation * p + Vector3::new(3.0, -1.0, 2.0)).collect();
+            let (here, there) = (canonical(&points, [0, 1, 2, 3]), canonical(&moved, [2, 0, 3, 1]));
+            prop_assert_eq!(here.is_some(), there.is_some());
+            if let (Some((quad, code)), Some((moved_quad, moved_code))) = (here, there) {
+                prop_assert_eq!(quad, moved_quad);
+                prop_assert!(code.iter().zip(&moved_code).all(|(a, b)| (a - b).abs() < 1e-5));
+            }
+        }
+
+        #[test]
+        fn near_ties_hold_the_canonical_labeling(points in four(), margin in 0.0..0.1f64) {
+            if let Some((quad, _)) = canonical(&points, [0, 1, 2, 3]) {
+                let mut labelings = Vec::new();
+                near_ties(&points, quad, margin, &mut |labelled, _| labelings.push(labelled));
+                prop_assert!(labelings.contains(&quad));
+            }
+        }
+    }
+
+    #[test]
+    fn a_mirror_image_has_another_code() {
+        let points = [[0.0, 0.0, 0.0], [0.8, 0.0, 0.0], [0.3, 0.4, 0.0], [0.2, 0.1, 0.3]].map(Vector3::from);
+        let mirrored = points.map(|p| Vector3::new(p.x, p.y, -p.z));
+        let [here, there] = [points, mirrored].map(|p| canonical(&p, [0, 1, 2, 3]).expect("not collinear").1);
+        assert!((here[5] + there[5]).abs() < 1e-6 && here[5].abs() > 0.1);
+    }
+}
