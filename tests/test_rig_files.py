@@ -251,6 +251,11 @@ def test_baselines_that_are_none(tmp_path):
     refused(tmp_path, "baseline_m: found 120", "looks like millimetres")
 
 
+def test_a_rotation_that_is_none_is_refused(tmp_path):
+    write_opencv(tmp_path, R=1.1 * ROTATION)
+    refused(tmp_path, "stereo.yml", "stretches", "expected rotation and shift")
+
+
 def test_a_pair_needs_a_baseline(tmp_path):
     write_colmap(tmp_path, rig=False)
     refused(tmp_path, "no baseline", "rigs.txt")

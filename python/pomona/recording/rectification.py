@@ -139,6 +139,8 @@ def _bouguet(rig: Rig, right: Camera, size_px: tuple[int, int]) -> tuple[NDArray
     if rig.right_from_left is None or not np.isfinite(rig.right_from_left).all():
         raise PomonaError(f"{rig.where}: no baseline: found no place of the right camera, expected it in metres")
     rotation, translation_m = rig.right_from_left[:3, :3], rig.right_from_left[:3, 3]
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-2:
+        raise PomonaError(f"{rig.where}: found a place of the right camera that stretches, expected rotation and shift")
     if _aligned(rig.left, right, rotation, translation_m):
         left_projection = np.hstack([rig.left.matrix, np.zeros((3, 1))])
         shift = rig.left.matrix @ np.array([[translation_m[0]], [0.0], [0.0]])
