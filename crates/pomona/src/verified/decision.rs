@@ -2,7 +2,7 @@
 
 use super::acceptance::VerifiedConfig;
 use super::association::associate;
-use super::growth::{Overlap, grow, settle};
+use super::growth::{Overlap, grow, grow_everywhere, settle};
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::outline;
@@ -30,8 +30,11 @@ const DETECTION: f64 = 0.55;
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
 const SHARP: f64 = 0.18;
 
-/// Rounds of the search: seeds per fruit and candidates that are refined.
-const ROUNDS: [(u64, usize); 3] = [(1, 32), (4, 48), (u64::MAX, 64)];
+/// Rounds of the search: seeds per fruit up to which they go, and candidates that are refined.
+const ROUNDS: [(u64, usize); 4] = [(1, 32), (1, 32), (4, 48), (u64::MAX, 64)];
+
+/// Fruits whose seeds make the first round: where the visits overlap well, few are enough in a cloud of any size.
+const FIRST_FRUITS: usize = 256;
 
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
@@ -71,6 +74,8 @@ impl Prepared {
 struct Finding {
     overlap: Overlap,
     seed: Hypothesis,
+    /// What growth assumed.
+    model: Model,
 }
 
 /// Finds the query in the map.
@@ -90,6 +95,9 @@ pub(crate) fn search(
         stages.push(("mirrored", 1.0));
         findings.clear();
     }
+    if let Some(best) = findings.first_mut() {
+        search.reach_all(best);
+    }
     search.answer(findings, map, query, stages)
 }
 
@@ -101,6 +109,9 @@ const MIRRORED: f64 = 1.3;
 
 /// A pose that explains this share of the query is no accident of a flat crown.
 const WHOLE: f64 = 0.7;
+
+/// A pose with this many times the evidence needed is no local optimum.
+const SURE: f64 = 6.0;
 
 /// Times that turned starts are tried.
 const POLISHES: usize = 3;
@@ -135,8 +146,9 @@ pub(crate) fn pairs_under(
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let place = search.query.points.first().copied().unwrap_or_default();
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
-    let overlap = settle(&search.query, search.map, &seed, &Model { sigma, ..search.model });
-    search.answer(vec![Finding { overlap, seed }], map, query, Vec::new())
+    let model = Model { sigma, ..search.model };
+    let overlap = settle(&search.query, search.map, &seed, &model);
+    search.answer(vec![Finding { overlap, seed, model }], map, query, Vec::new())
 }
 
 struct Search<'a> {
@@ -183,9 +195,10 @@ impl<'a> Search<'a> {
         for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
             let end = turns.min(last);
             let admits = |pose: &Pose| self.admits(pose);
-            let (hypotheses, rest, spent) =
-                round(&self.query, self.map, self.seeds, &self.model, &admits, turn..end, keep);
-            turn = end;
+            let stride = if index == 0 { self.query.len().div_ceil(FIRST_FRUITS) as u64 } else { 1 };
+            let which = (stride, turn..end);
+            let (hypotheses, rest, spent) = round(&self.query, self.map, self.seeds, &self.model, &admits, which, keep);
+            turn = if stride == 1 { end } else { 0 };
             effort = effort + spent;
             tried += hypotheses.len();
             let threshold = self.config.threshold(effort.fitted);
@@ -198,12 +211,14 @@ impl<'a> Search<'a> {
                 grown += self.look_for_rivals(&rest, &mut findings);
                 findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
                 for finding in &mut findings {
-                    self.polish(finding);
+                    if finding.overlap.log_odds < SURE * threshold {
+                        self.polish(finding);
+                    }
                 }
                 break;
             }
             // After the first round, before the long ones: what shows the same trees is found here at any noise.
-            let outline = (index == 0).then(|| self.by_outline()).flatten();
+            let outline = (index == 1).then(|| self.by_outline()).flatten();
             if let Some(found) = outline.filter(|found| self.turns_are_fixed(found)) {
                 findings.push(found);
                 break;
@@ -238,7 +253,7 @@ impl<'a> Search<'a> {
             }
             let overlap = grow(&self.query, self.map, seed, &self.model);
             grown += 1;
-            findings.push(Finding { overlap, seed: *seed });
+            findings.push(Finding { overlap, seed: *seed, model: self.model });
         }
         grown
     }
@@ -315,7 +330,8 @@ impl<'a> Search<'a> {
         let translation = pose.apply(&middle) - rotation * middle * pose.scale;
         let seed =
             Hypothesis { pose: Pose { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
-        let mut mirrored = Finding { overlap: grow(&self.query, self.map, &seed, &self.model), seed };
+        let model = finding.model;
+        let mut mirrored = Finding { overlap: grow(&self.query, self.map, &seed, &model), seed, model };
         self.polish(&mut mirrored);
         mirrored.overlap.log_odds > MIRRORED * log_odds
     }
@@ -343,12 +359,22 @@ impl<'a> Search<'a> {
                 })
                 .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
             let Some(seed) = best else { return };
-            let overlap = grow(&self.query, self.map, &seed, &self.model);
+            let overlap = grow(&self.query, self.map, &seed, &finding.model);
             if overlap.log_odds < finding.overlap.log_odds + 0.5 {
                 return;
             }
-            *finding = Finding { overlap, seed };
+            *finding = Finding { overlap, seed, model: finding.model };
         }
+    }
+
+    /// Adds the crowns that growth did not reach; only the finding that is reported needs them.
+    fn reach_all(&self, finding: &mut Finding) {
+        if finding.seed.sigma >= SHARP * self.map.spacing {
+            return; // settled on the whole query already
+        }
+        let log_odds = finding.overlap.log_odds;
+        finding.overlap = grow_everywhere(&self.query, self.map, &finding.seed, &finding.model);
+        finding.overlap.log_odds = log_odds;
     }
 
     fn by_outline(&self) -> Option<Finding> {
@@ -360,7 +386,7 @@ impl<'a> Search<'a> {
             settle(&self.query, self.map, &seed, &model)
         };
         overlap.log_odds = overlap.log_odds.max(seed.log_odds);
-        Some(Finding { overlap, seed })
+        Some(Finding { overlap, seed, model })
     }
 
     fn answer(&self, mut findings: Vec<Finding>, map: &FruitCloud, query: &FruitCloud, mut stages: Stages) -> Match {

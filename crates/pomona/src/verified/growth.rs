@@ -93,6 +93,20 @@ const RIGID_ROUNDS: usize = 6;
 
 /// Grows a hypothesis as far as the evidence goes.
 pub(crate) fn grow(query: &Landscape, map: &Landscape, seed: &Hypothesis, model: &Model) -> Overlap {
+    let growth = grown(query, map, seed, model);
+    let log_odds = growth.log_odds();
+    growth.finish(log_odds)
+}
+
+/// The same, and a look at the crowns that growth did not reach.
+pub(crate) fn grow_everywhere(query: &Landscape, map: &Landscape, seed: &Hypothesis, model: &Model) -> Overlap {
+    let mut growth = grown(query, map, seed, model);
+    let log_odds = growth.log_odds();
+    growth.reach_all();
+    growth.finish(log_odds)
+}
+
+fn grown<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = Growth::new(query, map, seed, model);
     let extent = growth.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
     let most = (extent / growth.edge) as usize * 2 + EXTRA_ROUNDS;
@@ -110,9 +124,7 @@ pub(crate) fn grow(query: &Landscape, map: &Landscape, seed: &Hypothesis, model:
     }
     growth.predict();
     growth.pair_up();
-    let log_odds = growth.log_odds();
-    growth.reach_all();
-    growth.finish(log_odds)
+    growth
 }
 
 /// Pairs under a pose that holds for the whole query, with the noise as it is given.

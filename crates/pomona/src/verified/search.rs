@@ -126,17 +126,18 @@ const COMMON: usize = 48;
 /// Residual sum of a seed's fit over sigma^2: 95 % of chi^2 with 12 - 6 degrees of freedom.
 const MAX_RESIDUAL: f64 = 12.6;
 
-/// One round: `turns` seeds of every fruit, the best `keep` candidates refined, and the other candidates in order.
+/// One round: `turns` seeds of every `stride`-th fruit, the best `keep` candidates refined, and the other candidates in order.
 pub(crate) fn round(
     query: &Landscape,
     map: &Landscape,
     index: &SeedIndex,
     model: &Model,
     admits: &(impl Fn(&Pose) -> bool + Sync),
-    turns: std::ops::Range<u64>,
+    (stride, turns): (u64, std::ops::Range<u64>),
     keep: usize,
 ) -> (Vec<Hypothesis>, Vec<Candidate>, Effort) {
-    let rows: Vec<u32> = (0..query.len() as u32).collect();
+    let rows: Vec<u32> =
+        (0..query.len() as u32).filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride)).collect();
     let parts: Vec<(Vec<Candidate>, Effort)> = rows
         .par_chunks(16)
         .map(|rows| {
