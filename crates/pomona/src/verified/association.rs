@@ -20,6 +20,13 @@ pub(crate) struct Association {
     pub(crate) gain: f64,
 }
 
+/// Rounds in which the share of fruits seen again and the noise follow from the marginals: nearest partners, which growth
+/// goes by, lie closer than true ones where fruits crowd.
+const ROUNDS: usize = 4;
+
+/// Pairs whose noise is as growth found it, against those that say otherwise.
+const EXPECTED_PAIRS: f64 = 12.0;
+
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     query: u32,
@@ -27,6 +34,8 @@ struct Edge {
     /// Likelihood ratio of "the same fruit" against "hidden there, new here".
     ratio: f64,
     distance: f64,
+    /// Squared distance over the variance along its direction.
+    mahalanobis2: f64,
 }
 
 /// Pairs of an overlap.
@@ -42,15 +51,18 @@ pub(crate) fn associate(
     size: &impl Fn(u32, u32) -> f64,
     min_probability: f64,
 ) -> Vec<Association> {
-    let mut share = 0.6;
+    let (mut share, mut stretch) = (0.6, 1.0);
     let mut edges = Vec::new();
     let mut marginals = Vec::new();
-    // Two rounds: the share of fruits seen again is estimated from the marginals of the first.
-    for _ in 0..2 {
-        edges = edges_of(query, map, overlap, share, size);
+    for _ in 0..ROUNDS {
+        edges = edges_of(query, map, overlap, share, stretch, size);
         marginals = belief_propagation(&edges, query.len(), map.len());
         let expected: f64 =
             overlap.predictions.iter().flatten().map(|prediction| map.support(&prediction.place)).sum::<f64>().max(1.0);
+        let weight: f64 = marginals.iter().sum();
+        let squares: f64 = edges.iter().zip(&marginals).map(|(edge, p)| p * edge.mahalanobis2).sum();
+        stretch *= (squares / 3.0 + EXPECTED_PAIRS) / (weight + EXPECTED_PAIRS);
+        stretch = stretch.clamp(1.0, 4.0);
         share = ((marginals.iter().sum::<f64>() + 1.0) / (expected + 2.0)).clamp(0.2, 0.97);
     }
     let gains: Vec<(usize, usize, f64)> = edges
@@ -81,6 +93,7 @@ fn edges_of(
     map: &Landscape,
     overlap: &Overlap,
     share: f64,
+    stretch: f64,
     size: &impl Fn(u32, u32) -> f64,
 ) -> Vec<Edge> {
     let scale = overlap.pose.scale;
@@ -88,6 +101,7 @@ fn edges_of(
     let mut edges = Vec::new();
     for (row, prediction) in overlap.predictions.iter().enumerate() {
         let Some(Prediction { place, variance }) = *prediction else { continue };
+        let variance = stretch * variance;
         let first = edges.len();
         let own = query.covariances.as_ref().map(|all| overlap.pose.turned(&all[row]));
         map.near(&place, GATE * (WIDEST * variance).sqrt(), |partner| {
@@ -100,7 +114,7 @@ fn edges_of(
                 let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
                 let new = (1.0 - share) * companions.max(map.floor);
                 let ratio = share / (1.0 - share) * density / new * size(row as u32, partner);
-                edges.push(Edge { query: row as u32, map: partner, ratio, distance });
+                edges.push(Edge { query: row as u32, map: partner, ratio, distance, mahalanobis2 });
             }
         });
         // Two cells of the grid may share a bucket, which then is visited twice.
@@ -206,7 +220,7 @@ mod tests {
 
     #[test]
     fn marginals_are_exact_on_a_tree_and_close_on_a_loop() {
-        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
+        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0, mahalanobis2: 0.0 };
         let tree = [edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)];
         for (found, truth) in belief_propagation(&tree, 2, 2).iter().zip(exact(&tree)) {
             assert!((found - truth).abs() < 1e-6, "{found} {truth}");

@@ -1,6 +1,6 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::VerifiedConfig;
+use super::acceptance::{VerifiedConfig, poses};
 use super::association::associate;
 use super::growth::{Overlap, grow, grow_everywhere, settle};
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
@@ -180,6 +180,10 @@ impl<'a> Search<'a> {
         }
     }
 
+    fn threshold(&self) -> f64 {
+        self.config.threshold(poses(self.query.len(), self.map.len(), self.model.scale))
+    }
+
     fn admits(&self, pose: &Pose) -> bool {
         self.up.is_none_or(|[query, map]| (pose.rotation * query).dot(&map) > MAX_LEAN_RAD.cos())
     }
@@ -188,6 +192,7 @@ impl<'a> Search<'a> {
     fn run(&self) -> (Vec<Finding>, Stages) {
         let mut effort = Effort::default();
         let last = self.config.seeds_per_fruit.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
+        let threshold = self.threshold();
         let mut turn = 0;
         let mut best: Option<f64> = None;
         let mut findings = Vec::new();
@@ -201,7 +206,6 @@ impl<'a> Search<'a> {
             turn = if stride == 1 { end } else { 0 };
             effort = effort + spent;
             tried += hypotheses.len();
-            let threshold = self.config.threshold(effort.fitted);
             grown += self.grow_distinct(&hypotheses, &mut findings);
             for finding in &findings {
                 best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
@@ -234,7 +238,7 @@ impl<'a> Search<'a> {
             ("fitted", effort.fitted as f64),
             ("refined", tried as f64),
             ("grown", f64::from(grown)),
-            ("threshold_nats", self.config.threshold(effort.fitted)),
+            ("threshold_nats", threshold),
             ("best_nats", best.unwrap_or(f64::NAN)),
             ("verified", findings.len() as f64),
         ];

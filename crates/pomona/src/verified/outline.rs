@@ -46,13 +46,13 @@ pub(crate) fn hypothesis(
 }
 
 /// Fewer fruits than this have no outline.
-const MIN_FRUITS: usize = 50;
+const MIN_FRUITS: usize = 100;
 
-/// Evidence in nats above which an outline is accepted: five standard deviations of its sum under chance.
+/// Evidence in nats above which an outline is accepted: seven standard deviations of its sum under chance.
 ///
 /// Over disjoint rows the sum has mean zero and a standard deviation of 0.9 per square root of fruits.
 pub(crate) fn threshold(query: &Landscape) -> f64 {
-    5.0 * (query.len() as f64).sqrt()
+    6.5 * (query.len() as f64).sqrt()
 }
 
 /// Principal axes as a proper rotation, and the root-mean-square extent.
@@ -128,7 +128,7 @@ fn fine_structure(query: &Landscape, map: &Landscape, pose: &Pose, sigma: f64) -
 }
 
 /// Noise in spacings that is tried: 1.5 to 11 cm in an orchard.
-const SIGMAS: [f64; 9] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33, 0.42];
+const SIGMAS: [f64; 8] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33];
 
 /// Noise in spacings at which the half-turns are compared.
 const SCREENING: f64 = 0.25;
