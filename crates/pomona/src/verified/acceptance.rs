@@ -60,13 +60,14 @@ impl VerifiedConfig {
     }
 }
 
-/// Poses that two clouds offer: any fruit on any fruit, and where the scale is free, at any of a hundred scales.
-pub(crate) fn poses(n_query: usize, n_map: usize, scale: Scale) -> f64 {
+/// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales; where the
+/// vertical is known, with the `share` of all turns that keeps it.
+pub(crate) fn poses(n_query: usize, n_map: usize, scale: Scale, share: f64) -> f64 {
     let scales = match scale {
         Scale::Metric => 1.0,
         Scale::Free => 100.0,
     };
-    n_query as f64 * n_map as f64 * scales
+    n_query as f64 * n_map as f64 * scales * share
 }
 
 /// Log-odds, in nats, that a single wrong pose reaches.

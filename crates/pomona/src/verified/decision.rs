@@ -51,6 +51,9 @@ const RIVAL_CANDIDATES: usize = 24;
 /// Two hypotheses that put a fruit within this many spacings of one place are the same.
 const SAME: f64 = 0.4;
 
+/// Times more seeds where the vertical is known.
+const UPRIGHT_SEEDS: u64 = 4;
+
 /// How far the vertical of a pose may lean from the one given: 10 degrees.
 const MAX_LEAN_RAD: f64 = 0.175;
 
@@ -181,7 +184,9 @@ impl<'a> Search<'a> {
     }
 
     fn threshold(&self) -> f64 {
-        self.config.threshold(poses(self.query.len(), self.map.len(), self.model.scale))
+        // The cap of directions within the lean, over the sphere.
+        let share = if self.up.is_some() { (1.0 - MAX_LEAN_RAD.cos()) / 2.0 } else { 1.0 };
+        self.config.threshold(poses(self.query.len(), self.map.len(), self.model.scale, share))
     }
 
     fn admits(&self, pose: &Pose) -> bool {
@@ -191,7 +196,9 @@ impl<'a> Search<'a> {
     /// Rounds of seeds until a pose is accepted, then the outline.
     fn run(&self) -> (Vec<Finding>, Stages) {
         let mut effort = Effort::default();
-        let last = self.config.seeds_per_fruit.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
+        // A known vertical rules most candidates out at once, so that more seeds cost no more.
+        let seeds = self.config.seeds_per_fruit * if self.up.is_some() { UPRIGHT_SEEDS } else { 1 };
+        let last = seeds.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
         let threshold = self.threshold();
         let mut turn = 0;
         let mut best: Option<f64> = None;
