@@ -5,12 +5,11 @@
 //! where pairs are few. What the patches leave over is smoothed between neighbouring fruits, in the measure in which
 //! neighbours' residuals agree. Growth goes from cell to neighbouring cell and stops where the evidence turns.
 
+use super::cells::{Cell, CellIndex, cells_of, key_of, surroundings, total};
 use super::hypothesis::{GATE, Hypothesis, Model, PRIOR_FREEDOMS, gaussian};
-use super::landscape::{CellHasher, Landscape};
+use super::landscape::Landscape;
 use super::pose::{Moments, Pose};
 use nalgebra::Vector3;
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
 
 /// Edge of a cell in spacings of the query: some ten fruits.
 const CELL: f64 = 2.5;
@@ -45,18 +44,6 @@ pub(crate) struct Overlap {
     pub(crate) middle: Vector3<f64>,
     /// Where each fruit of the query is expected; `None` outside the overlap.
     pub(crate) predictions: Vec<Option<Prediction>>,
-}
-
-#[derive(Debug, Clone)]
-struct Cell {
-    key: [i64; 3],
-    centre: Vector3<f64>,
-    rows: Vec<u32>,
-    around: Vec<(u32, f64)>,
-    moments: Moments,
-    pose: Pose,
-    reached: bool,
-    log_odds: f64,
 }
 
 struct Growth<'a> {
@@ -454,63 +441,3 @@ const SMOOTHING: f64 = 1.0;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
-
-fn total<'a>(parts: impl Iterator<Item = (&'a Moments, f64)>) -> Moments {
-    let mut sum = Moments::default();
-    for (part, weight) in parts {
-        sum.accumulate(part, weight);
-    }
-    sum
-}
-
-fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
-    total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
-}
-
-type CellIndex = HashMap<[i64; 3], usize, BuildHasherDefault<CellHasher>>;
-
-fn key_of(p: &Vector3<f64>, edge: f64) -> [i64; 3] {
-    [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
-}
-
-fn cells_of(query: &Landscape, edge: f64, pose: &Pose) -> (Vec<Cell>, CellIndex) {
-    let mut index = CellIndex::default();
-    let mut cells: Vec<Cell> = Vec::new();
-    for (row, p) in query.points.iter().enumerate() {
-        let key = key_of(p, edge);
-        let at = *index.entry(key).or_insert_with(|| {
-            cells.push(Cell {
-                key,
-                centre: Vector3::zeros(),
-                rows: Vec::new(),
-                around: Vec::new(),
-                moments: Moments::default(),
-                pose: *pose,
-                reached: false,
-                log_odds: 0.0,
-            });
-            cells.len() - 1
-        });
-        cells[at].rows.push(row as u32);
-        cells[at].centre += p;
-    }
-    for cell in &mut cells {
-        cell.centre /= cell.rows.len() as f64;
-    }
-    for i in 0..cells.len() {
-        let key = cells[i].key;
-        let mut around = Vec::new();
-        for dx in -2..=2i64 {
-            for dy in -2..=2i64 {
-                for dz in -2..=2i64 {
-                    if let Some(&other) = index.get(&[key[0] + dx, key[1] + dy, key[2] + dz]) {
-                        let d2 = (cells[other].centre - cells[i].centre).norm_squared() / (edge * edge);
-                        around.push((other as u32, (-0.5 * d2).exp()));
-                    }
-                }
-            }
-        }
-        cells[i].around = around;
-    }
-    (cells, index)
-}

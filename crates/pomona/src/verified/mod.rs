@@ -11,6 +11,7 @@
 
 mod acceptance;
 mod association;
+mod cells;
 mod decision;
 mod growth;
 mod hypothesis;
