@@ -266,7 +266,7 @@ impl<'a> Growth<'a> {
         if let Some(pose) = all.step(&self.pose, self.model.scale, 0.0) {
             self.pose = pose;
         }
-        for i in 0..self.cells.len() {
+        for i in (0..self.cells.len()).filter(|&i| self.cells[i].reached).collect::<Vec<_>>() {
             if self.rigid {
                 self.cells[i].pose = self.pose;
                 continue;
