@@ -19,10 +19,12 @@ from recording_maker import FIELDS
 SIZE = (64, 48)
 
 
-def write_video(path: Path, n_frames: int = 12, *, size=(128, 48), codec="mjpeg", rate=10, stamps=None) -> Path:
+def write_video(
+    path: Path, n_frames: int = 12, *, size=(128, 48), codec="mjpeg", rate=10, stamps=None, options=None
+) -> Path:
     """Encode frames whose left half is brightness 10 n and whose right half is 10 n + 5."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=rate)
+        stream = container.add_stream(codec, rate=rate, options=options or {})
         stream.width, stream.height = size
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
         stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
-from pomona.recording.frame import Frame
+from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.pictures import numbered_pictures
 from pomona.recording.poses import read_tum
 from pomona.recording.rectification import Optics
@@ -84,10 +84,10 @@ class FolderRecording:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def frames(self) -> Iterator[Frame]:
-        """Give the frames in order of their numbers."""
+    def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
+        """Give the frames in order of their numbers, or those of some numbers."""
         posed = self.trajectory
-        for row, number in enumerate(self.numbers):
+        for row, number in chosen_rows(self.numbers, numbers):
             yield Frame(
                 number=number,
                 time_s=None if posed is None else float(posed.times_s[row]),

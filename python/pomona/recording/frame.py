@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pomona.recording.calibration import Calibration
 from pomona.trajectory import Trajectory
 
-__all__ = ["Frame", "Recording"]
+__all__ = ["Frame", "Recording", "chosen_rows"]
 
 Picture = NDArray[np.uint8]
 Depth = NDArray[np.float32]
@@ -22,6 +22,8 @@ Depth = NDArray[np.float32]
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One instant of a recording. Pictures are decoded when asked for and not kept, so memory does not grow.
+
+    They may be asked for in any order and from any thread.
 
     Attributes
     ----------
@@ -75,11 +77,20 @@ class Recording(Protocol):
     def __len__(self) -> int:
         """Count the frames."""
 
-    def frames(self) -> Iterator[Frame]:
-        """Give the frames in order of time."""
+    def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
+        """Give the frames in order of time, or of them only those with these numbers.
+
+        What lies between them is not decoded where the format allows.
+        """
 
     def inputs(self) -> Iterator[Path]:
         """Give the files that a session made of it depends on, for their hashes."""
 
     def description(self) -> dict[str, Any]:
         """Say in short what was found: `pomona info`."""
+
+
+def chosen_rows(all_numbers: tuple[int, ...], chosen: Collection[int] | None) -> Iterator[tuple[int, int]]:
+    """Give (row, number) of each frame, or of those that were chosen."""
+    wanted = None if chosen is None else frozenset(chosen)
+    return ((row, number) for row, number in enumerate(all_numbers) if wanted is None or number in wanted)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
-from pomona.recording.frame import Frame
+from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.rectification import Optics
 from pomona.recording.rectified_pictures import read_rectified
 from pomona.trajectory import Trajectory
@@ -69,9 +69,9 @@ class ListedRecording:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def frames(self) -> Iterator[Frame]:
-        """Give the frames in order; nothing is decoded yet."""
-        for row, number in enumerate(self.numbers):
+    def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
+        """Give the frames in order, or those of some numbers; nothing is decoded yet."""
+        for row, number in chosen_rows(self.numbers, numbers):
             yield Frame(
                 number=number,
                 time_s=None if self.times_s is None else float(self.times_s[row]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
-from pomona.recording.frame import Frame
+from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.rectification import Optics
 from pomona.recording.rig_files import find_optics
 from pomona.recording.video_file import VideoFile, VideoPicture
@@ -70,17 +70,18 @@ class VideoRecording:
     def __len__(self) -> int:
         return len(self.left.times_s)
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
         """Decode frame by frame; a frame that cannot be decoded says so when its pictures are asked for."""
         width = self.calibration.width
         left_of, right_of = (slice(0, width), slice(width, 2 * width)) if self.side_by_side else (slice(None),) * 2
-        lefts = self.left.pictures()
+        rows = [row for row, _ in chosen_rows(self.numbers, numbers)]
+        lefts = self.left.pictures(rows)
         pairs = (
             ((picture, picture) for picture in lefts)
             if self.side_by_side
-            else zip(lefts, self.right.pictures(), strict=True)
+            else zip(lefts, self.right.pictures(rows), strict=True)
         )
-        for row, (left, right) in enumerate(pairs):
+        for row, (left, right) in zip(rows, pairs, strict=True):
             yield Frame(
                 number=row,
                 time_s=float(self.left.times_s[row]),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import bisect
 import datetime
+import itertools
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     from av.video.frame import VideoFrame
 
 __all__ = ["VideoFile", "VideoPicture"]
+
+JUMP_FRAMES = 50
+"""Fewer pictures than these are decoded for nothing rather than jumped over: a jump opens the file anew."""
 
 CUT_OFF_FRAMES = 2
 """A header may promise the length in rounded time: a video is cut off when more than this is missing."""
@@ -52,6 +57,8 @@ class VideoFile:
         Presentation times in the file's own unit, ascending: exact, one for each picture.
     times_s : (F,) float64
         The same in seconds.
+    keys : tuple of int
+        Rows of the pictures that can be decoded without others, ascending.
     created : str or None
         When it was made, where the file says it.
     """
@@ -60,6 +67,7 @@ class VideoFile:
     size_px: tuple[int, int]
     stamps: tuple[int, ...]
     times_s: NDArray[np.float64]
+    keys: tuple[int, ...]
     created: str | None
 
     @classmethod
@@ -73,25 +81,60 @@ class VideoFile:
         """
         with _opened(path) as container:
             stream = container.streams.video[0]
-            stamps = _stamps(path, container)
+            stamps, keys = _stamps(path, container)
             seconds = float(stream.time_base or 0)
             times_s = np.array(stamps, np.float64) * seconds
             _warn_when_cut_off(path, container, times_s)
-            return cls(path, (stream.width, stream.height), stamps, times_s, _created(container))
+            return cls(path, (stream.width, stream.height), stamps, times_s, keys, _created(container))
 
-    def pictures(self) -> Iterator[VideoPicture]:
-        """Decode picture by picture, one for each time; those that cannot be decoded raise when they are read."""
+    def pictures(self, rows: Sequence[int] | None = None) -> Iterator[VideoPicture]:
+        """Decode picture by picture; those that cannot be decoded raise when they are read.
+
+        Parameters
+        ----------
+        rows : sequence of int, optional
+            Which of `stamps`, ascending; all where not given. Long stretches that nobody wants are jumped over.
+        """
+        for run in self._runs(range(len(self.stamps)) if rows is None else rows):
+            upcoming = 0
+            for row, frame in self._decoded_from(run[0], frozenset(run)):
+                while upcoming < len(run) and run[upcoming] < row:
+                    yield self._picture(run[upcoming], None)
+                    upcoming += 1
+                if upcoming < len(run) and run[upcoming] == row:
+                    yield self._picture(row, None if frame.is_corrupt else frame)
+                    upcoming += 1
+                if upcoming == len(run):
+                    break
+            yield from (self._picture(missing, None) for missing in run[upcoming:])
+
+    def _runs(self, rows: Sequence[int]) -> Iterator[Sequence[int]]:
+        """Cut rows where going on to a later key picture saves more than `JUMP_FRAMES`."""
+        cuts = [place for place in range(1, len(rows)) if self._key(rows[place]) - rows[place - 1] > JUMP_FRAMES]
+        return (rows[start:end] for start, end in itertools.pairwise([0, *cuts, len(rows)]) if start < end)
+
+    def _key(self, row: int) -> int:
+        """Give the row of the last picture, up to this one, that needs no other to be decoded."""
+        return self.keys[bisect.bisect_right(self.keys, row) - 1] if self.keys and self.keys[0] <= row else 0
+
+    def _decoded_from(self, row: int, wanted: frozenset[int]) -> Iterator[tuple[int, VideoFrame]]:
+        """Decode from the key picture of a row on; give (row, picture) in ascending order."""
         rows = {stamp: row for row, stamp in enumerate(self.stamps)}
-        upcoming = 0
-        with _opened(self.path) as container:
-            for frame in _decoded(container):
-                row = rows.get(frame.pts if frame.pts is not None else -1, -1)
-                if row < upcoming:
-                    continue
-                yield from (self._picture(missing, None) for missing in range(upcoming, row))
-                yield self._picture(row, None if frame.is_corrupt else frame)
-                upcoming = row + 1
-        yield from (self._picture(missing, None) for missing in range(upcoming, len(self.stamps)))
+        stamps = frozenset(self.stamps[row] for row in wanted)
+        for key in sorted({0, self._key(row)}, reverse=True):
+            latest = -1
+            with _opened(self.path) as container:
+                if key:
+                    container.seek(self.stamps[key], stream=container.streams.video[0])
+                for frame in _decoded(container, stamps):
+                    at = rows.get(frame.pts if frame.pts is not None else -1, -1)
+                    if latest < 0 and key and at > row:
+                        break  # Not every container jumps exactly: begin at its beginning instead.
+                    if at > latest:
+                        latest = at
+                        yield at, frame
+            if latest >= 0:
+                return
 
     def _picture(self, row: int, frame: VideoFrame | None) -> VideoPicture:
         return VideoPicture(f"{self.path}: frame {row} at {self.times_s[row]:.3f} s", frame)
@@ -113,11 +156,12 @@ def _opened(path: Path) -> InputContainer:
     return container
 
 
-def _stamps(path: Path, container: InputContainer) -> tuple[int, ...]:
-    """Presentation times of all packets, ascending; packets come in the order of decoding."""
+def _stamps(path: Path, container: InputContainer) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Presentation times of all packets, ascending, and the rows of key pictures; packets come as they are decoded."""
     import av
 
     stamps: list[int] = []
+    keys: set[int] = set()
     decoded_at: list[int] = []
     packets = container.demux(container.streams.video[0])
     while True:
@@ -130,6 +174,8 @@ def _stamps(path: Path, container: InputContainer) -> tuple[int, ...]:
         stamp = packet.pts if packet.pts is not None else packet.dts
         if packet.size and not packet.is_discard and stamp is not None:
             stamps.append(stamp)
+            if packet.is_keyframe:
+                keys.add(stamp)
             if packet.dts is not None:  # Matroska does not note them where pictures are reordered
                 decoded_at.append(packet.dts)
     if not stamps:
@@ -141,11 +187,15 @@ def _stamps(path: Path, container: InputContainer) -> tuple[int, ...]:
         raise PomonaError(f"{path}: packet {int(back[0]) + 1}: time goes back from {later:.3f} s to {earlier:.3f} s")
     if len(set(stamps)) < len(stamps):
         raise PomonaError(f"{path}: found two frames of the same time, expected ascending times")
-    return tuple(sorted(stamps))
+    stamps.sort()
+    return tuple(stamps), tuple(row for row, stamp in enumerate(stamps) if stamp in keys)
 
 
-def _decoded(container: InputContainer) -> Iterator[Any]:
-    """Pictures in order of time; packets that the decoder refuses are passed over."""
+def _decoded(container: InputContainer, wanted: frozenset[int]) -> Iterator[Any]:
+    """Pictures in order of time; packets that the decoder refuses are passed over.
+
+    Where no picture needs another, only those of the wanted times are decoded.
+    """
     import av
 
     stream = container.streams.video[0]
@@ -153,6 +203,7 @@ def _decoded(container: InputContainer) -> Iterator[Any]:
     stream.codec_context.thread_count = 1
     # Without it H.264 fills what is lost from other pictures, and does not say so.
     stream.codec_context.options = {"err_detect": "explode"}
+    alone = stream.codec_context.codec.intra_only
     packets = container.demux(stream)
     while True:
         try:
@@ -161,6 +212,8 @@ def _decoded(container: InputContainer) -> Iterator[Any]:
             return
         if packet is None:
             return
+        if alone and packet.size and packet.pts is not None and packet.pts not in wanted:
+            continue
         try:
             yield from packet.decode()
         except av.error.FFmpegError:
