@@ -7,11 +7,12 @@ surface by the radius that the outline gives, on the axis Z = depth / (1 - s); n
 Covariance of the centre, to first order, with the ray c as its long axis:
 
     C = var(Z) c c^T + Z^2 diag(sigma_cx^2, sigma_cy^2, 0)
-    var(Z) = sigma_vote^2 / n + (Z sigma_s)^2 + (roundness R)^2 + (scale Z)^2                        (4)
+    var(Z) = sigma_vote^2 / n + (Z sigma_s)^2 + (roundness R)^2 + (scale Z)^2 + (Z^2 sigma_d / (f B))^2    (4)
 
 sigma_vote is the spread of the depths that agree: noise and the surface's own shape; n the number of independent
 patches of surface they come from; Z sigma_s the outline's error, which moves the centre behind the surface; then what
-fruits differ from a sphere, and the depth camera's own scale. The diameter has the variance
+fruits differ from a sphere, the depth camera's own scale, and for a stereo pair what the disparities of one fruit err
+by together, sigma_d. The diameter has the variance
 
     var(D) = (2 Z sigma_s)^2 + (2 s)^2 var(Z) + (roundness D)^2 + (hidden D)^2,                      (5)
 
@@ -27,6 +28,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.errors import PomonaError
 from pomona.outline import Outline, outline_of_box
 from pomona.recording.calibration import Calibration
 from pomona.surface import SURFACE_PATCHES, Vote, covered_edges, shifted, vote_for_depth
@@ -103,7 +105,13 @@ class _Fruit:
     support: float
 
 
-def lift(depth_m: NDArray[np.float32], boxes_px: Array, calibration: Calibration) -> Lifted:
+def lift(
+    depth_m: NDArray[np.float32],
+    boxes_px: Array,
+    calibration: Calibration,
+    *,
+    disparity_sigma_px: float | Array | None = None,
+) -> Lifted:
     """Lift boxes to fruits in 3D, in the frame of the camera.
 
     Parameters
@@ -114,12 +122,21 @@ def lift(depth_m: NDArray[np.float32], boxes_px: Array, calibration: Calibration
         xmin, ymin, xmax, ymax; origin at the top left corner of the top left pixel. What is outside is cut.
     calibration : Calibration
         The camera of the depth picture.
+    disparity_sigma_px : float or (D,) float64, optional
+        For depth that a stereo pair gave: standard deviation of a fruit's disparity, in pixels. It makes the centre
+        uncertain along its ray by Z^2 / (f B) of it. Needs the baseline of `calibration`.
+
+    Raises
+    ------
+    PomonaError
+        When `disparity_sigma_px` is given and the calibration has no baseline.
     """
+    depth_sigma_per_m2 = _depth_sigma_per_m2(calibration, disparity_sigma_px, len(boxes_px))
     size = np.array([calibration.width, calibration.height, calibration.width, calibration.height], np.float64)
     fruits: dict[int, _Fruit] = {}
     refused: Counter[Refusal] = Counter()
     for row, box_px in enumerate(np.clip(boxes_px, 0.0, size)):
-        fruit = _lift_box(depth_m, box_px, calibration)
+        fruit = _lift_box(depth_m, box_px, calibration, float(depth_sigma_per_m2[row]))
         if isinstance(fruit, Refusal):
             refused[fruit] += 1
         else:
@@ -137,7 +154,18 @@ def lift(depth_m: NDArray[np.float32], boxes_px: Array, calibration: Calibration
     )
 
 
-def _lift_box(depth_m: NDArray[np.float32], box_px: Array, calibration: Calibration) -> _Fruit | Refusal:
+def _depth_sigma_per_m2(calibration: Calibration, disparity_sigma_px: float | Array | None, count: int) -> Array:
+    """Give sigma_Z / Z^2 of each box, 0 where depth is no stereo depth."""
+    if disparity_sigma_px is None:
+        return np.zeros(count)
+    if calibration.baseline_m is None:
+        raise PomonaError("baseline_m: found none, expected one where depth has a disparity_sigma_px")
+    return np.broadcast_to(disparity_sigma_px, count) / (calibration.fx * calibration.baseline_m)
+
+
+def _lift_box(
+    depth_m: NDArray[np.float32], box_px: Array, calibration: Calibration, depth_sigma_per_m2: float
+) -> _Fruit | Refusal:
     outline = outline_of_box(box_px, calibration)
     if outline is None:
         return Refusal.CUT
@@ -153,7 +181,7 @@ def _lift_box(depth_m: NDArray[np.float32], box_px: Array, calibration: Calibrat
     if outline.hidden_axis is not None:
         centre, centre_sigma = shifted(depths, rays, outline, vote)
         vote = vote_for_depth(depths, rays, centre, outline.radius) or vote
-    return _fruit(outline, vote, centre, centre_sigma)
+    return _fruit(outline, vote, centre, centre_sigma, depth_sigma_per_m2)
 
 
 def _pixels(depth_m: NDArray[np.float32], box_px: Array, calibration: Calibration) -> tuple[Array, Array]:
@@ -165,7 +193,7 @@ def _pixels(depth_m: NDArray[np.float32], box_px: Array, calibration: Calibratio
     return depths.ravel(), calibration.rays(np.stack([x, y], axis=-1)).reshape(-1, 3)
 
 
-def _fruit(outline: Outline, vote: Vote, centre: Array, centre_sigma: Array) -> _Fruit:
+def _fruit(outline: Outline, vote: Vote, centre: Array, centre_sigma: Array, depth_sigma_per_m2: float) -> _Fruit:
     """Put a fruit together with its covariance, equations (4) and (5)."""
     z, s = vote.depth_m, outline.radius
     diameter_m = 2 * s * z
@@ -175,6 +203,7 @@ def _fruit(outline: Outline, vote: Vote, centre: Array, centre_sigma: Array) -> 
         + (z * outline.radius_sigma) ** 2
         + (ROUNDNESS_SIGMA * s * z) ** 2
         + (SCALE_SIGMA * z) ** 2
+        + (depth_sigma_per_m2 * z**2) ** 2
     )
     ray = np.array([centre[0], centre[1], 1.0])
     covariance = along2 * np.outer(ray, ray) + z**2 * np.diag([centre_sigma[0] ** 2, centre_sigma[1] ** 2, 0.0])
