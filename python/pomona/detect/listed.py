@@ -1,0 +1,111 @@
+"""Boxes that a file lists, checked against the recording they belong to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pomona.detect.detections import Detections
+from pomona.errors import PomonaError
+from pomona.recording import Calibration
+
+__all__ = ["ListedBox", "by_frame", "number_in"]
+
+
+@dataclass(frozen=True)
+class ListedBox:
+    """One box of a file.
+
+    Attributes
+    ----------
+    where : str
+        Its place in the file, for messages: `line 7`, `annotations[6]`.
+    frame : int
+        Frame number.
+    corners_px : tuple of four float
+        xmin, ymin, xmax, ymax in our pixels.
+    score : float
+        Confidence.
+    id : str
+        Name of the fruit, empty where the file does not name it.
+    """
+
+    where: str
+    frame: int
+    corners_px: tuple[float, float, float, float]
+    score: float = 1.0
+    id: str = ""
+
+
+def by_frame(
+    path: Path, boxes: Iterable[ListedBox], calibration: Calibration, numbers: Sequence[int]
+) -> dict[int, Detections]:
+    """Sort boxes by frame; a box partly outside the picture is cut at its edge.
+
+    Raises
+    ------
+    PomonaError
+        When a box is not in a frame there is, wholly outside the picture, or its score is not 0 to 1; when only some
+        boxes have ids, or one frame has an id twice.
+    """
+    frames: dict[int, list[ListedBox]] = {}
+    known = set(numbers)
+    for box in boxes:
+        if box.frame not in known:
+            have = f"{min(known)} to {max(known)}" if known else "none"
+            found = f"frame: found {box.frame}"
+            raise PomonaError(f"{path}: {box.where}: {found}, expected a frame there is ({have})")
+        _check(path, box, calibration)
+        frames.setdefault(box.frame, []).append(box)
+    _require_ids_of_all_or_none(path, frames)
+    return {number: _detections(path, number, found, calibration) for number, found in sorted(frames.items())}
+
+
+def number_in(where: str, field: str, cell: object) -> float:
+    """Give a finite number out of a cell of text or a JSON value."""
+    try:
+        value = math.nan if isinstance(cell, bool) else float(cell)  # type: ignore[arg-type] # what fails is caught
+    except (TypeError, ValueError):
+        value = math.nan
+    if not math.isfinite(value):
+        found = cell.strip() if isinstance(cell, str) else cell
+        raise PomonaError(f"{where}: {field}: found {found!r}, expected a number")
+    return value
+
+
+def _check(path: Path, box: ListedBox, calibration: Calibration) -> None:
+    xmin, ymin, xmax, ymax = box.corners_px
+    for axis, low, high in (("x", xmin, xmax), ("y", ymin, ymax)):
+        if low >= high:
+            found = f"found {axis}min {low:g} and {axis}max {high:g}"
+            raise PomonaError(f"{path}: {box.where}: {found}, expected {axis}min below")
+    width, height = calibration.size_px
+    if xmax <= 0 or ymax <= 0 or xmin >= width or ymin >= height:
+        found = f"the box {xmin:g},{ymin:g},{xmax:g},{ymax:g} is outside the picture of {width}x{height} pixels"
+        raise PomonaError(f"{path}: {box.where}: {found}")
+    if not 0 <= box.score <= 1:
+        raise PomonaError(f"{path}: {box.where}: score: found {box.score:g}, expected 0 to 1")
+
+
+def _require_ids_of_all_or_none(path: Path, frames: dict[int, list[ListedBox]]) -> None:
+    boxes = [box for found in frames.values() for box in found]
+    nameless = next((box for box in boxes if not box.id), None)
+    if nameless is not None and any(box.id for box in boxes):
+        raise PomonaError(f"{path}: {nameless.where}: id: found none, expected ids for all boxes or for none")
+
+
+def _detections(path: Path, number: int, boxes: list[ListedBox], calibration: Calibration) -> Detections:
+    first: dict[str, ListedBox] = {}
+    for box in boxes:
+        if box.id and (earlier := first.setdefault(box.id, box)) is not box:
+            places = f"{earlier.where} and {box.where}"
+            raise PomonaError(f"{path}: {places}: id: found {box.id!r} twice in frame {number}, expected it once")
+    return Detections(
+        boxes_px=np.clip([box.corners_px for box in boxes], 0.0, np.tile(np.array(calibration.size_px, float), 2)),
+        scores=np.array([box.score for box in boxes]),
+        ids=tuple(box.id for box in boxes) if boxes[0].id else None,
+    )
