@@ -1,7 +1,7 @@
 """Recordings with truth: the Kinect captures imported, the rendered row with boxes from its id pictures."""
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,9 @@ from pomona.detect.from_file import FileDetector
 from pomona.recording import Recording, open_recording
 from pomona.recording.kinect_apples import import_captures
 from pomona.survey import Survey, scan
+
+DATES = ("2024-08-09", "2024-08-28")
+"""Both visits of the rendered row."""
 
 MIN_VISIBLE = 0.30
 MIN_WIDTH_PX = 7
@@ -49,17 +52,20 @@ def rendered_truth(source: Path) -> FruitCloud:
     return FruitCloud.read(source / "fruits.csv")
 
 
-def with_true_boxes(source: Path, folder: Path) -> list[TrueBox]:
-    """Make a recording folder of a rendered one, its depth as it is, with detections.csv made from ids/."""
+def with_true_boxes(
+    source: Path, folder: Path, *, pictures: Sequence[str] = ("depth",), names: bool = True
+) -> list[TrueBox]:
+    """Make a recording folder of a rendered one, with detections.csv made from ids/, with the true ids or without."""
     folder.mkdir(parents=True)
-    (folder / "depth").symlink_to((source / "depth").resolve())
+    for kind in pictures:
+        (folder / kind).symlink_to((source / kind).resolve())
     for name in ("calibration.json", "poses_tum.txt"):
         (folder / name).write_bytes((source / name).read_bytes())
     boxes = list(true_boxes(source))
     with (folder / "detections.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
-        writer.writerows((box.frame, *box.box_px, 1, box.fruit) for box in boxes)
+        writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", *(("id",) if names else ())))
+        writer.writerows((box.frame, *box.box_px, 1, *((box.fruit,) if names else ())) for box in boxes)
     return boxes
 
 

@@ -137,7 +137,7 @@ def test_boxes_without_depth_are_counted(pomona, row, tmp_path):
     with (row / "detections.csv").open("a") as file:
         file.write("0,625,465,640,480,0.5,corner\n")
     done = pomona("scan", row, "-o", tmp_path / "fruits.csv")
-    assert "1 boxes without a fruit: cut by the edge of the picture" in done.stdout
+    assert "1 boxes without a place: cut by the edge of the picture" in done.stdout
     assert len(FruitCloud.read(tmp_path / "fruits.csv")) == 3
 
 

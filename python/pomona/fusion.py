@@ -1,9 +1,14 @@
 r"""One fruit out of many sightings: centre and diameter weighted by their covariances.
 
-With sightings x_i of covariance C_i the centre is the minimum of sum_i rho(m_i^2), m_i^2 = (x - x_i)^T C_i^-1 (x -
-x_i), rho Cauchy's: x = (sum w_i C_i^-1)^-1 sum w_i C_i^-1 x_i with w_i = 1 / (1 + m_i^2 / 3) (3 is what m_i^2 is on
-average). A sighting of the leaf in front is 5 sigma off and counts a ninth. Rays that cross make the long axes of the
-C_i cut each other: that is how many poor depths give one good place.
+A sighting says two things that fail apart: a direction, from its box, and a depth, from pictures in which a leaf or
+the row behind may have been matched instead. So its information J = C^-1 is split along its ray u,
+
+    J_along = J u u^T J / (u^T J u),    J_across = J - J_along    (J_across u = 0),
+
+and each part has its own robust loss: the centre is the minimum of sum_i rho_2(r_i^T J_across r_i) + rho_1(r_i^T
+J_along r_i) with r_i = x - x_i and Cauchy's rho_n(m^2) = n log(1 + m^2 / n), n the degrees of freedom, what m^2 is on
+average. A wrong depth then loses its weight and leaves its ray. Rays that cross make one good place of many poor
+depths.
 
 Leaves make an outline smaller, never larger. So a measured diameter D_i is the true one, less a hidden part with an
 exponential distribution of mean h_i D_i, plus Gaussian noise, and the diameter comes from the likelihood
@@ -13,6 +18,8 @@ exponential distribution of mean h_i D_i, plus Gaussian noise, and the diameter 
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +38,7 @@ SHARED = 0.1
 frame, so the variance does not fall below this part of a single sighting's, however many there are."""
 
 
-def fuse_centres(centres: Array, covariances: Array) -> tuple[Array, Array]:
+def fuse_centres(centres: Array, covariances: Array, rays: Array) -> tuple[Array, Array]:
     """Fuse sightings of one fruit.
 
     Parameters
@@ -40,24 +47,81 @@ def fuse_centres(centres: Array, covariances: Array) -> tuple[Array, Array]:
         In one frame of reference, metres.
     covariances : (V, 3, 3) float64
         Positive definite, square metres.
+    rays : (V, 3) float64
+        Direction in which each saw the fruit, of any length.
 
     Returns
     -------
     centre : (3,) float64
     covariance : (3, 3) float64
-        Larger by chi^2 per degree of freedom where the sightings disagree by more than they say.
+        Larger where most sightings disagree by more than they say.
     """
-    information: Array = np.asarray(np.linalg.inv(covariances), np.float64)
-    centre: Array = np.asarray(np.median(centres, axis=0), np.float64)
-    for _ in range(ITERATIONS):
-        weight = 1.0 / (1.0 + _mahalanobis2(centres - centre, information) / 3.0)
-        total = np.einsum("v,vij->ij", weight, information)
-        centre = np.linalg.solve(total, np.einsum("v,vij,vj->i", weight, information, centres))
     if len(centres) == 1:
-        return centre, covariances[0]
-    chi2 = float(weight @ _mahalanobis2(centres - centre, information)) / (3.0 * (len(centres) - 1))
-    covariance = np.linalg.inv(total) * max(chi2, 1.0) + SHARED * covariances.mean(axis=0)
+        return centres[0], covariances[0]
+    information = _Information.of(covariances, rays)
+    # The cost has a valley for each depth that some sightings agree on: begin at each, keep the deepest.
+    starts = np.concatenate([centres, np.median(centres, axis=0)[None]])
+    found = np.array([_descend(start, centres, information) for start in starts])
+    cost = [_cost(information.squares(centres - centre)) for centre in found]
+    centre = found[int(np.argmin(cost))]
+    squares = information.squares(centres - centre)
+    weights = _weights(squares)
+    total = information.sum(weights)
+    # Half of them may be wrong, but where the median sighting is off, all say too much.
+    disagreement = float(np.median(squares.sum(axis=1))) / MEDIAN_CHI2 * len(centres) / (len(centres) - 1)
+    covariance = np.linalg.inv(total) * max(disagreement, 1.0) + SHARED * covariances.mean(axis=0)
     return centre, (covariance + covariance.T) / 2
+
+
+MEDIAN_CHI2 = 2.366
+"""Median of chi^2 with three degrees of freedom."""
+
+DEGREES = np.array([2.0, 1.0])
+"""Degrees of freedom of a sighting across its ray and along it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Information:
+    """Inverse covariances (V, 3, 3), split in what a sighting says across its ray and along it."""
+
+    across: Array
+    along: Array
+
+    @classmethod
+    def of(cls, covariances: Array, rays: Array) -> _Information:
+        whole = np.linalg.inv(covariances)
+        pulled = np.einsum("vij,vj->vi", whole, rays)
+        along = pulled[:, :, None] * pulled[:, None, :] / np.einsum("vi,vi->v", rays, pulled)[:, None, None]
+        return cls(whole - along, along)
+
+    def squares(self, deviations: Array) -> Array:
+        """Squared Mahalanobis lengths across and along, (V, 2)."""
+        parts = (self.across, self.along)
+        return np.stack([np.einsum("vi,vij,vj->v", deviations, part, deviations) for part in parts], axis=1)
+
+    def sum(self, weights: Array) -> Array:
+        across = np.einsum("v,vij->ij", weights[:, 0], self.across)
+        return np.asarray(across + np.einsum("v,vij->ij", weights[:, 1], self.along))
+
+    def pull(self, weights: Array, centres: Array) -> Array:
+        across = np.einsum("v,vij,vj->i", weights[:, 0], self.across, centres)
+        return np.asarray(across + np.einsum("v,vij,vj->i", weights[:, 1], self.along, centres))
+
+
+def _descend(centre: Array, centres: Array, information: _Information) -> Array:
+    for _ in range(ITERATIONS):
+        weights = _weights(information.squares(centres - centre))
+        pull = information.pull(weights, centres)
+        centre = np.asarray(np.linalg.solve(information.sum(weights), pull), np.float64)
+    return centre
+
+
+def _weights(squares: Array) -> Array:
+    return np.asarray(1.0 / (1.0 + squares / DEGREES))
+
+
+def _cost(squares: Array) -> float:
+    return float((DEGREES * np.log1p(squares / DEGREES)).sum())
 
 
 def fuse_diameters(diameters_m: Array, sigmas_m: Array, hidden: Array) -> tuple[float, float]:
@@ -94,7 +158,3 @@ def fuse_diameters(diameters_m: Array, sigmas_m: Array, hidden: Array) -> tuple[
     weight /= weight.sum()
     mean = float(weight @ candidates)
     return mean, float(np.sqrt(weight @ (candidates - mean) ** 2))
-
-
-def _mahalanobis2(deviations: Array, information: Array) -> Array:
-    return np.asarray(np.einsum("vi,vij,vj->v", deviations, information, deviations))

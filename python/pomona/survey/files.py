@@ -1,0 +1,127 @@
+"""A survey as files: sessions, and the stages that `--keep` leaves."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pomona.atomic import whole_file
+from pomona.orchard import write_session
+from pomona.recording import Recording
+from pomona.survey.part import Part
+from pomona.survey.story import Survey
+
+__all__ = ["identity", "part_path", "write_stages", "write_survey"]
+
+CHUNK_BYTES = 1 << 20
+
+
+def write_survey(
+    output: Path,
+    survey: Survey,
+    recording: Recording,
+    *,
+    name: str,
+    date: str,
+    configuration: Mapping[str, Any],
+    inputs: Iterable[Path],
+) -> list[Path]:
+    """Write each part as a session of its own: a part has its own frame of reference.
+
+    Parameters
+    ----------
+    output : Path
+        .gpkg for sessions; .csv or .ply for their fruits alone. Further parts are `NAME-part2.gpkg` and so on.
+    survey : Survey
+        At least one part.
+    recording : Recording
+        What it was made of.
+    name, date : str
+        Of the session.
+    configuration : mapping
+        Effective settings, JSON values.
+    inputs : iterable of Path
+        Files that the survey depends on besides those of the recording.
+
+    Returns
+    -------
+    list of Path
+        The files, in order of the parts.
+    """
+    paths = [part_path(output, number) for number in range(len(survey.parts))]
+    if output.suffix.lower() != ".gpkg":
+        for path, part in zip(paths, survey.parts, strict=True):
+            part.cloud.write(path)
+        return paths
+    hashes = {_shown(file, recording): _sha256(file) for file in dict.fromkeys([*recording.inputs(), *inputs])}
+    for number, (path, part) in enumerate(zip(paths, survey.parts, strict=True)):
+        write_session(
+            path,
+            part.cloud,
+            name=name if number == 0 else f"{name} part {number + 1}",
+            date=date,
+            recording=str(recording.path.resolve()),
+            trajectory=part.trajectory,
+            configuration=configuration,
+            input_hashes=hashes,
+        )
+    return paths
+
+
+def part_path(path: Path, number: int) -> Path:
+    """Give the file of a part; the first has the name that was asked for."""
+    return path if number == 0 else path.with_stem(f"{path.stem}-part{number + 1}")
+
+
+def write_stages(folder: Path, survey: Survey) -> None:
+    """Write poses and tracks of each part in formats that `pomona scan` reads: poses_tum.txt, tracks.csv."""
+    for number, part in enumerate(survey.parts):
+        with whole_file(part_path(folder / "poses_tum.txt", number)) as partial:
+            partial.write_text(_tum(part), encoding="utf-8")
+        with (
+            whole_file(part_path(folder / "tracks.csv", number)) as partial,
+            partial.open("w", newline="", encoding="utf-8") as file,
+        ):
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
+            writer.writerows(_tracks(part))
+
+
+def _tum(part: Part) -> str:
+    from scipy.spatial.transform import Rotation
+
+    poses = part.trajectory.session_from_camera
+    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True)
+    lines = ["# time tx ty tz qx qy qz qw: session_from_camera"]
+    for time_s, pose, quaternion in zip(part.trajectory.times_s, poses, quaternions, strict=True):
+        lines.append(f"{time_s:.6f} " + " ".join(f"{number:.9f}" for number in (*pose[:3, 3], *quaternion)))
+    return "\n".join(lines) + "\n"
+
+
+def _tracks(part: Part) -> Iterable[tuple[object, ...]]:
+    """Rows of the boxes that are fruits."""
+    boxes, ids = part.boxes, part.cloud.ids or ()
+    for frame, box_px, score, fruit in zip(boxes.frames, boxes.boxes_px, boxes.scores, boxes.fruits, strict=True):
+        if fruit >= 0:
+            yield (frame, *(f"{edge:.3f}" for edge in box_px), f"{score:.4f}", ids[fruit])
+
+
+def identity(files: Iterable[Path]) -> dict[str, list[int]]:
+    """Say which files these are, near enough to notice that one changed: size in bytes and time of the last change."""
+    stats = {str(file.resolve()): file.stat() for file in files}
+    return {name: [stat.st_size, stat.st_mtime_ns] for name, stat in stats.items()}
+
+
+def _sha256(file: Path) -> str:
+    digest = hashlib.sha256()
+    with file.open("rb") as stream:
+        while chunk := stream.read(CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _shown(file: Path, recording: Recording) -> str:
+    return str(file.relative_to(recording.path)) if file.is_relative_to(recording.path) else str(file)

@@ -1,0 +1,114 @@
+"""What single frames showed, kept in a folder: a scan that is started again need not look twice.
+
+Detector and depth see each frame by itself, so what they found is taken up frame by frame; poses and tracks need all
+frames and are found anew. The fruits are the same, kept or not.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pomona.atomic import whole_file
+from pomona.depth import Lifted, Refusal
+from pomona.detect import Detections
+from pomona.errors import PomonaError
+from pomona.recording import Frame
+from pomona.survey.seeing import Look
+
+__all__ = ["Kept"]
+
+FORMAT = 1
+
+LIFTED = ("rows", "centres_in_camera", "covariances", "diameters_m", "diameter_sigmas_m", "hidden", "support")
+
+
+class Kept:
+    """A folder of looks, one file a frame, made from one recording with one set of settings.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is not there.
+    made_from : mapping
+        Whatever the looks depend on, JSON values.
+
+    Raises
+    ------
+    PomonaError
+        When the folder keeps what was made from something else, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, made_from: Mapping[str, Any]) -> None:
+        self._looks = folder / "looks"
+        note = folder / "made_from.json"
+        ours = json.dumps({"format": FORMAT, **made_from}, sort_keys=True, indent=1)
+        try:
+            self._looks.mkdir(parents=True, exist_ok=True)
+            if note.is_file():
+                _require_same(note, ours)
+            else:
+                with whole_file(note) as partial:
+                    partial.write_text(ours, encoding="utf-8")
+        except OSError as error:
+            raise PomonaError(f"{folder}: cannot be written: {error.strerror}") from None
+
+    def remembering(self, see: Callable[[Frame], Look]) -> Callable[[Frame], Look]:
+        """Give a `see` that looks only at frames that are not kept yet, and keeps them."""
+
+        def look(frame: Frame) -> Look:
+            file = self._looks / f"{frame.number:06d}.npz"
+            if file.is_file():
+                return _read(file, frame.number)
+            seen = see(frame)
+            _write(file, seen)
+            return seen
+
+        return look
+
+
+def _require_same(note: Path, ours: str) -> None:
+    theirs = note.read_text(encoding="utf-8")
+    if theirs == ours:
+        return
+    found, expected = json.loads(theirs), json.loads(ours)
+    odd = next(name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name))
+    raise PomonaError(
+        f"{note}: {odd}: found {found.get(odd)!r}, expected {expected.get(odd)!r}: remove the folder or take another"
+    )
+
+
+def _write(file: Path, look: Look) -> None:
+    arrays: dict[str, Any] = {name: getattr(look.lifted, name) for name in LIFTED}
+    arrays |= {"boxes_px": look.detections.boxes_px, "scores": look.detections.scores}
+    arrays["refused"] = np.array(json.dumps({reason.name: count for reason, count in look.lifted.refused.items()}))
+    if look.detections.ids is not None:
+        arrays["ids"] = np.array(json.dumps(look.detections.ids))
+    if look.colours is not None:
+        arrays["colours"] = look.colours
+    with whole_file(file) as partial, partial.open("wb") as stream:
+        np.savez(stream, **arrays)
+
+
+def _read(file: Path, frame: int) -> Look:
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            ids = tuple(json.loads(str(arrays["ids"]))) if "ids" in arrays else None
+            refused = json.loads(str(arrays["refused"]))
+            return Look(
+                frame,
+                Detections(arrays["boxes_px"], arrays["scores"], ids),
+                Lifted(
+                    **{name: arrays[name] for name in LIFTED},
+                    refused=Counter({Refusal[name]: count for name, count in refused.items()}),
+                ),
+                arrays.get("colours"),
+            )
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise PomonaError(f"{file}: not a kept frame ({error}): remove it") from None

@@ -1,0 +1,154 @@
+"""What one frame shows: boxes, each lifted to 3D where it can be, and its colour. No frame needs another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.depth import Lifted, lift
+from pomona.detect import Detections, Detector
+from pomona.errors import PomonaError
+from pomona.recording import Calibration, Frame, Recording
+from pomona.stereo import StereoDepth
+from pomona.survey.prefetch import Kind
+
+__all__ = ["Look", "Seeing"]
+
+COLOUR_PART = 0.5
+"""Middle part of a box, along each side, whose median is the fruit's colour: mostly fruit, whatever hides its rim."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One frame, seen.
+
+    Attributes
+    ----------
+    frame : int
+        Frame number.
+    detections : Detections
+        D boxes.
+    lifted : Lifted
+        The boxes in 3D, those that could be.
+    colours : (D, 3) uint8 or None
+        Median colour of each box, BGR; None where the recording has none.
+    """
+
+    frame: int
+    detections: Detections
+    lifted: Lifted
+    colours: NDArray[np.uint8] | None
+
+
+class _Depth(Protocol):
+    """Gives the fruits of one frame in 3D."""
+
+    needs: tuple[Kind, ...]
+
+    def __call__(self, frame: Frame, boxes_px: NDArray[np.float64]) -> Lifted: ...
+
+
+class Seeing:
+    """Detector and depth of one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        With depth, or with left and right pictures and a baseline.
+    detector : Detector
+        Gives the boxes.
+    stereo : bool
+        Measure depth from left and right even where there are depth pictures.
+
+    Raises
+    ------
+    PomonaError
+        When the recording has neither depth nor a stereo pair.
+    """
+
+    def __init__(self, recording: Recording, detector: Detector, *, stereo: bool = False) -> None:
+        self._detector = detector
+        self._depth = _depth_of(recording, stereo)
+        self._colour = "left" in recording.description()["pictures"]
+
+    @property
+    def needs(self) -> tuple[Kind, ...]:
+        """Pictures that every frame is asked for."""
+        return tuple(dict.fromkeys((*self._depth.needs, *(("left",) if self._colour else ()))))
+
+    @property
+    def stereo(self) -> bool:
+        """Whether depth comes from left and right."""
+        return isinstance(self._depth, _FromStereo)
+
+    def __call__(self, frame: Frame) -> Look:
+        """Look at one frame.
+
+        Raises
+        ------
+        UnreadablePictureError
+            When one of its pictures cannot be read.
+        """
+        detections = self._detector(frame)
+        lifted = self._depth(frame, detections.boxes_px)
+        return Look(frame.number, detections, lifted, self._colours(frame, detections.boxes_px))
+
+    def _colours(self, frame: Frame, boxes_px: NDArray[np.float64]) -> NDArray[np.uint8] | None:
+        if not self._colour or frame.read_left is None:
+            return None
+        left = frame.read_left()
+        return np.array([_colour(left, box_px) for box_px in boxes_px], np.uint8).reshape(-1, 3)
+
+
+def _colour(picture: NDArray[np.uint8], box_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median colour of the middle of a box; the box may reach out of the picture, its middle pixel is kept inside."""
+    height, width = picture.shape[:2]
+    centre, half = (box_px[:2] + box_px[2:]) / 2, COLOUR_PART * (box_px[2:] - box_px[:2]) / 2
+    limits = np.array([width - 1, height - 1])
+    low = np.clip(np.floor(centre - half).astype(int), 0, limits)
+    high = np.clip(np.ceil(centre + half).astype(int), low + 1, limits + 1)
+    middle = picture[low[1] : high[1], low[0] : high[0]].reshape(-1, 3)
+    return np.asarray(np.median(middle, axis=0))
+
+
+def _depth_of(recording: Recording, stereo: bool) -> _Depth:
+    pictures = recording.description()["pictures"]
+    if "depth" in pictures and not stereo:
+        return _FromPictures(recording)
+    if {"left", "right"} <= pictures.keys() and recording.calibration.baseline_m is not None:
+        return _FromStereo(recording.calibration)
+    found = " and ".join(pictures)
+    expected = "left and right" if stereo else "depth, or left and right"
+    raise PomonaError(f"{recording.path}: found {found} pictures, expected {expected}")
+
+
+class _FromPictures:
+    """Depth that was recorded."""
+
+    needs: tuple[Kind, ...] = ("depth",)
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+
+    def __call__(self, frame: Frame, boxes_px: NDArray[np.float64]) -> Lifted:
+        if frame.read_depth is None:
+            raise PomonaError(f"{self._recording.path}: frame {frame.number} has no depth picture")
+        return lift(frame.read_depth(), boxes_px, self._recording.calibration)
+
+
+class _FromStereo:
+    """Depth from left and right, at the boxes alone."""
+
+    needs: tuple[Kind, ...] = ("left", "right")
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._calibration, self._stereo = calibration, StereoDepth(calibration)
+
+    def __call__(self, frame: Frame, boxes_px: NDArray[np.float64]) -> Lifted:
+        if frame.read_left is None or frame.read_right is None:
+            raise PomonaError(f"frame {frame.number}: found one picture, expected left and right")
+        found = self._stereo(frame.read_left(), frame.read_right(), boxes_px)
+        return lift(found.depth_m, boxes_px, self._calibration, disparity_sigma_px=found.disparity_sigma_px)

@@ -1,0 +1,198 @@
+"""The story of a scan: recording -> boxes, depth and poses, frame by frame -> tracks -> fruits, each once."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pomona.cloud import FruitCloud
+from pomona.depth import Refusal
+from pomona.detect import Detector
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording import Frame, Recording
+from pomona.recording.pictures import UnreadablePictureError
+from pomona.survey.kept import Kept
+from pomona.survey.motion import Camera, Place, camera_of
+from pomona.survey.part import OpenPart, Part
+from pomona.survey.prefetch import prefetched
+from pomona.survey.seeing import Look, Seeing
+from pomona.trajectory import Trajectory
+
+__all__ = ["Progress", "Survey", "scan"]
+
+Progress = Callable[[int, int, int], None]
+"""Called after each frame with frames done, frames in all, fruits so far."""
+
+PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
+"""The smallest berries and the largest melons."""
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What a scan found.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        One where the camera was followed all the way; more where its track broke. At least one, maybe without fruits.
+    detections : int
+        Boxes seen.
+    refused : Counter of Refusal
+        Boxes whose depth was not measured, by reason.
+    skipped : dict
+        Number of each frame that could not be used, and why.
+    stopped : int or None
+        Frame after which `stop` said yes.
+    """
+
+    parts: tuple[Part, ...]
+    detections: int
+    refused: Counter[Refusal]
+    skipped: dict[int, str] = field(default_factory=dict)
+    stopped: int | None = None
+
+    @property
+    def cloud(self) -> FruitCloud:
+        """Fruits of the longest part."""
+        return self._longest.cloud
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Poses of the longest part."""
+        return self._longest.trajectory
+
+    @property
+    def _longest(self) -> Part:
+        return max(self.parts, key=lambda part: len(part.trajectory))
+
+
+def scan(
+    recording: Recording,
+    detector: Detector,
+    *,
+    stereo: bool = False,
+    odometry: bool = False,
+    keep: Kept | None = None,
+    progress: Progress | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Survey:
+    """Find every fruit of a recording once.
+
+    Parameters
+    ----------
+    recording : Recording
+        With depth, or left and right, pictures.
+    detector : Detector
+        Gives boxes. Their ids say which boxes are one fruit.
+    stereo : bool
+        Measure depth from left and right even where there are depth pictures.
+    odometry : bool
+        Find the poses even where the recording has some.
+    keep : Kept, optional
+        Where what single frames show is kept, so that a scan that is started again need not look twice.
+    progress : callable, optional
+        Called after each frame.
+    stop : callable, optional
+        Asked after each frame; once it says yes, the survey of the frames so far is made.
+
+    Raises
+    ------
+    PomonaError
+        When pictures that are needed are not there, or no frame can be used. Single ones that cannot are skipped and
+        told.
+    """
+    seeing = Seeing(recording, detector, stereo=stereo)
+    camera = camera_of(recording, odometry=odometry)
+    if len(recording) > 1 and not getattr(detector, "with_ids", False):
+        found = f"boxes without ids in {len(recording)} frames"
+        raise PomonaError(f"{recording.path}: found {found}, expected an id for each")
+    findings = _Findings()
+    look_at = keep.remembering(seeing) if keep is not None else seeing
+    frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
+    with ThreadPoolExecutor(1, "pomona-look") as looker, closing(frames):
+        for done, frame in enumerate(frames, start=1):
+            look = looker.submit(look_at, frame)  # while this thread follows the camera
+            findings.add(frame, _placed(camera, frame), look)
+            if progress is not None:
+                progress(done, len(recording), findings.n_fruits)
+            if stop is not None and stop():
+                findings.stopped = frame.number
+                break
+    _tell_skipped(recording, findings.skipped)
+    survey = findings.survey(camera)
+    _check_sizes(recording, survey)
+    return survey
+
+
+def _placed(camera: Camera, frame: Frame) -> Place:
+    try:
+        return camera(frame)
+    except UnreadablePictureError as error:
+        return Place(None, broken=str(error))
+
+
+class _Findings:
+    """What there is so far: the closed frames of each part, and the frames that could not be used."""
+
+    def __init__(self) -> None:
+        self._parts: list[OpenPart] = []
+        self._detections = 0
+        self._refused = Counter[Refusal]()
+        self.skipped: dict[int, str] = {}
+        self.stopped: int | None = None
+
+    @property
+    def n_fruits(self) -> int:
+        return sum(part.n_fruits for part in self._parts)
+
+    def add(self, frame: Frame, place: Place, coming: Future[Look]) -> None:
+        """Take a frame, or note why it cannot be used."""
+        try:
+            look = coming.result()
+        except UnreadablePictureError as error:
+            self.skipped[frame.number] = str(error)
+            return
+        if place.session_from_camera is None:
+            self.skipped[frame.number] = f"frame {frame.number}: {place.broken}"
+            return
+        if place.part >= len(self._parts):
+            self._parts.append(OpenPart(place.part, place.broken))
+        # Where nobody noted the time, frames are numbered: order is all that is known.
+        time_s = float(frame.number if frame.time_s is None else frame.time_s)
+        self._parts[place.part].add(look, time_s)
+        self._detections += len(look.detections)
+        self._refused += look.lifted.refused
+
+    def survey(self, camera: Camera) -> Survey:
+        parts = tuple(part.closed(camera) for part in self._parts)
+        return Survey(parts, self._detections, self._refused, self.skipped, self.stopped)
+
+
+def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:
+    """Say how many frames could not be used, and the first of them; a scan of nothing is no scan."""
+    if not skipped:
+        return
+    first = next(iter(skipped.values()))
+    if len(skipped) == len(recording):
+        raise PomonaError(first)
+    message = f"{recording.path}: skipped {len(skipped)} of {len(recording)} frames, first {first}"
+    warnings.warn(message, PomonaWarning, stacklevel=3)
+
+
+def _check_sizes(recording: Recording, survey: Survey) -> None:
+    """Warn when the fruits cannot be fruits: then a unit is wrong, mostly that of depth or baseline."""
+    low_m, high_m = PLAUSIBLE_DIAMETER_M
+    diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
+    if len(diameters_m) and not low_m <= (median_m := float(np.median(diameters_m))) <= high_m:
+        expected = f"{1000 * low_m:g} to {1000 * high_m:g} mm"
+        unit = f"depth_unit_m {recording.calibration.depth_unit_m:g}, fx {recording.calibration.fx:g} px"
+        message = (
+            f"{recording.path}: the median diameter is {1000 * median_m:.3g} mm, expected {expected}: check {unit}"
+        )
+        warnings.warn(message, PomonaWarning, stacklevel=3)

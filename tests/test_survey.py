@@ -1,0 +1,229 @@
+"""A scan read ahead, stopped, kept and taken up again, drawn; and the whole front end on stereo pictures."""
+
+import csv
+import json
+import os
+import signal
+import sys
+import threading
+
+import cv2
+import numpy as np
+import pytest
+from benchmarks.recordings import detector
+
+from pomona.cli import main
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.orchard import load_session
+from pomona.recording import Frame, open_recording
+from pomona.recording.pictures import UnreadablePictureError
+from pomona.survey import Kept, scan
+from pomona.survey.prefetch import prefetched
+from recording_maker import FIELDS, make_recording
+
+STEPS_M = (0.0, 0.05, 0.1, 0.15)
+
+
+@pytest.fixture
+def row(tmp_path):
+    return make_recording(tmp_path / "2024-08-09", STEPS_M)
+
+
+@pytest.fixture
+def pomona(monkeypatch, capsys):
+    def run_main(*arguments):
+        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return ended.value.code, printed.out, printed.err
+
+    return run_main
+
+
+def with_left(folder):
+    """Give a recording grey left pictures with a red disc in each box."""
+    (folder / "left").mkdir()
+    boxes = list(csv.DictReader((folder / "detections.csv").read_text().splitlines()))
+    for frame in range(len(STEPS_M)):
+        picture = np.full((FIELDS["height"], FIELDS["width"], 3), 90, np.uint8)
+        for box in (box for box in boxes if int(box["frame"]) == frame):
+            x, y = ((float(box[f"{axis}min"]) + float(box[f"{axis}max"])) / 2 for axis in "xy")
+            cv2.circle(picture, (round(x), round(y)), 14, (30, 40, 200), -1)
+        assert cv2.imwrite(str(folder / "left" / f"{frame:04d}.png"), picture)
+    return folder
+
+
+def test_pictures_are_decoded_once_ahead_and_in_order():
+    read, threads = [], set()
+
+    def reader(number):
+        def read_left():
+            read.append(number)
+            threads.add(threading.current_thread())
+            return np.full((2, 2, 3), number, np.uint8)
+
+        return read_left
+
+    frames = (Frame(number=number, read_left=reader(number)) for number in range(5))
+    for frame in prefetched(frames, ("left",)):
+        assert frame.number in read
+        assert frame.read_left() is frame.read_left()
+        assert frame.read_left()[0, 0, 0] == frame.number
+    assert read == [0, 1, 2, 3, 4]
+    assert threading.main_thread() not in threads
+
+
+def test_pictures_that_nobody_needs_are_not_decoded():
+    def never():
+        raise AssertionError("decoded")
+
+    frames = list(prefetched([Frame(number=0, read_left=never, read_depth=lambda: np.ones((1, 1), np.float32))], ()))
+    assert frames[0].read_depth()[0, 0] == 1
+
+
+def test_a_picture_that_cannot_be_read_says_so_where_it_is_asked_for():
+    def broken():
+        raise UnreadablePictureError("0001.png: corrupt")
+
+    frames = list(prefetched([Frame(number=0), Frame(number=1, read_left=broken), Frame(number=2)], ("left",)))
+    assert [frame.number for frame in frames] == [0, 1, 2]
+    for _ in range(2):
+        with pytest.raises(UnreadablePictureError, match="corrupt"):
+            frames[1].read_left()
+
+
+def test_an_error_of_the_recording_comes_through():
+    def frames():
+        yield Frame(number=0)
+        raise PomonaError("video.mp4: cut off")
+
+    with pytest.raises(PomonaError, match="cut off"):
+        list(prefetched(frames(), ()))
+
+
+def test_a_scan_that_is_stopped_keeps_what_it_has(row):
+    recording = open_recording(row)
+    done = []
+    survey = scan(
+        recording,
+        detector(row, recording),
+        progress=lambda *state: done.append(state),
+        stop=lambda: len(done) == 2,
+    )
+    assert done == [(1, 4, 3), (2, 4, 3)]
+    assert survey.stopped == 1
+    assert survey.trajectory.frames.tolist() == [0, 1]
+    assert survey.cloud.n_views.tolist() == [2, 2, 2]
+
+
+def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, monkeypatch):
+    from pomona.detect.from_file import FileDetector
+
+    look = FileDetector.__call__
+
+    def interrupting(self, frame):
+        if frame.number == 1:
+            signal.raise_signal(signal.SIGINT)  # the real signal, as the terminal sends it
+        return look(self, frame)
+
+    monkeypatch.setattr(FileDetector, "__call__", interrupting)
+    before = signal.getsignal(signal.SIGINT)
+    code, printed, _ = pomona("scan", row, "-o", tmp_path / "session.gpkg")
+    assert code == 130
+    assert "stopped after frame" in printed
+    session = load_session(tmp_path / "session.gpkg")
+    assert len(session.cloud) == 3
+    assert 2 <= len(session.trajectory) < len(STEPS_M)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_every_from_and_to(pomona, row, tmp_path):
+    code, printed, _ = pomona("scan", row, "-o", tmp_path / "s.gpkg", "--every", 2, "--from", 1, "--json")
+    assert code == 0
+    assert json.loads(printed)["n_frames"] == 2
+    assert load_session(tmp_path / "s.gpkg").trajectory.frames.tolist() == [1, 3]
+
+
+def test_what_is_kept_is_not_looked_at_again_and_changes_nothing(pomona, row, tmp_path):
+    keep = tmp_path / "keep"
+    assert pomona("scan", row, "-o", tmp_path / "plain.csv")[0] == 0
+    assert pomona("scan", row, "-o", tmp_path / "first.csv", "--keep", keep)[0] == 0
+    assert len(list((keep / "looks").iterdir())) == len(STEPS_M)
+    for picture in (row / "depth").iterdir():  # the same size and age: only a look at it would tell
+        stat = picture.stat()
+        picture.write_bytes(b"\0" * stat.st_size)
+        os.utime(picture, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert pomona("scan", row, "-o", tmp_path / "again.csv", "--keep", keep)[0] == 0
+    plain = (tmp_path / "plain.csv").read_bytes()
+    assert (tmp_path / "first.csv").read_bytes() == plain
+    assert (tmp_path / "again.csv").read_bytes() == plain
+
+
+def test_kept_stages_are_inputs_of_the_next_scan(pomona, row, tmp_path):
+    keep = tmp_path / "keep"
+    assert pomona("scan", row, "-o", tmp_path / "first.csv", "--keep", keep)[0] == 0
+    tracks = keep / "tracks.csv"
+    assert pomona("scan", row, "-o", tmp_path / "again.csv", "--detections", tracks)[0] == 0
+    first, again = (FruitCloud.read(tmp_path / name) for name in ("first.csv", "again.csv"))
+    assert first.ids == again.ids
+    np.testing.assert_allclose(first.positions, again.positions, atol=2e-4)
+    assert (keep / "poses_tum.txt").read_text().count("\n") == 1 + len(STEPS_M)
+
+
+def test_looks_of_other_boxes_are_not_taken_up(pomona, row, tmp_path):
+    keep = tmp_path / "keep"
+    assert pomona("scan", row, "-o", tmp_path / "first.csv", "--keep", keep)[0] == 0
+    with (row / "detections.csv").open("a") as file:
+        file.write("0,100,100,120,120,0.5,d\n")
+    code, _, told = pomona("scan", row, "-o", tmp_path / "again.csv", "--keep", keep)
+    assert (code, told.count("\n")) == (2, 1)
+    assert "made_from.json: files" in told
+    assert "remove the folder" in told
+
+
+def test_a_kept_frame_that_is_cut_off_is_named(row, tmp_path):
+    recording = open_recording(row)
+    kept = Kept(tmp_path / "keep", {})
+    scan(recording, detector(row, recording), keep=kept)
+    file = tmp_path / "keep" / "looks" / "000002.npz"
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(PomonaError, match=r"000002\.npz: not a kept frame"):
+        scan(recording, detector(row, recording), keep=kept)
+
+
+def test_fruits_have_the_colour_of_their_pictures(row):
+    recording = open_recording(with_left(row))
+    cloud = scan(recording, detector(row, recording)).cloud
+    assert cloud.extras["colour"] == ("#c8281e",) * 3
+
+
+def test_the_preview_shows_every_frame_with_boxes_on_it(pomona, row, tmp_path):
+    av = pytest.importorskip("av")
+    with_left(row)
+    preview = tmp_path / "preview.mp4"
+    assert pomona("scan", row, "-o", tmp_path / "fruits.csv", "--preview", preview)[0] == 0
+    with av.open(str(preview)) as video:
+        pictures = [frame.to_ndarray(format="bgr24") for frame in video.decode(video=0)]
+    assert len(pictures) == len(STEPS_M)
+    boxes = list(csv.DictReader((row / "detections.csv").read_text().splitlines()))
+    for frame, picture in enumerate(pictures):
+        assert picture.shape == (FIELDS["height"], FIELDS["width"], 3)
+        for box in (box for box in boxes if int(box["frame"]) == frame):
+            x, y = round(float(box["xmin"])), round((float(box["ymin"]) + float(box["ymax"])) / 2)
+            edge = picture[y - 3 : y + 4, x - 1 : x + 2].astype(int)
+            # Grey is what was there: an edge of a fruit's box has a strong colour.
+            assert np.ptp(edge, axis=2).max() > 60
+
+
+def test_a_preview_needs_pictures_and_a_name_that_says_video(pomona, row, tmp_path):
+    for arguments, words in (
+        (("--preview", tmp_path / "p.mp4"), "no left pictures"),
+        (("--preview", tmp_path / "p.avi"), "suffix '.avi'"),
+    ):
+        code, _, told = pomona("scan", row, "-o", tmp_path / "fruits.csv", *arguments)
+        assert (code, told.count("\n")) == (2, 1)
+        assert words in told
+        assert not list(tmp_path.glob("*.mp4"))
+        assert not (tmp_path / "fruits.csv").exists()
