@@ -1,12 +1,15 @@
 """What several tests need."""
 
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pomona import FruitCloud, Views
+from pomona.cli import main
 
 
 @pytest.fixture(scope="session")
@@ -33,3 +36,17 @@ def full_cloud() -> FruitCloud:
         views=Views(frames=np.array([4, 4, 9]), fruits=np.array([0, 2, 2])),
         extras={"note": tuple("abcdef")},
     )
+
+
+@pytest.fixture
+def pomona(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """The command line, in this process: exit code, stdout, stderr."""
+
+    def run_main(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return ended.value.code, printed.out, printed.err
+
+    return run_main

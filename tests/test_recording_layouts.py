@@ -2,14 +2,12 @@
 
 import json
 import shutil
-import sys
 
 import cv2
 import numpy as np
 import pytest
 
 from pomona import PomonaError, PomonaWarning
-from pomona.cli import main
 from pomona.cli.scan import SUFFIXES
 from pomona.cloud import FruitCloud
 from pomona.detect.from_file import FileDetector
@@ -266,20 +264,6 @@ def test_euroc_gives_pairs_and_poses(euroc):
     np.testing.assert_allclose([f.session_from_camera[0, 3] for f in frames], [0, 0.05, 0.1], atol=1e-6)
     assert frames[0].read_left().shape == (48, 64, 3)
     assert len(open_recording(euroc / "mav0")) == 3
-
-
-@pytest.fixture
-def pomona(monkeypatch, capsys):
-    """The command line, in this process: exit code, stdout, stderr."""
-
-    def run_main(*arguments):
-        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return ended.value.code, printed.out, printed.err
-
-    return run_main
 
 
 def test_info_prints_what_shows_a_wrong_unit(pomona, kitti):

@@ -13,10 +13,13 @@ if TYPE_CHECKING:
 
 def info(
     recording: Path = typer.Argument(
-        metavar="RECORDING", help="Recording folder, KITTI, TUM RGB-D or EuRoC folder, or stereo video."
+        metavar="RECORDING", help="Recording folder, KITTI, TUM RGB-D or EuRoC folder, stereo video, ROS bag or MCAP."
     ),
     calibration: Path | None = typer.Option(
         None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
+    ),
+    topics: str | None = typer.Option(
+        None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
     ),
     check: bool = typer.Option(False, "--check", help="Decode every picture and name those that cannot be read."),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
@@ -26,8 +29,11 @@ def info(
     With --check the exit code is 1 when a picture cannot be read.
     """
     from pomona.recording import open_recording
+    from pomona.recording.bags.topics import parsed_topics
 
-    opened = open_recording(recording, calibration=calibration)
+    opened = open_recording(
+        recording, calibration=calibration, topics=None if topics is None else parsed_topics(topics)
+    )
     found = opened.description()
     unreadable = _unreadable(opened) if check else {}
     if check:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from pomona.errors import PomonaError
@@ -11,12 +12,14 @@ __all__ = ["ACCEPTED", "open_recording"]
 
 ACCEPTED = (
     "a recording folder (left/ or depth/ with calibration.json), a KITTI, TUM RGB-D or EuRoC folder, "
-    "a side-by-side video, or a folder with left.mp4 and right.mp4"
+    "a side-by-side video, a folder with left.mp4 and right.mp4, a ROS 1 bag, a ROS 2 bag or an MCAP"
 )
 """For messages and the help."""
 
 
-def open_recording(path: str | Path, *, calibration: str | Path | None = None) -> Recording:
+def open_recording(
+    path: str | Path, *, calibration: str | Path | None = None, topics: Mapping[str, str] | None = None
+) -> Recording:
     """Open a recording and check what can be checked without decoding it.
 
     Parameters
@@ -25,6 +28,9 @@ def open_recording(path: str | Path, *, calibration: str | Path | None = None) -
         One of `ACCEPTED`; the kind is recognised by its files.
     calibration : str or Path, optional
         File or folder with the calibration, where it does not lie beside the pictures.
+    topics : mapping, optional
+        Of a bag: the topic of `left`, `right`, `depth`, `left_info`, `right_info`, `depth_info` or `poses`, where it is
+        not found by its name.
 
     Raises
     ------
@@ -34,8 +40,13 @@ def open_recording(path: str | Path, *, calibration: str | Path | None = None) -
     place, given = Path(path), None if calibration is None else Path(calibration)
     if not place.exists():
         raise PomonaError(f"{path}: not found, expected {ACCEPTED}")
+    from pomona.recording import bags
     from pomona.recording.video import VIDEO_SUFFIXES, left_and_right, open_video
 
+    if bags.recognises(place):
+        return bags.open_bag(place, given, topics)
+    if topics:
+        raise PomonaError(f"{path}: topics: found no bag, expected one for --topics")
     if not place.is_dir():
         if place.suffix.lower() not in VIDEO_SUFFIXES:
             raise PomonaError(f"{path}: found a file, expected {ACCEPTED}")

@@ -11,9 +11,18 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 
-__all__ = ["UnreadablePictureError", "numbered_pictures", "picture_size", "read_colour", "read_depth"]
+__all__ = [
+    "UnreadablePictureError",
+    "decoded_picture",
+    "numbered_pictures",
+    "picture_size",
+    "read_colour",
+    "read_depth",
+]
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+PNG_BEGINS = b"\x89PNG\r\n\x1a\n"
 
 
 class UnreadablePictureError(PomonaError):
@@ -66,24 +75,43 @@ def read_depth(path: Path, calibration: Calibration) -> NDArray[np.float32]:
     return picture.astype(np.float32) * np.float32(calibration.depth_unit_m)
 
 
-def _decode(path: Path, flags: int) -> NDArray[Any]:
+def decoded_picture(where: str | Path, encoded: NDArray[np.uint8], flags: int) -> NDArray[Any]:
+    """Decode the bytes of a PNG or JPEG as `cv2.imdecode` does, but not one that is cut off.
+
+    Raises
+    ------
+    UnreadablePictureError
+        One line that begins with `where`.
+    """
     import cv2
 
+    kind = _cut_off(encoded.tobytes())
+    if kind is not None:
+        raise UnreadablePictureError(f"{where}: the {kind} is cut off")
+    picture = cv2.imdecode(encoded, flags) if len(encoded) else None
+    if picture is None:
+        raise UnreadablePictureError(f"{where}: not a picture, or a corrupt one")
+    return np.asarray(picture)
+
+
+def _decode(path: Path, flags: int) -> NDArray[Any]:
     try:
         encoded = np.fromfile(path, np.uint8)
     except OSError as error:
         raise UnreadablePictureError(f"{path}: cannot be read: {error.strerror}") from None
-    if path.suffix.lower() == ".png" and not _png_ends(encoded):
+    if path.suffix.lower() == ".png" and encoded[:8].tobytes() != PNG_BEGINS:
         raise UnreadablePictureError(f"{path}: the PNG is cut off or not a PNG")
-    picture = cv2.imdecode(encoded, flags) if len(encoded) else None
-    if picture is None:
-        raise UnreadablePictureError(f"{path}: not a picture, or a corrupt one")
-    return np.asarray(picture)
+    return decoded_picture(path, encoded, flags)
 
 
-def _png_ends(encoded: NDArray[np.uint8]) -> bool:
-    # A truncated PNG decodes with rows of zeros and only a message on stderr: its last chunk must be IEND.
-    return encoded[:8].tobytes() == b"\x89PNG\r\n\x1a\n" and b"IEND" in encoded[-32:].tobytes()
+def _cut_off(encoded: bytes) -> str | None:
+    """Name a PNG or JPEG that has no end: decoders fill the rest with zeros or grey, and only mutter on stderr."""
+    if encoded.startswith(PNG_BEGINS):
+        return None if b"IEND" in encoded[-32:] else "PNG"
+    if encoded.startswith(b"\xff\xd8"):
+        # The end of the image must come after the last start of a scan; thumbnails have ends of their own before it.
+        return None if encoded.rfind(b"\xff\xd9") > encoded.rfind(b"\xff\xda") else "JPEG"
+    return None
 
 
 def _require_size(path: Path, picture: NDArray[Any], calibration: Calibration) -> None:

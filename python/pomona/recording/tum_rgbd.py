@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.listed import ListedRecording
+from pomona.recording.pairing import mutually_nearest
 from pomona.recording.poses import read_tum
 from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectified_pictures import size_of_first
@@ -90,21 +91,11 @@ def _associated(folder: Path, colour_s: NDArray[np.float64], depth_s: NDArray[np
     """Rows (colour, depth) of pictures that are each other's nearest in time; says how many colour ones are left."""
     if not (len(colour_s) and len(depth_s)):
         raise PomonaError(f"{folder}: found {len(colour_s)} pictures in rgb.txt and {len(depth_s)} in depth.txt")
-    nearest_depth, nearest_colour = _nearest(colour_s, depth_s), _nearest(depth_s, colour_s)
-    rows = np.arange(len(colour_s))
-    mutual = nearest_colour[nearest_depth] == rows
-    near = np.abs(depth_s[nearest_depth] - colour_s) <= FARTHEST_S
-    kept = rows[mutual & near]
+    kept = mutually_nearest(colour_s, depth_s, FARTHEST_S)
     if len(kept) == 0:
         raise PomonaError(f"{folder}: found no colour and depth within {FARTHEST_S:g} s, expected one clock")
-    if len(kept) < len(rows):
-        left_out = f"{len(rows) - len(kept)} of {len(rows)} colour pictures"
+    if len(kept) < len(colour_s):
+        left_out = f"{len(colour_s) - len(kept)} of {len(colour_s)} colour pictures"
         message = f"{folder}: {left_out} have no depth within {FARTHEST_S:g} s and are left out"
         warnings.warn(message, PomonaWarning, stacklevel=3)
-    return np.stack([kept, nearest_depth[kept]], axis=1)
-
-
-def _nearest(of_s: NDArray[np.float64], among_s: NDArray[np.float64]) -> NDArray[np.int64]:
-    after = np.searchsorted(among_s, of_s).clip(0, len(among_s) - 1)
-    before = (after - 1).clip(0)
-    return np.where(np.abs(among_s[before] - of_s) <= np.abs(among_s[after] - of_s), before, after)
+    return kept

@@ -1,0 +1,5 @@
+"""Recordings of robots: ROS 1 and ROS 2 bags and MCAP files, read without ROS."""
+
+from pomona.recording.bags.opening import open_bag, recognises
+
+__all__ = ["open_bag", "recognises"]

@@ -1,0 +1,128 @@
+"""What is read of a bag when it is opened: times of the pictures, cameras, and frames of reference that stand still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.recording.bags.message_file import Message, MessageFile, Topic, decoded, stamp_ns
+from pomona.recording.bags.pictures import is_depth, size_of
+from pomona.recording.bags.topics import Roles
+
+__all__ = ["Contents", "PictureTopic", "read_contents"]
+
+STATIC = "/tf_static"
+
+AFTER_STAMP = 12
+"""Bytes of sequence number or encapsulation and of the time, before what a camera_info says."""
+
+
+@dataclass(eq=False)
+class PictureTopic:
+    """The pictures of one topic.
+
+    Attributes
+    ----------
+    stamps_ns, logged_ns : (M,) int64
+        When each was taken, ascending, and when the recorder received it.
+    size_px : (width, height)
+        Of the first one that can be read.
+    depth : bool
+        Whether they hold depth.
+    frame : str
+        Name of the camera's frame of reference.
+    """
+
+    topic: Topic
+    stamps_ns: NDArray[np.int64]
+    logged_ns: NDArray[np.int64]
+    size_px: tuple[int, int]
+    depth: bool
+    frame: str
+
+
+@dataclass(eq=False)
+class Contents:
+    """See the module.
+
+    Attributes
+    ----------
+    pictures : dict
+        For `left`, `right`, `depth`, as there are.
+    infos : dict
+        For each topic of a camera_info the different ones on it, decoded.
+    static : list
+        Decoded `TransformStamped` that hold for the whole recording.
+    """
+
+    pictures: dict[str, PictureTopic]
+    infos: dict[str, list[Any]]
+    static: list[Any]
+
+
+@dataclass(eq=False)
+class _Seen:
+    """One topic of pictures while it is read."""
+
+    topic: Topic
+    stamps_ns: list[int] = field(default_factory=list)
+    logged_ns: list[int] = field(default_factory=list)
+    example: Any = None
+    size_px: tuple[int, int] | None = None
+
+    def add(self, message: Message) -> None:
+        self.stamps_ns.append(stamp_ns(message))
+        self.logged_ns.append(message.logged_ns)
+        if self.size_px is None:
+            try:
+                example = decoded(message)
+                self.size_px, self.example = size_of(self.topic.name, example), example
+            except PomonaError:
+                return
+
+
+def read_contents(file: MessageFile, roles: Roles) -> Contents:
+    """Read a bag once, and decode of each topic of pictures the first one only.
+
+    Raises
+    ------
+    PomonaError
+        When a topic has no picture that can be read, or its times go back.
+    """
+    seen = {topic: _Seen(file.topics[topic]) for topic in roles.pictures.values()}
+    info_topics = [name for name in (roles.left_info, roles.right_info, roles.depth_info) if name is not None]
+    infos: dict[str, dict[bytes, Any]] = {name: {} for name in info_topics}
+    static: list[Any] = []
+    for message in file.messages({*seen, *infos, STATIC}):
+        name = message.topic.name
+        if name in seen:
+            seen[name].add(message)
+        elif name in infos:
+            said = message.body[AFTER_STAMP:]
+            if said not in infos[name]:
+                infos[name][said] = decoded(message)
+        else:
+            static.extend(decoded(message).transforms)
+    pictures = {kind: _listed(file, seen[topic]) for kind, topic in roles.pictures.items()}
+    return Contents(pictures, {name: list(each.values()) for name, each in infos.items()}, static)
+
+
+def _listed(file: MessageFile, seen: _Seen) -> PictureTopic:
+    where = f"{file.path}: {seen.topic.name}"
+    if seen.size_px is None:
+        raise PomonaError(f"{where}: found {len(seen.stamps_ns)} pictures and none that can be read")
+    logged_ns = np.array(seen.logged_ns, np.int64)
+    stamps_ns = np.array(seen.stamps_ns, np.int64)
+    if not stamps_ns.any():  # a driver that leaves the header empty
+        stamps_ns = logged_ns
+    back = np.flatnonzero(np.diff(stamps_ns) <= 0)
+    if len(back):
+        row = int(back[0]) + 1
+        times = f"from {stamps_ns[row - 1] / 1e9:.3f} s to {stamps_ns[row] / 1e9:.3f} s"
+        raise PomonaError(f"{where}: picture {row}: time goes back {times}, expected ascending times")
+    example = seen.example
+    return PictureTopic(seen.topic, stamps_ns, logged_ns, seen.size_px, is_depth(example), str(example.header.frame_id))

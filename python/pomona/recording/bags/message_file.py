@@ -1,0 +1,124 @@
+"""What every kind of bag gives: topics, and the bodies of their messages one after the other."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from pomona.errors import PomonaError
+
+__all__ = ["Message", "MessageFile", "Topic", "decoded", "missing_extra", "stamp_ns"]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic of a bag.
+
+    Attributes
+    ----------
+    type : str
+        As ROS 2 writes it: `sensor_msgs/msg/Image`.
+    encoding : str
+        `cdr` (ROS 2), `ros1`, or what an MCAP says.
+    """
+
+    name: str
+    type: str
+    encoding: str
+
+
+@dataclass(frozen=True, eq=False)
+class Message:
+    """A message that is not decoded.
+
+    Attributes
+    ----------
+    logged_ns : int
+        When the recorder received it; the header in the body says when it was made.
+    """
+
+    topic: Topic
+    logged_ns: int
+    body: bytes
+
+
+class MessageFile(Protocol):
+    """A bag, open for as long as somebody reads from it."""
+
+    @property
+    def path(self) -> Path:
+        """The file or folder."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the format."""
+
+    @property
+    def topics(self) -> dict[str, Topic]:
+        """All topics by name."""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files it consists of."""
+
+    def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
+        """Read the messages of some topics, each topic's in the order in which they were logged.
+
+        Parameters
+        ----------
+        topics : collection of str
+            Names.
+        start_ns : int, optional
+            Leave out those that were logged earlier.
+        """
+
+
+def stamp_ns(message: Message) -> int:
+    """Time in the message's header; only for types that begin with `std_msgs/Header`.
+
+    ROS 1 writes seq, seconds and nanoseconds; CDR four bytes that tell the order of bytes, then seconds and
+    nanoseconds.
+    """
+    try:
+        if message.topic.encoding == "ros1":
+            seconds, nanoseconds = struct.unpack_from("<II", message.body, 4)
+        else:
+            seconds, nanoseconds = struct.unpack_from("<iI" if message.body[1] & 1 else ">iI", message.body, 4)
+    except (struct.error, IndexError):
+        return 0
+    return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def decoded(message: Message) -> Any:
+    """Decode a message of one of ROS' common types; its fields are attributes.
+
+    Raises
+    ------
+    PomonaError
+        When the body is not what the type says.
+    """
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, get_typestore
+
+    ros1 = message.topic.encoding == "ros1"
+    store = _stores.get(ros1)
+    if store is None:
+        store = _stores[ros1] = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
+    decode = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+    try:
+        return decode(message.body, message.topic.type)
+    except (SerdeError, KeyError, IndexError, ValueError, struct.error) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise PomonaError(f"{message.topic.name}: not a {message.topic.type} ({reason})") from None
+
+
+_stores: dict[bool, Any] = {}
+"""Definitions of ROS 1 and of ROS 2: they take a while to make, and sensor_msgs has not changed in either."""
+
+
+def missing_extra(path: Path) -> PomonaError:
+    """Say how to install what reads bags."""
+    return PomonaError(f"{path}: a bag needs rosbags and mcap, which are not installed: pip install 'pomona[bags]'")

@@ -1,0 +1,135 @@
+"""From a bag to a recording: topics, cameras, pairs, poses."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.bags.bag_recording import BagRecording
+from pomona.recording.bags.camera_info import camera_of, rig_of, says_rectified
+from pomona.recording.bags.contents import Contents, PictureTopic, read_contents
+from pomona.recording.bags.message_file import MessageFile
+from pomona.recording.bags.topics import Roles, chosen_topics
+from pomona.recording.pairing import half_period, mutually_nearest
+from pomona.recording.rectification import Optics, rectified
+from pomona.recording.rig_files import find_optics
+
+__all__ = ["BAG_SUFFIXES", "open_bag", "recognises"]
+
+BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+
+
+def recognises(place: Path) -> bool:
+    """Whether a file or a folder is a bag."""
+    if place.is_file():
+        return place.suffix in BAG_SUFFIXES
+    return (place / "metadata.yaml").is_file() or bool(_parts(place))
+
+
+def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, str] | None = None) -> BagRecording:
+    """Open a bag: it is read once from beginning to end, and its pictures are not decoded.
+
+    Parameters
+    ----------
+    path : Path
+        A .bag, .mcap or .db3, or the folder of a ROS 2 bag.
+    calibration : Path, optional
+        Instead of the camera_info in it.
+    topics : mapping, optional
+        Topic of each role of `ROLES`, where they are not found by their names.
+
+    Raises
+    ------
+    PomonaError
+        When pictures or cameras are missing, not clear, or do not fit together.
+    """
+    file = _open_file(path)
+    roles = chosen_topics(path, file.topics, topics)
+    contents = read_contents(file, roles)
+    _require_kinds(path, contents)
+    optics = _optics(path, roles, contents, calibration)
+    rows = _simultaneous(path, contents.pictures)
+    return BagRecording(path, file, roles, optics, contents.pictures, rows, None)
+
+
+def _open_file(path: Path) -> MessageFile:
+    from pomona.recording.bags.joined import JoinedBags
+    from pomona.recording.bags.mcap_file import McapFile
+    from pomona.recording.bags.ros_bag import RosBag
+
+    parts = (path,) if path.is_file() else _parts(path)
+    if parts and all(part.suffix == ".mcap" for part in parts):
+        return McapFile.open(path) if path.is_file() else JoinedBags(path, tuple(map(McapFile.open, parts)))
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        return JoinedBags(path, tuple(RosBag.open(part, (part,)) for part in parts))
+    return RosBag.open(path, (path,) if path.is_file() else tuple(sorted(file for file in path.iterdir())))
+
+
+def _parts(folder: Path) -> tuple[Path, ...]:
+    """Files of a bag that was split, in the order of their numbers."""
+    files = (file for file in folder.iterdir() if file.is_file() and file.suffix in (".mcap", ".db3"))
+    return tuple(sorted(files, key=lambda file: [int(digits) for digits in re.findall(r"\d+", file.stem)]))
+
+
+def _require_kinds(path: Path, contents: Contents) -> None:
+    pictures = contents.pictures
+    left, right, depth = (pictures.get(kind) for kind in ("left", "right", "depth"))
+    if depth is not None and not depth.depth:
+        raise PomonaError(f"{path}: {depth.topic.name}: found colour or grey, expected depth")
+    for other in (right, depth):
+        if left is not None and other is not None and left.size_px != other.size_px:
+            sizes = " and ".join("{}x{}".format(*each.size_px) for each in (left, other))
+            names = f"{left.topic.name} and {other.topic.name}"
+            raise PomonaError(f"{path}: {names}: found {sizes} pixels, expected equal sizes")
+
+
+def _optics(path: Path, roles: Roles, contents: Contents, calibration: Path | None) -> Optics:
+    """Rectify by what was given, else by the camera_info, else by a calibration beside the bag."""
+    first = next(iter(contents.pictures.values()))
+    stereo = "right" in contents.pictures
+    infos = [roles.left_info or roles.depth_info, roles.right_info if stereo else None]
+    if calibration is not None or not any(contents.infos.get(name or "") for name in infos):
+        beside = path if path.is_dir() else path.parent
+        try:
+            return find_optics(beside, first.size_px, stereo=stereo, given=calibration)
+        except PomonaError as error:
+            if calibration is not None or "found none" not in str(error):
+                raise
+    expected = [roles.pictures.get("left") or roles.pictures["depth"], roles.right if stereo else None]
+    cameras = []
+    for info, picture in zip(infos, expected, strict=True):
+        if picture is None:
+            continue
+        if info is None:
+            wanted = f"{picture.rpartition('/')[0]}/camera_info"
+            raise PomonaError(f"{path}: {picture}: found no camera_info for it, expected {wanted} or --calibration")
+        cameras.append(camera_of(path, info, contents.infos[info], is_rectified=says_rectified(picture)))
+    rig = rig_of((path,), cameras[0], cameras[1] if stereo else None, None)
+    return rectified(rig, first.size_px, stereo=stereo)
+
+
+def _simultaneous(path: Path, pictures: dict[str, PictureTopic]) -> dict[str, NDArray[np.int64]]:
+    """Rows of each topic that belong together: within half a frame of the first topic's; says what is left out."""
+    kinds = list(pictures)
+    first = pictures[kinds[0]]
+    rows = {kinds[0]: np.arange(len(first.stamps_ns))}
+    for kind in kinds[1:]:
+        other = pictures[kind]
+        farthest_ns = min(half_period(first.stamps_ns), half_period(other.stamps_ns), np.inf)
+        pairs = mutually_nearest(first.stamps_ns[rows[kinds[0]]], other.stamps_ns, farthest_ns)
+        if len(pairs) == 0:
+            names = f"{first.topic.name} and {other.topic.name}"
+            raise PomonaError(f"{path}: {names}: found no pictures within half a frame, expected one clock")
+        rows = {known: of_known[pairs[:, 0]] for known, of_known in rows.items()} | {kind: pairs[:, 1]}
+    counts = [len(pictures[kind].stamps_ns) for kind in kinds]
+    if max(counts) > len(rows[kinds[0]]):
+        found = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+        message = f"{path}: found {found} pictures, {len(rows[kinds[0]])} frames have all of them; others are left out"
+        warnings.warn(message, PomonaWarning, stacklevel=4)
+    return rows

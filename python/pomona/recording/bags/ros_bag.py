@@ -1,0 +1,73 @@
+"""ROS 1 bags, and ROS 2 bags in SQLite, through rosbags."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pomona.errors import PomonaError
+from pomona.recording.bags.message_file import Message, Topic, missing_extra
+
+__all__ = ["RosBag"]
+
+
+@dataclass(frozen=True, eq=False)
+class RosBag:
+    """See `MessageFile`."""
+
+    path: Path
+    kind: str
+    topics: dict[str, Topic]
+    files: tuple[Path, ...]
+
+    @classmethod
+    def open(cls, path: Path, files: tuple[Path, ...]) -> RosBag:
+        """Open a .bag, a .db3 or the folder of a ROS 2 bag.
+
+        Raises
+        ------
+        PomonaError
+            When it cannot be read.
+        """
+        ros1 = path.suffix == ".bag"
+        encoding = "ros1" if ros1 else "cdr"
+        with _opened(path) as reader:
+            topics = {each.topic: Topic(each.topic, each.msgtype, encoding) for each in reader.connections}
+        return cls(path, "ROS 1 bag" if ros1 else "ROS 2 bag", topics, files)
+
+    def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
+        """Read in order of the time of logging."""
+        with _opened(self.path) as reader:
+            connections = [each for each in reader.connections if each.topic in topics]
+            if not connections:
+                return
+            for connection, logged_ns, body in reader.messages(connections, start=start_ns):
+                yield Message(self.topics[connection.topic], logged_ns, bytes(body))
+
+
+def _opened(path: Path) -> Any:
+    try:
+        from rosbags import rosbag1, rosbag2
+    except ImportError:
+        raise missing_extra(path) from None
+    reader: Any = (rosbag1 if path.suffix == ".bag" else rosbag2).Reader(path)
+    return _Opened(path, reader)
+
+
+class _Opened:
+    """A reader that says in one line what is wrong with its file."""
+
+    def __init__(self, path: Path, reader: Any) -> None:
+        self.path, self.reader = path, reader
+
+    def __enter__(self) -> Any:
+        try:
+            return self.reader.__enter__()
+        except Exception as error:  # its own errors, SQLite's, and those of what a damaged header makes it do
+            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            raise PomonaError(f"{self.path}: not a bag, or a damaged one ({reason})") from None
+
+    def __exit__(self, *_: object) -> None:
+        self.reader.close()
