@@ -12,7 +12,8 @@ __all__ = ["ACCEPTED", "open_recording"]
 
 ACCEPTED = (
     "a recording folder (left/ or depth/ with calibration.json), a KITTI, TUM RGB-D or EuRoC folder, "
-    "a side-by-side video, a folder with left.mp4 and right.mp4, a ROS 1 bag, a ROS 2 bag or an MCAP"
+    "a side-by-side video, a folder with left.mp4 and right.mp4, a ROS 1 bag, a ROS 2 bag, "
+    "an MCAP or a ZED .svo2"
 )
 """For messages and the help."""
 
@@ -48,6 +49,10 @@ def open_recording(
     if topics:
         raise PomonaError(f"{path}: topics: found no bag, expected one for --topics")
     if not place.is_dir():
+        if place.suffix.lower() == ".svo2":
+            from pomona.recording.svo2 import open_svo2
+
+            return open_svo2(place, given)
         if place.suffix.lower() not in VIDEO_SUFFIXES:
             raise PomonaError(f"{path}: found a file, expected {ACCEPTED}")
         return open_video(place, given)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,31 @@ from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.rectification import Optics
 from pomona.recording.rig_files import find_optics
-from pomona.recording.video_file import VideoFile, VideoPicture
+from pomona.recording.video_file import VideoFile
+from pomona.recording.video_runs import VideoPicture
 
 __all__ = ["VIDEO_SUFFIXES", "VideoRecording", "left_and_right", "open_video"]
 
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".ts", ".m4v")
+
+
+class Video(Protocol):
+    """One stream of pictures."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of each picture, ascending."""
+
+    @property
+    def created(self) -> str | None:
+        """When it was made, ISO 8601."""
+
+    def pictures(self, rows: Sequence[int] | None = None) -> Iterator[VideoPicture]:
+        """Decode picture by picture, all or those of some rows, ascending."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +51,15 @@ class VideoRecording:
 
     Attributes
     ----------
-    left, right : VideoFile
-        The same file when the pictures are side by side.
+    left, right : Video
+        The same when the pictures are side by side.
     """
 
     path: Path
+    kind: str
     optics: Optics
-    left: VideoFile
-    right: VideoFile
+    left: Video
+    right: Video
 
     trajectory = None
 
@@ -95,9 +116,8 @@ class VideoRecording:
 
     def description(self) -> dict[str, Any]:
         """Say what was found."""
-        kind = "side-by-side video" if self.side_by_side else "left and right video"
         counts = {"left": len(self), "right": len(self)}
-        return describe(self, kind, self.left.times_s.tolist(), counts, detections=False)
+        return describe(self, self.kind, self.left.times_s.tolist(), counts, detections=False)
 
 
 def _columns(
@@ -141,7 +161,8 @@ def open_video(path: Path, calibration: Path | None = None) -> VideoRecording:
         _require_pair(left, right)
     else:
         raise PomonaError(f"{path}: found {len(files)} videos, expected left and right, or one side by side")
-    return VideoRecording(path, find_optics(place, size_px, stereo=True, given=calibration), left, right)
+    kind = "side-by-side video" if left is right else "left and right video"
+    return VideoRecording(path, kind, find_optics(place, size_px, stereo=True, given=calibration), left, right)
 
 
 def _require_pair(left: VideoFile, right: VideoFile) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import bisect
 import datetime
-import itertools
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,36 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.recording.pictures import UnreadablePictureError
+from pomona.recording.video_runs import VideoPicture, key_row, wanted_pictures
 
 if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.frame import VideoFrame
 
-__all__ = ["VideoFile", "VideoPicture"]
-
-JUMP_FRAMES = 50
-"""Fewer pictures than these are decoded for nothing rather than jumped over: a jump opens the file anew."""
+__all__ = ["VideoFile", "missing_pyav"]
 
 CUT_OFF_FRAMES = 2
 """A header may promise the length in rounded time: a video is cut off when more than this is missing."""
-
-
-@dataclass(eq=False)
-class VideoPicture:
-    """A picture of a video, turned into BGR once, when it is first asked for."""
-
-    where: str
-    frame: VideoFrame | None
-    _bgr: NDArray[np.uint8] | None = None
-
-    def read(self) -> NDArray[np.uint8]:
-        """Give (H, W, 3) uint8, BGR."""
-        if self.frame is None:
-            raise UnreadablePictureError(f"{self.where}: the picture is corrupt")
-        if self._bgr is None:
-            self._bgr = np.asarray(self.frame.to_ndarray(format="bgr24"), np.uint8)
-        return self._bgr
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,56 +73,42 @@ class VideoFile:
         rows : sequence of int, optional
             Which of `stamps`, ascending; all where not given. Long stretches that nobody wants are jumped over.
         """
-        for run in self._runs(range(len(self.stamps)) if rows is None else rows):
-            upcoming = 0
-            for row, frame in self._decoded_from(run[0], frozenset(run)):
-                while upcoming < len(run) and run[upcoming] < row:
-                    yield self._picture(run[upcoming], None)
-                    upcoming += 1
-                if upcoming < len(run) and run[upcoming] == row:
-                    yield self._picture(row, None if frame.is_corrupt else frame)
-                    upcoming += 1
-                if upcoming == len(run):
-                    break
-            yield from (self._picture(missing, None) for missing in run[upcoming:])
+        chosen = range(len(self.stamps)) if rows is None else rows
+        return wanted_pictures(chosen, self.keys, self._decoded, self._where)
 
-    def _runs(self, rows: Sequence[int]) -> Iterator[Sequence[int]]:
-        """Cut rows where going on to a later key picture saves more than `JUMP_FRAMES`."""
-        cuts = [place for place in range(1, len(rows)) if self._key(rows[place]) - rows[place - 1] > JUMP_FRAMES]
-        return (rows[start:end] for start, end in itertools.pairwise([0, *cuts, len(rows)]) if start < end)
-
-    def _key(self, row: int) -> int:
-        """Give the row of the last picture, up to this one, that needs no other to be decoded."""
-        return self.keys[bisect.bisect_right(self.keys, row) - 1] if self.keys and self.keys[0] <= row else 0
-
-    def _decoded_from(self, row: int, wanted: frozenset[int]) -> Iterator[tuple[int, VideoFrame]]:
-        """Decode from the key picture of a row on; give (row, picture) in ascending order."""
-        rows = {stamp: row for row, stamp in enumerate(self.stamps)}
-        stamps = frozenset(self.stamps[row] for row in wanted)
-        for key in sorted({0, self._key(row)}, reverse=True):
+    def _decoded(self, rows: Sequence[int]) -> Iterator[tuple[int, VideoFrame]]:
+        """Decode from the key picture of the first row on; give (row, picture) in ascending order."""
+        row_of = {stamp: row for row, stamp in enumerate(self.stamps)}
+        wanted = frozenset(self.stamps[row] for row in rows)
+        for key in sorted({0, key_row(self.keys, rows[0])}, reverse=True):
             latest = -1
             with _opened(self.path) as container:
                 if key:
                     container.seek(self.stamps[key], stream=container.streams.video[0])
-                for frame in _decoded(container, stamps):
-                    at = rows.get(frame.pts if frame.pts is not None else -1, -1)
-                    if latest < 0 and key and at > row:
+                for frame in _decoded(container, wanted):
+                    row = row_of.get(frame.pts if frame.pts is not None else -1, -1)
+                    if latest < 0 and key and row > rows[0]:
                         break  # Not every container jumps exactly: begin at its beginning instead.
-                    if at > latest:
-                        latest = at
-                        yield at, frame
+                    if row > latest:
+                        latest = row
+                        yield row, frame
             if latest >= 0:
                 return
 
-    def _picture(self, row: int, frame: VideoFrame | None) -> VideoPicture:
-        return VideoPicture(f"{self.path}: frame {row} at {self.times_s[row]:.3f} s", frame)
+    def _where(self, row: int) -> str:
+        return f"{self.path}: frame {row} at {self.times_s[row]:.3f} s"
+
+
+def missing_pyav(path: Path) -> PomonaError:
+    """Say how to install what decodes videos."""
+    return PomonaError(f"{path}: a video needs PyAV, which is not installed: pip install 'pomona[video]'")
 
 
 def _opened(path: Path) -> InputContainer:
     try:
         import av
     except ImportError:
-        raise PomonaError(f"{path}: a video needs PyAV, which is not installed: pip install 'pomona[video]'") from None
+        raise missing_pyav(path) from None
     try:
         container = av.open(str(path))
     except (av.error.FFmpegError, OSError) as error:
