@@ -209,9 +209,9 @@ def test_the_preview_shows_every_frame_with_boxes_on_it(pomona, row, tmp_path):
     assert len(pictures) == len(STEPS_M)
     boxes = list(csv.DictReader((row / "detections.csv").read_text().splitlines()))
     for frame, picture in enumerate(pictures):
-        assert picture.shape == (FIELDS["height"], FIELDS["width"], 3)
+        assert picture.shape == (2 * FIELDS["height"], 2 * FIELDS["width"], 3)  # enlarged to be legible
         for box in (box for box in boxes if int(box["frame"]) == frame):
-            x, y = round(float(box["xmin"])), round((float(box["ymin"]) + float(box["ymax"])) / 2)
+            x, y = round(2 * float(box["xmin"])), round(float(box["ymin"]) + float(box["ymax"]))
             edge = picture[y - 3 : y + 4, x - 1 : x + 2].astype(int)
             # Grey is what was there: an edge of a fruit's box has a strong colour.
             assert np.ptp(edge, axis=2).max() > 60

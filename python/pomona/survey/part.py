@@ -32,15 +32,12 @@ class Boxes:
         Confidence, 0 to 1.
     fruits : (B,) int64
         Row of the fruit in the part's cloud, -1 where the box is of none.
-    depths_m : (B,) float64
-        Depth of the centre along the optical axis as this frame measured it, NaN where it did not.
     """
 
     frames: NDArray[np.int64]
     boxes_px: NDArray[np.float64]
     scores: NDArray[np.float64]
     fruits: NDArray[np.int64]
-    depths_m: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +105,7 @@ class OpenPart:
         fruits = row_of[owners[sightings.boxes[measured]]]
         cloud = fruits_of(sightings.select(measured), fruits, self._looks, session_from_camera, named)
         trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), session_from_camera)
-        return Part(cloud, trajectory, _boxes(self._looks, sightings, row_of[owners]), self._began)
+        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners]), self._began)
 
     def _owners(self) -> tuple[NDArray[np.int64], list[str]]:
         """Fruit of each box of the part as a row of the names, -1 for none."""
@@ -138,13 +135,10 @@ def _measured(
     return row_of, [names[row] for row in found]
 
 
-def _boxes(looks: Sequence[Look], sightings: Sightings, fruits: NDArray[np.int64]) -> Boxes:
-    depths_m = np.full(len(fruits), np.nan)
-    depths_m[sightings.boxes] = sightings.centres_in_camera[:, 2]
+def _boxes(looks: Sequence[Look], fruits: NDArray[np.int64]) -> Boxes:
     return Boxes(
         frames=np.repeat([look.frame for look in looks], [len(look.detections) for look in looks]).astype(np.int64),
         boxes_px=np.concatenate([np.empty((0, 4)), *(look.detections.boxes_px for look in looks)]),
         scores=np.concatenate([np.empty(0), *(look.detections.scores for look in looks)]),
         fruits=fruits,
-        depths_m=depths_m,
     )

@@ -16,7 +16,7 @@ from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.recording import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
-from pomona.survey.part import Boxes, Part
+from pomona.survey.part import Part
 from pomona.survey.prefetch import prefetched
 from pomona.survey.story import Survey
 
@@ -29,6 +29,9 @@ RATE_HZ = 10
 
 GOLDEN = 0.618034
 """Step of the hue from one fruit to the next: neighbours in number never look alike."""
+
+LEGIBLE_PX = 1280
+"""Smaller pictures are drawn on enlarged, to this width or more."""
 
 GREY = (160, 160, 160)
 """Boxes that became no fruit."""
@@ -56,11 +59,13 @@ def write_preview(
         As `require_preview`.
     """
     require_preview(recording)
+    times = -(-LEGIBLE_PX // recording.calibration.width)
     part_of = {frame: part for part in survey.parts for frame in part.trajectory.frames.tolist()}
-    with whole_file(path) as partial, _video(partial, recording, _rate(survey)) as write:
+    size_px = times * recording.calibration.width, times * recording.calibration.height
+    with whole_file(path) as partial, _video(partial, size_px, _rate(survey)) as write:
         for done, frame in enumerate(prefetched(recording.frames(), ("left",)), start=1):
             if (part := part_of.get(frame.number)) is not None and (picture := _left(frame)) is not None:
-                write(_drawn(picture, frame.number, part))
+                write(_drawn(picture, frame.number, part, times))
             if progress is not None:
                 progress(done, len(recording))
 
@@ -94,14 +99,13 @@ def _left(frame: Frame) -> Picture | None:
 
 
 @contextmanager
-def _video(path: Path, recording: Recording, rate: Fraction) -> Iterator[Callable[[Picture], None]]:
+def _video(path: Path, size_px: tuple[int, int], rate: Fraction) -> Iterator[Callable[[Picture], None]]:
     import av
 
-    calibration = recording.calibration
     with av.open(str(path), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=rate, options={"crf": "20", "preset": "veryfast"})
         # The common pixel format halves colour along both axes, which takes even sides.
-        stream.width, stream.height = calibration.width // 2 * 2, calibration.height // 2 * 2
+        stream.width, stream.height = (side // 2 * 2 for side in size_px)
         stream.pix_fmt = "yuv420p"
 
         def write(picture: Picture) -> None:
@@ -114,34 +118,45 @@ def _video(path: Path, recording: Recording, rate: Fraction) -> Iterator[Callabl
             container.mux(packet)
 
 
-def _drawn(picture: Picture, frame: int, part: Part) -> Picture:
-    """Draw the boxes of one frame: fruits in their own colour with name, depth and diameter; the rest grey."""
+def _drawn(picture: Picture, frame: int, part: Part, times: int) -> Picture:
+    """Draw the boxes of one frame: fruits in their own colour with name, diameter and depth; the rest grey."""
     import cv2
 
-    drawn, boxes = picture.copy(), part.boxes
-    for row in np.flatnonzero(boxes.frames == frame):
-        low, high = (tuple(np.round(corner).astype(int).tolist()) for corner in np.split(boxes.boxes_px[row], 2))
-        fruit = int(boxes.fruits[row])
+    drawn = np.asarray(cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC), np.uint8)
+    rows = np.flatnonzero(part.boxes.frames == frame)
+    depths_m = _depths(part, frame)
+    for row in rows:
+        low, high = (np.round(times * corner).astype(int) for corner in np.split(part.boxes.boxes_px[row], 2))
+        fruit = int(part.boxes.fruits[row])
         colour = GREY if fruit < 0 else _colour(fruit)
-        cv2.rectangle(drawn, low, high, colour, 1, cv2.LINE_AA)
+        cv2.rectangle(drawn, low.tolist(), high.tolist(), colour, 1, cv2.LINE_AA)
         if fruit >= 0:
-            for line, text in enumerate(_labels(part, boxes, int(row), fruit)):
-                place = (low[0], low[1] - 3 - 9 * line)
-                cv2.putText(drawn, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.3, (0, 0, 0), 2, cv2.LINE_AA)
-                cv2.putText(drawn, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.3, colour, 1, cv2.LINE_AA)
-    cv2.putText(drawn, f"frame {frame}", (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1, cv2.LINE_AA)
+            _write(drawn, (int(low[0]), int(low[1]) - 4), _label(part, fruit), colour)
+            _write(drawn, (int(low[0]), int(high[1]) + 12), f"{depths_m[fruit]:.2f} m", colour)
+    _write(drawn, (8, 18), f"frame {frame}", (255, 255, 255))
     return drawn
 
 
-def _labels(part: Part, boxes: Boxes, row: int, fruit: int) -> Iterator[str]:
-    """Lines of text from the box upwards."""
-    depth_m = boxes.depths_m[row]
-    if np.isfinite(depth_m):
-        yield f"{depth_m:.2f} m"
-    name = (part.cloud.ids or ())[fruit]
-    yield name if part.cloud.diameters_m is None else f"{name}  {1000 * part.cloud.diameters_m[fruit]:.0f} mm"
+def _depths(part: Part, frame: int) -> NDArray[np.float64]:
+    """Depth of every fruit of the part in this frame, metres along the optical axis."""
+    row = int(np.flatnonzero(part.trajectory.frames == frame)[0])
+    pose = part.trajectory.session_from_camera[row]
+    return np.asarray((part.cloud.positions - pose[:3, 3]) @ pose[:3, 2])
+
+
+def _label(part: Part, fruit: int) -> str:
+    name = part.cloud.label(fruit)
+    return name if part.cloud.diameters_m is None else f"{name}: {1000 * part.cloud.diameters_m[fruit]:.0f} mm"
+
+
+def _write(picture: Picture, place: tuple[int, int], text: str, colour: tuple[int, int, int]) -> None:
+    """Write with a dark rim, legible on leaves and sky."""
+    import cv2
+
+    for width, ink in ((3, (0, 0, 0)), (1, colour)):
+        cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.38, ink, width, cv2.LINE_AA)
 
 
 def _colour(fruit: int) -> tuple[int, int, int]:
-    red, green, blue = colorsys.hsv_to_rgb(fruit * GOLDEN % 1.0, 0.75, 1.0)
+    red, green, blue = colorsys.hsv_to_rgb(fruit * GOLDEN % 1.0, 0.55, 1.0)
     return int(255 * blue), int(255 * green), int(255 * red)
