@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pomona.detect.coco import read_coco
 from pomona.detect.csv_table import read_csv
@@ -65,6 +66,11 @@ class FileDetector:
     def with_ids(self) -> bool:
         """Whether every box names its fruit (true of an empty file)."""
         return all(found.ids is not None for found in self.by_frame.values())
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """What it reads, for a session's provenance."""
+        return {"detections": str(self.path.resolve())}
 
     @property
     def description(self) -> str:

@@ -1,0 +1,6 @@
+"""Detectors as ONNX files, run by ONNX Runtime (extra `onnx`), which is imported when a model is opened."""
+
+from pomona.detect.onnx.detector import OnnxDetector
+from pomona.detect.onnx.families import FAMILIES
+
+__all__ = ["FAMILIES", "OnnxDetector"]

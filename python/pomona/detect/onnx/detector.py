@@ -1,0 +1,193 @@
+"""The story of a model: picture -> tiles -> network -> candidates -> boxes in the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.detect.detections import Detections
+from pomona.detect.onnx.candidates import Selection, suppress
+from pomona.detect.onnx.families import FAMILIES
+from pomona.detect.onnx.masks import tightened
+from pomona.detect.onnx.network import Network
+from pomona.detect.onnx.preparation import prepare
+from pomona.detect.onnx.signature import Signature, identify
+from pomona.detect.onnx.tiles import Tile, Tiling, lay_tiles, merge_tiles, read_tiling
+from pomona.errors import PomonaError
+from pomona.recording import Frame
+
+__all__ = ["IOU", "MIN_SCORE", "OnnxDetector"]
+
+MIN_SCORE = 0.25
+"""What the YOLO families use; a box that is seen once with a low score is dropped later, for want of views."""
+
+IOU = 0.6
+"""Boxes that overlap more are one fruit: then two fruits of 75 mm would hang within 19 mm across the view,
+(s - d) / (s + d) = 0.6, the one nearly hidden by the other."""
+
+CUT_PX = 3.0
+"""A box that ends within so many pixels of the network's input from the edge of its tile is cut by it: as near as
+detectors draw."""
+
+
+@dataclass(frozen=True, eq=False)
+class OnnxDetector:
+    """A detector out of an ONNX file; `open` makes one."""
+
+    network: Network
+    signature: Signature
+    selection: Selection
+    iou: float
+    class_agnostic: bool
+    tiling: Tiling
+
+    @classmethod
+    def open(
+        cls,
+        path: str | Path,
+        *,
+        family: str | None = None,
+        min_score: float = MIN_SCORE,
+        iou: float = IOU,
+        classes: tuple[str | int, ...] | None = None,
+        class_agnostic: bool = True,
+        tiles: str = "auto",
+        size_px: tuple[int, int] | None = None,
+        threads: int | None = None,
+    ) -> OnnxDetector:
+        """Open a model and tell what it is.
+
+        Parameters
+        ----------
+        path : str or Path
+            The ONNX file.
+        family : str, optional
+            What it is, where it does not say so itself: a key of `FAMILIES`.
+        min_score : float
+            Least confidence of a box.
+        iou : float
+            Boxes that overlap more are one fruit, in families that give one fruit many times.
+        classes : tuple of str or int, optional
+            Names or numbers of the classes that are fruits; all where it is None.
+        class_agnostic : bool
+            Whether overlapping boxes of different classes are one fruit too.
+        tiles : str
+            `auto`: a picture that the network would see at less than half its size is cut into overlapping tiles;
+            `off`; or columns x rows, as 3x2.
+        size_px : (int, int), optional
+            Width and height of the input, where the network takes any; else those that the file says, else 640x640.
+        threads : int, optional
+            For ONNX Runtime; one a core where it is None.
+
+        Raises
+        ------
+        PomonaError
+            When the file cannot be run, is of no known family, or a setting is wrong.
+        """
+        for name, value in (("min_score", min_score), ("iou", iou)):
+            if not 0 <= value <= 1:
+                raise PomonaError(f"{name}: found {value}, expected 0 to 1")
+        tiling = read_tiling(tiles)
+        network = Network.open(Path(path), threads)
+        signature = identify(network, family, size_px)
+        selection = signature.selection(str(path), min_score, classes)
+        return cls(network, signature, selection, iou, class_agnostic, tiling)
+
+    @property
+    def path(self) -> Path:
+        """The ONNX file."""
+        return self.network.path
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """What it runs with, for a session's provenance."""
+        classes = self.selection.classes
+        return {
+            "model": str(self.path.resolve()),
+            "family": self.signature.family,
+            "size_px": list(self.signature.size_px),
+            "min_score": self.selection.min_score,
+            "iou": self.iou,
+            "classes": None if classes is None else classes.tolist(),
+            "class_agnostic": self.class_agnostic,
+            "tiles": "auto" if self.tiling is None else "x".join(map(str, self.tiling)),
+        }
+
+    @property
+    def description(self) -> str:
+        """Say in one line what the model was taken for."""
+        signature = self.signature
+        size = "x".join(map(str, signature.size_px))
+        title = f"{signature.family} ({FAMILIES[signature.family].title}) {signature.grounds}"
+        return f"{self.path}: {title}; input {size} {signature.preparation}; {self._classes()}"
+
+    def _classes(self) -> str:
+        names, count = self.signature.names or {}, self.signature.decoder.n_classes
+        if self.selection.classes is not None:
+            chosen = self.selection.classes.tolist()
+        else:
+            chosen = list(names) or list(range(count or 0))
+        shown = ", ".join(names.get(number, str(number)) for number in chosen[:5]) + ", ..." * (len(chosen) > 5)
+        return f"fruits are of {len(chosen)} classes: {shown}" if chosen else "fruits are of all classes"
+
+    def __call__(self, frame: Frame) -> Detections:
+        """Find the fruits of one frame in its left picture.
+
+        Raises
+        ------
+        PomonaError
+            When it has none; an `UnreadablePictureError` when it cannot be read.
+        """
+        if frame.read_left is None:
+            raise PomonaError(f"frame {frame.number}: found no left picture, expected one: {self.path} needs it")
+        return self.detect(frame.read_left())
+
+    def detect(self, picture: NDArray[np.uint8]) -> Detections:
+        """Find the fruits of a picture.
+
+        Parameters
+        ----------
+        picture : (H, W, 3) uint8
+            BGR.
+
+        Returns
+        -------
+        Detections
+            Without ids, best first; boxes end at the edge of the picture.
+        """
+        picture_px = (picture.shape[1], picture.shape[0])
+        tiles = lay_tiles(picture_px, self.signature.size_px, self.tiling)
+        found = [self._in_tile(picture, tile) for tile in tiles]
+        boxes_px, scores = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        if len(tiles) > 1:
+            seen = np.repeat([tile.corners_px for tile in tiles], [len(part) for _, part in found], axis=0).astype(
+                float
+            )
+            boxes_px, scores = merge_tiles(boxes_px, scores, seen, picture_px, self._margin_px(tiles[0]))
+        return _within(boxes_px, scores, picture_px)
+
+    def _in_tile(self, picture: NDArray[np.uint8], tile: Tile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Boxes and scores of one tile, in the pixels of the picture."""
+        part, size_px = picture[tile.ymin : tile.ymax, tile.xmin : tile.xmax], self.signature.size_px
+        given, placement = prepare(part, size_px, self.signature.preparation)
+        candidates = self.signature.decoder(self.network.run(given), self.selection)
+        if FAMILIES[self.signature.family].overlapping:
+            candidates = suppress(candidates, self.iou, across_classes=self.class_agnostic)
+        boxes_px = placement.to_picture(tightened(candidates, size_px)) + np.tile((tile.xmin, tile.ymin), 2)
+        return boxes_px, candidates.scores
+
+    def _margin_px(self, tile: Tile) -> float:
+        width, height = self.signature.size_px
+        return CUT_PX * max((tile.xmax - tile.xmin) / width, (tile.ymax - tile.ymin) / height)
+
+
+def _within(boxes_px: NDArray[np.float64], scores: NDArray[np.float64], picture_px: tuple[int, int]) -> Detections:
+    """Cut boxes at the picture's edge; without what is outside, or no box at all (a network may give NaN)."""
+    cut_px = np.clip(boxes_px, 0, np.tile(picture_px, 2))
+    rows = np.argsort(-scores, kind="stable")
+    rows = rows[np.isfinite(boxes_px[rows]).all(axis=1) & (cut_px[rows, :2] < cut_px[rows, 2:]).all(axis=1)]
+    return Detections(cut_px[rows], np.clip(scores[rows], 0, 1))

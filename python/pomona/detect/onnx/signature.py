@@ -1,0 +1,148 @@
+"""Which family a network belongs to, and on what grounds.
+
+In this order: what the user says, our own metadata, RF-DETR's, Ultralytics', the names and shapes of the outputs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pomona.detect.onnx.candidates import Selection
+from pomona.detect.onnx.claims import claim_of
+from pomona.detect.onnx.families import FAMILIES, Decoder, Family, Layout
+from pomona.detect.onnx.network import Network, Outputs
+from pomona.detect.onnx.preparation import PADDING, Preparation, prepare
+from pomona.errors import PomonaError
+
+__all__ = ["ALIASES", "Signature", "identify"]
+
+ALIASES = {
+    "yolov7": "yolov5",
+    "yolov9": "yolov8",
+    "yolo11": "yolov8",
+    "yolo12": "yolov8",
+    "yolov10": "yolo-end2end",
+    "yolo26": "yolo-end2end",
+    "d-fine": "rtdetr",
+    "deim": "rtdetr",
+}
+"""Other names for the families."""
+
+DEFAULT_SIDE_PX = 640
+"""Input of a network that takes any size and does not say what it was trained at: what most are trained at."""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How a network is used.
+
+    Attributes
+    ----------
+    family : str
+        Key of `FAMILIES`.
+    grounds : str
+        What told it, for people.
+    decoder : Decoder
+        Reads its outputs.
+    preparation : Preparation
+        What it expects of a picture.
+    names : mapping or None
+        Names of its classes by number.
+    size_px : (int, int)
+        Width and height of its input; where any goes, those to use.
+    """
+
+    family: str
+    grounds: str
+    decoder: Decoder
+    preparation: Preparation
+    names: dict[int, str] | None
+    size_px: tuple[int, int]
+
+    def selection(self, where: str, min_score: float, classes: tuple[str | int, ...] | None) -> Selection:
+        """Turn names or numbers of classes into a selection.
+
+        Raises
+        ------
+        PomonaError
+            When there is no such class.
+        """
+        if classes is None:
+            return Selection(min_score)
+        numbers = {name: number for number, name in (self.names or {}).items()}
+        count = self.decoder.n_classes
+        chosen = []
+        for wanted in classes:
+            number = numbers.get(str(wanted), int(wanted) if str(wanted).isdecimal() else -1)
+            if number < 0 or (count is not None and number >= count):
+                known = ", ".join(numbers) if numbers else f"a number below {count}" if count else "a number"
+                raise PomonaError(f"{where}: class: found {wanted!r}, expected {known[:200]}")
+            chosen.append(number)
+        return Selection(min_score, np.unique(np.array(chosen, np.int64)))
+
+
+def identify(network: Network, family: str | None = None, size_px: tuple[int, int] | None = None) -> Signature:
+    """Tell the family of a network.
+
+    Parameters
+    ----------
+    network : Network
+        It is run once, on an empty picture.
+    family : str, optional
+        What the user says it is: a key of `FAMILIES` or `ALIASES`.
+    size_px : (int, int), optional
+        Width and height to use, where the network takes any size.
+
+    Raises
+    ------
+    PomonaError
+        When it is of no known family: what was found and what is accepted.
+    """
+    claim = claim_of(network.path, network.metadata)
+    asked = family or claim.family
+    key = None if asked is None else _known(network, asked, claim.source if family is None else "the setting")
+    size_px = _size(network, size_px or claim.size_px)
+    # A network in the wrong clothes runs as well: only the shapes of what comes out count here, not what it finds.
+    layout = Layout(_outputs_for_nothing(network, size_px), size_px, network.takes_sizes, claim)
+    for name, candidate in FAMILIES.items():
+        decoder = candidate.decoder(layout) if key in (None, name) else None
+        if decoder is not None:
+            changed = {} if family else claim.preparation
+            return Signature(
+                family=name,
+                grounds="as was said" if family else f"by {claim.source}",
+                decoder=decoder,
+                preparation=replace(candidate.preparation, **changed),
+                names=claim.names,
+                size_px=size_px,
+            )
+    raise PomonaError(_unknown(network, layout, None if key is None else (key, FAMILIES[key])))
+
+
+def _known(network: Network, name: str, source: str) -> str:
+    key = ALIASES.get(name.lower(), name.lower())
+    if key not in FAMILIES:
+        expected = ", ".join([*FAMILIES, *ALIASES])
+        raise PomonaError(f"{network.path}: family: found {name!r} in {source}, expected one of {expected}")
+    return key
+
+
+def _size(network: Network, wanted_px: tuple[int, int] | None) -> tuple[int, int]:
+    if network.size_px is None:
+        return wanted_px or (DEFAULT_SIDE_PX, DEFAULT_SIDE_PX)
+    return network.size_px
+
+
+def _outputs_for_nothing(network: Network, size_px: tuple[int, int]) -> Outputs:
+    grey = np.full((size_px[1], size_px[0], 3), PADDING, np.uint8)
+    return network.run(prepare(grey, size_px, Preparation())[0])
+
+
+def _unknown(network: Network, layout: Layout, asked: tuple[str, Family] | None) -> str:
+    found = ", ".join(f"{name} {output.shape}" for name, output in layout.outputs.items())
+    if asked is not None:
+        return f"{network.path}: outputs: found {found}, expected those of {asked[0]}: {asked[1].signature}"
+    accepted = "; ".join(f"{key} ({family.signature})" for key, family in FAMILIES.items())
+    return f"{network.path}: outputs: found {found}, expected those of a family: {accepted}"

@@ -1,0 +1,179 @@
+"""Overlapping tiles of a large picture, and the boxes of all tiles as those of one picture.
+
+Neighbouring tiles share a strip. What a fruit shows in that strip both of them see: two boxes are of one fruit when
+they agree *inside the strip*, however much of it each tile cuts off.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+
+__all__ = ["Tile", "Tiling", "lay_tiles", "merge_tiles", "read_tiling"]
+
+OVERLAP = 0.2
+"""Part of a tile that its neighbour sees too; a fruit smaller than that is whole in one of them."""
+
+MAX_SHRINK = 2.0
+"""Without a word of the user the picture is cut when the network would see it at less than half its size: then fruits
+that are large enough to be lifted, 15 px or so, would be smaller than a cell of the finest grid, 8 px."""
+
+SAME_IOU = 0.5
+"""Two boxes of one fruit agree in the strip at least so far; those of neighbours in a cluster do not."""
+
+Tiling = tuple[int, int] | None
+"""Columns and rows, None for as many as needed."""
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A part of a picture: xmin, ymin, xmax, ymax in whole pixels."""
+
+    xmin: int
+    ymin: int
+    xmax: int
+    ymax: int
+
+    @property
+    def corners_px(self) -> tuple[int, int, int, int]:
+        """As one tuple."""
+        return self.xmin, self.ymin, self.xmax, self.ymax
+
+
+def read_tiling(text: str) -> Tiling:
+    """Read a setting: `auto`, `off` or columns x rows, as 3x2."""
+    if text == "auto":
+        return None
+    sides = re.fullmatch(r"([1-9]\d?)x([1-9]\d?)", "1x1" if text == "off" else text)
+    if sides is None:
+        raise PomonaError(f"tiles: found {text!r}, expected auto, off, or columns x rows, as 3x2")
+    return int(sides[1]), int(sides[2])
+
+
+def lay_tiles(picture_px: tuple[int, int], network_px: tuple[int, int], tiling: Tiling) -> list[Tile]:
+    """Cover a picture with tiles of one size, row by row.
+
+    Parameters
+    ----------
+    picture_px, network_px : (int, int)
+        Width and height of the picture, and of the network's input.
+    tiling : (int, int) or None
+        Columns and rows; None for as few as keep a tile within `MAX_SHRINK` times the input.
+    """
+    counts = tiling or tuple(map(_needed, picture_px, network_px))
+    columns, rows = (_cuts(length, count) for length, count in zip(picture_px, counts, strict=True))
+    return [Tile(xmin, ymin, xmax, ymax) for ymin, ymax in rows for xmin, xmax in columns]
+
+
+def _needed(length_px: int, input_px: int) -> int:
+    count = 1
+    while _side(length_px, count) > MAX_SHRINK * input_px:
+        count += 1
+    return count
+
+
+def _side(length_px: int, count: int) -> int:
+    return int(np.ceil(length_px / (count - (count - 1) * OVERLAP)))
+
+
+def _cuts(length_px: int, count: int) -> list[tuple[int, int]]:
+    side = _side(length_px, count)
+    starts = np.round(np.linspace(0, length_px - side, count)).astype(int).tolist()
+    return [(start, start + side) for start in starts]
+
+
+def merge_tiles(
+    boxes_px: NDArray[np.float64],
+    scores: NDArray[np.float64],
+    tiles: NDArray[np.float64],
+    picture_px: tuple[int, int],
+    margin_px: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Make one list of the boxes of all tiles.
+
+    Boxes of different tiles that agree in what both tiles see are one: the whole one of them, or where every tile cuts
+    the fruit, all of it. A box that its tile cuts and that no other tile confirms is dropped: it is part of a fruit,
+    and its centre is not the fruit's.
+
+    Parameters
+    ----------
+    boxes_px : (N, 4) float64
+        In the picture.
+    scores : (N,) float64
+        Confidence.
+    tiles : (N, 4) float64
+        The tile of each box.
+    picture_px : (int, int)
+        Width and height of the picture: its own edges cut nothing that a tile could mend.
+    margin_px : float
+        A box that ends so near the edge of its tile is cut by it.
+
+    Returns
+    -------
+    (M, 4) float64, (M,) float64
+        Boxes and scores, best first.
+    """
+    cut = _cut(boxes_px, tiles, picture_px, margin_px)
+    kept: list[_Merged] = []
+    for row in np.lexsort((-scores, cut)):
+        box = _Merged(boxes_px[row], scores[row], tiles[row], [tiles[row]], bool(cut[row]))
+        twin = next((other for other in kept if other.is_same(box)), None)
+        if twin is None:
+            kept.append(box)
+        elif twin.cut:
+            twin.grow(box)
+            twin.cut = bool(_cut(twin.box_px[None], twin.seen_px[None], picture_px, margin_px)[0])
+    whole = sorted((box for box in kept if not box.cut), key=lambda box: -box.score)
+    return np.array([box.box_px for box in whole]).reshape(-1, 4), np.array([box.score for box in whole])
+
+
+@dataclass(eq=False)
+class _Merged:
+    """A box with what was seen of the picture to get it."""
+
+    box_px: NDArray[np.float64]
+    score: float
+    seen_px: NDArray[np.float64]
+    tiles: list[NDArray[np.float64]]
+    cut: bool
+
+    def is_same(self, other: _Merged) -> bool:
+        # Two boxes of one tile are two fruits: the network has decided that.
+        if any((mine == theirs).all() for mine in self.tiles for theirs in other.tiles):
+            return False
+        both_px = _intersection(self.seen_px, other.seen_px)
+        mine, theirs = _intersection(self.box_px, both_px), _intersection(other.box_px, both_px)
+        shared = _area(_intersection(mine, theirs))
+        return shared > SAME_IOU * (_area(mine) + _area(theirs) - shared)
+
+    def grow(self, other: _Merged) -> None:
+        self.box_px = _union(self.box_px, other.box_px)
+        self.seen_px = _union(self.seen_px, other.seen_px)
+        self.score = max(self.score, other.score)
+        self.tiles += other.tiles
+
+
+def _cut(
+    boxes_px: NDArray[np.float64], tiles: NDArray[np.float64], picture_px: tuple[int, int], margin_px: float
+) -> NDArray[np.bool_]:
+    """Whether a tile's edge that is not the picture's cuts a box."""
+    low = (boxes_px[:, :2] <= tiles[:, :2] + margin_px) & (tiles[:, :2] > 0)
+    high = (boxes_px[:, 2:] >= tiles[:, 2:] - margin_px) & (tiles[:, 2:] < picture_px)
+    return np.asarray((low | high).any(axis=1))
+
+
+def _intersection(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([np.maximum(one[:2], two[:2]), np.minimum(one[2:], two[2:])])
+
+
+def _union(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([np.minimum(one[:2], two[:2]), np.maximum(one[2:], two[2:])])
+
+
+def _area(box_px: NDArray[np.float64]) -> float:
+    return float(np.prod(np.maximum(box_px[2:] - box_px[:2], 0)))

@@ -1,0 +1,73 @@
+import json
+
+import numpy as np
+import pytest
+
+import onnx_maker
+from pomona import PomonaError
+from pomona.detect.from_file import FileDetector
+from pomona.detect.onnx import OnnxDetector
+from pomona.detect.opening import open_detector
+from pomona.recording import open_recording
+from recording_maker import make_recording
+
+
+@pytest.fixture
+def row(tmp_path):
+    """A recording folder with depth, left pictures and boxes."""
+    import cv2
+
+    folder = make_recording(tmp_path / "row")
+    (folder / "left").mkdir()
+    picture = np.zeros((480, 640, 3), np.uint8)
+    picture[100:140, 200:260, 2] = 255
+    assert cv2.imwrite(str(folder / "left" / "0000.png"), picture)
+    return folder
+
+
+def test_boxes_that_are_named_or_lie_in_the_folder(row):
+    recording = open_recording(row)
+    detector = open_detector(None, None, recording)
+    assert isinstance(detector, FileDetector)
+    assert detector.path == row / "detections.csv"
+    assert detector.description.endswith("detections.csv: 3 boxes with ids in 1 frames")
+    assert json.loads(json.dumps(detector.configuration)) == {"detections": str((row / "detections.csv").resolve())}
+    (row / "other.txt").write_text("1,-1,10,20,30,40,0.5\n")
+    other = open_detector(row / "other.txt", None, recording)
+    assert [len(other(frame)) for frame in recording.frames()] == [1]
+    assert other.description.endswith("other.txt: 1 boxes in 1 frames")
+
+
+def test_a_model_with_settings(row):
+    recording = open_recording(row)
+    model = onnx_maker.yolov8(row / "apples.onnx", 320, 256)
+    detector = open_detector(None, model, recording, min_score=0.5, tiles=None, classes=(0,))
+    assert isinstance(detector, OnnxDetector)
+    found = [detector(frame).boxes_px.tolist() for frame in recording.frames()]
+    assert found == [[[200, 100, 260, 140]]]
+    assert json.loads(json.dumps(detector.configuration)) == {
+        "model": str(model.resolve()),
+        "family": "yolov8",
+        "size_px": [320, 256],
+        "min_score": 0.5,
+        "iou": 0.6,
+        "classes": [0],
+        "class_agnostic": True,
+        "tiles": "auto",
+    }
+    assert detector.path == model
+
+
+def test_what_does_not_go_together_is_told(row):
+    recording = open_recording(row)
+    with pytest.raises(PomonaError, match=r"found --detections .* and --model .*, expected one of them"):
+        open_detector(row / "detections.csv", row / "apples.onnx", recording)
+    with pytest.raises(PomonaError, match="min_score: found without a model, expected --model FILE"):
+        open_detector(None, None, recording, min_score=0.5)
+    (row / "detections.csv").unlink()
+    with pytest.raises(PomonaError, match=r"detections\.csv: not found, expected boxes there, or --detections FILE"):
+        open_detector(None, None, recording)
+    (row / "left" / "0000.png").unlink()
+    (row / "left").rmdir()
+    with pytest.raises(PomonaError, match="found depth pictures, expected left ones"):
+        open_detector(None, row / "apples.onnx", open_recording(row))
