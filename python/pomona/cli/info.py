@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from pomona.recording import Recording
+    from pomona.recording.check import Checked
 
 
 def info(
@@ -21,12 +22,16 @@ def info(
     topics: str | None = typer.Option(
         None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
     ),
-    check: bool = typer.Option(False, "--check", help="Decode every picture and name those that cannot be read."),
+    check: bool = typer.Option(
+        False,
+        "--check",
+        help="Decode every picture; name those that cannot be read or show nothing, and swapped sides.",
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Say what RECORDING holds: frames, rate, camera, depth error at 1.5 m, pictures, poses, detections.
 
-    With --check the exit code is 1 when a picture cannot be read.
+    With --check the exit code is 1 when a picture cannot be read, and 2 when left and right are swapped.
     """
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
@@ -35,23 +40,27 @@ def info(
         recording, calibration=calibration, topics=None if topics is None else parsed_topics(topics)
     )
     found = opened.description()
-    unreadable = _unreadable(opened) if check else {}
-    if check:
-        found["unreadable"] = [{"frame": frame, "reason": reason} for frame, reason in unreadable.items()]
+    faults = _checked(opened) if check else None
+    if faults is not None:
+        for name, frames in (("unreadable", faults.unreadable), ("blank", faults.blank)):
+            found[name] = [{"frame": frame, "reason": reason} for frame, reason in frames.items()]
     typer.echo(_dumps(found) if json else _as_text(found))
-    if unreadable:
+    if faults is not None and faults.unreadable:
         raise typer.Exit(1)
 
 
-def _unreadable(recording: Recording) -> dict[int, str]:
+def _checked(recording: Recording) -> Checked:
+    """Decode everything; swapped sides are an error, because then nothing in the recording is right."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from pomona.recording.check import unreadable_frames
+    from pomona.recording.check import checked
+    from pomona.recording.swapped import check_sides
 
+    check_sides(recording)
     with Progress(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
         task = bar.add_task("reading", total=len(recording))
-        return unreadable_frames(recording, lambda done, _total: bar.update(task, completed=done))
+        return checked(recording, lambda done, _total: bar.update(task, completed=done))
 
 
 def _dumps(value: object) -> str:

@@ -26,7 +26,7 @@ PNG_BEGINS = b"\x89PNG\r\n\x1a\n"
 
 
 class UnreadablePictureError(PomonaError):
-    """One picture is missing, cut off or corrupt; the rest of the recording may be well."""
+    """One picture is missing, cut off, corrupt or of another size; the rest of the recording may be well."""
 
 
 def numbered_pictures(folder: Path) -> dict[int, Path]:
@@ -118,4 +118,4 @@ def _require_size(path: Path, picture: NDArray[Any], calibration: Calibration) -
     height, width = picture.shape[:2]
     if (width, height) != calibration.size_px:
         expected = f"{calibration.width}x{calibration.height} as in the calibration"
-        raise PomonaError(f"{path}: found {width}x{height} pixels, expected {expected}")
+        raise UnreadablePictureError(f"{path}: found {width}x{height} pixels, expected {expected}")

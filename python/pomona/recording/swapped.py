@@ -1,0 +1,96 @@
+"""Whether left and right are what they are called: a few frames tell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.recording.frame import Recording
+from pomona.recording.pictures import UnreadablePictureError
+
+__all__ = ["check_sides", "disparities_px"]
+
+LOOKED_AT = 5
+"""Frames, evenly over the recording, of which the first ones that show enough decide."""
+
+ENOUGH = 40
+"""Corners that must be found in both pictures before they say anything."""
+
+SWAPPED_SHARE = 0.8
+"""Of corners that are not at infinity. Chance goes both ways: 32 of 40 by chance happens once in 10,000 recordings."""
+
+CORNERS, PATCH_PX = 300, 15
+
+LEAST_CORRELATION = 0.85
+"""Of a patch with its like in the other picture; below, leaves are found everywhere among leaves."""
+
+NEAREST_PX = 1.0
+"""Least disparity that has a sign."""
+
+LARGEST_SHARE = 0.25
+"""Of the width of the picture, as disparity."""
+
+
+def check_sides(recording: Recording) -> None:
+    """Refuse a recording whose left pictures are from the right camera.
+
+    In a rectified pair everything lies farther left in the right picture: disparities are positive. Recordings without
+    right pictures, and frames that cannot be read or show nothing, say nothing.
+
+    Raises
+    ------
+    PomonaError
+        One line that says to swap them.
+    """
+    found = np.zeros(0)
+    middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
+    looked_at = {recording.numbers[min(row, len(recording) - 1)] for row in middles.tolist()}
+    for frame in recording.frames(looked_at):
+        if frame.read_left is None or frame.read_right is None:
+            return
+        try:
+            left, right = frame.read_left(), frame.read_right()
+        except UnreadablePictureError:
+            continue
+        found = np.concatenate([found, disparities_px(left, right)])
+        if len(found) >= ENOUGH:
+            break
+    negative = int((found < 0).sum())
+    if len(found) >= ENOUGH and negative >= SWAPPED_SHARE * len(found):
+        seen = f"{negative} of {len(found)} corners farther right in the right picture than in the left one"
+        raise PomonaError(f"{recording.path}: left and right are swapped: found {seen}, expected farther left")
+
+
+def disparities_px(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Find the corners of the left picture in the same rows of the right one, to the left and to the right alike.
+
+    Parameters
+    ----------
+    left, right : (H, W, 3) uint8
+        A rectified pair, BGR, at most a pixel off in rows.
+
+    Returns
+    -------
+    (N,) float64
+        Disparities of the corners that were found and are not about at infinity.
+    """
+    import cv2
+
+    half = PATCH_PX // 2
+    left, right = (np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8) for picture in (left, right))
+    height, width = left.shape
+    reach = int(LARGEST_SHARE * width)
+    inner = left[half + 1 : height - half - 1, half : width - half]
+    corners = cv2.goodFeaturesToTrack(inner, CORNERS, 0.01, PATCH_PX) if inner.size else None
+    if corners is None:
+        return np.zeros(0)
+    found = []
+    for x, y in (corners.reshape(-1, 2) + np.array([half, half + 1])).astype(int).tolist():
+        start, end = max(half, x - reach), min(width - half - 1, x + reach)
+        patch = left[y - half : y + half + 1, x - half : x + half + 1]
+        strip = right[y - half - 1 : y + half + 2, start - half : end + half + 1]
+        _, correlation, _, place = cv2.minMaxLoc(cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED))
+        if correlation >= LEAST_CORRELATION:
+            found.append(float(x - start - place[0]))
+    return np.array([disparity for disparity in found if abs(disparity) >= NEAREST_PX])
