@@ -3,7 +3,7 @@ from typing import TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MapIndex", "Match", "__version__", "default_config", "describe"]
+__all__ = ["MapIndex", "Match", "Tracker", "Tracks", "__version__", "default_config", "describe", "one_fruit_each"]
 
 __version__: str
 
@@ -54,5 +54,67 @@ class MapIndex:
         self, query: _Arrays, *, map_from_query: list[list[float]], noise_m: float | None = None
     ) -> Match: ...
 
+class _Lifted(TypedDict):
+    rows: NDArray[np.int64]
+    centres_in_camera: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    diameters_m: NDArray[np.float64]
+    diameter_sigmas_m: NDArray[np.float64]
+
+@final
+class Tracker:
+    def __new__(
+        cls,
+        *,
+        focal_px: tuple[float, float],
+        principal_px: tuple[float, float],
+        size_px: tuple[float, float],
+        config: str,
+    ) -> Tracker: ...
+    def update(
+        self,
+        frame: int,
+        session_from_camera: list[list[float]],
+        boxes_px: NDArray[np.float64],
+        scores: NDArray[np.float64],
+        lifted: _Lifted,
+    ) -> NDArray[np.int64]: ...
+    def finish(self, min_views: int | None = None) -> Tracks: ...
+
+@final
+class Tracks:
+    @property
+    def numbers(self) -> NDArray[np.int64]: ...
+    @property
+    def centres(self) -> NDArray[np.float64]: ...
+    @property
+    def covariances(self) -> NDArray[np.float64]: ...
+    @property
+    def radii_m(self) -> NDArray[np.float64]: ...
+    @property
+    def radius_sigmas_m(self) -> NDArray[np.float64]: ...
+    @property
+    def n_views(self) -> NDArray[np.int64]: ...
+    @property
+    def evidence(self) -> NDArray[np.float64]: ...
+    @property
+    def frames(self) -> NDArray[np.int64]: ...
+    @property
+    def rows(self) -> NDArray[np.int64]: ...
+    @property
+    def fruits(self) -> NDArray[np.int64]: ...
+    @property
+    def shared(self) -> NDArray[np.bool_]: ...
+
+def one_fruit_each(
+    *,
+    centres: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    radii_m: NDArray[np.float64],
+    frames: NDArray[np.int64],
+    fruits: NDArray[np.int64],
+    place_sigma_m: float,
+    config: str,
+) -> NDArray[np.int64]: ...
 def default_config() -> str: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...

@@ -3,6 +3,7 @@
 mod cloud;
 mod descriptor;
 mod matching;
+mod tracking;
 
 use pyo3::prelude::*;
 
@@ -11,6 +12,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_class::<tracking::PyTracker>()?;
+    module.add_class::<tracking::PyTracks>()?;
+    module.add_function(wrap_pyfunction!(tracking::one_fruit_each, module)?)?;
     module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())

@@ -6,6 +6,7 @@
 use crate::constellation::MAX_NEIGHBOURS;
 use crate::error::{Error, Result};
 use crate::ransac::RansacConfig;
+use crate::tracking::TrackingConfig;
 use crate::verified::VerifiedConfig;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +23,8 @@ pub struct Config {
     pub paper: PaperConfig,
     /// The verified method.
     pub verified: VerifiedConfig,
+    /// Fruits followed through the frames of a recording.
+    pub tracking: TrackingConfig,
 }
 
 /// Which fruits make a constellation.
@@ -100,7 +103,8 @@ impl Config {
         within("paper.clique_per_metre", paper.clique_per_metre, 0.0, 1.0)?;
         within("paper.ransac.confidence", paper.ransac.confidence, 0.0, 1.0 - f64::EPSILON)?;
         within("paper.ransac.max_samples", paper.ransac.max_samples as f64, 1.0, f64::MAX)?;
-        self.verified.validate()
+        self.verified.validate()?;
+        self.tracking.validate()
     }
 }
 

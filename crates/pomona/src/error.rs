@@ -31,6 +31,15 @@ pub enum Error {
         /// What was found and what was expected.
         reason: String,
     },
+    /// A pose of the camera is no rigid transform.
+    Pose,
+    /// Frames do not come in order.
+    FrameOrder {
+        /// Number of the frame.
+        found: i64,
+        /// Number of the frame before.
+        last: i64,
+    },
 }
 
 /// Result of the core's fallible functions.
@@ -45,6 +54,12 @@ impl fmt::Display for Error {
             }
             Self::Covariance { row } => {
                 write!(f, "row {row}: covariance is not symmetric positive semi-definite")
+            }
+            Self::Pose => {
+                write!(f, "session_from_camera: found a matrix that does not turn and move, expected a rigid one")
+            }
+            Self::FrameOrder { found, last } => {
+                write!(f, "frame {found}: found after frame {last}, expected a larger number")
             }
             Self::Setting { name, reason } => write!(f, "setting {name}: {reason}"),
         }

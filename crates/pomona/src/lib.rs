@@ -22,6 +22,7 @@ pub mod index;
 pub mod matching;
 mod paper;
 pub mod ransac;
+pub mod tracking;
 pub mod verified;
 pub mod voting;
 

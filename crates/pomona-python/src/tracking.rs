@@ -1,0 +1,212 @@
+//! Fruits followed through the frames of one visit.
+
+use crate::cloud::points;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pomona::Config;
+use pomona::nalgebra::{Matrix3, Matrix4};
+use pomona::tracking::{Body, Boxes, Camera, LiftedBoxes, Pose, Tracker, Tracks, merge_duplicates};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+fn wrong(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn parsed(config: &str) -> PyResult<Config> {
+    let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
+    config.validate().map_err(wrong)?;
+    Ok(config)
+}
+
+/// Boxes that have a depth, as Python passes them.
+#[derive(FromPyObject)]
+pub struct LiftedArrays<'py> {
+    #[pyo3(item)]
+    rows: PyReadonlyArray1<'py, i64>,
+    #[pyo3(item)]
+    centres_in_camera: PyReadonlyArray2<'py, f64>,
+    #[pyo3(item)]
+    covariances: PyReadonlyArray3<'py, f64>,
+    #[pyo3(item)]
+    diameters_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    diameter_sigmas_m: PyReadonlyArray1<'py, f64>,
+}
+
+/// A tracker and what it knows.
+#[pyclass(name = "Tracker", module = "pomona._core")]
+pub struct PyTracker {
+    tracker: Tracker,
+    min_views: usize,
+}
+
+#[pymethods]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+impl PyTracker {
+    #[new]
+    #[pyo3(signature = (*, focal_px, principal_px, size_px, config))]
+    fn new(focal_px: [f64; 2], principal_px: [f64; 2], size_px: [f64; 2], config: &str) -> PyResult<Self> {
+        let config = parsed(config)?.tracking;
+        let tracker = Tracker::new(Camera { focal_px, principal_px, size_px }, config).map_err(wrong)?;
+        Ok(Self { tracker, min_views: config.min_views })
+    }
+
+    fn update<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: i64,
+        session_from_camera: [[f64; 4]; 4],
+        boxes_px: PyReadonlyArray2<'py, f64>,
+        scores: PyReadonlyArray1<'py, f64>,
+        lifted: LiftedArrays<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let pose = Pose::from_matrix(&Matrix4::from_fn(|row, column| session_from_camera[row][column]));
+        let pose = pose.map_err(wrong)?;
+        let edges_px = boxes(&boxes_px)?;
+        let scores = scores.as_array().to_vec();
+        let rows = rows(&lifted.rows)?;
+        let centres: Vec<_> = points(&lifted.centres_in_camera)?.iter().map(|point| point.coords).collect();
+        let covariances = matrices(&lifted.covariances)?;
+        let diameters_m = lifted.diameters_m.as_array().to_vec();
+        let diameter_sigmas_m = lifted.diameter_sigmas_m.as_array().to_vec();
+        let boxes = Boxes { edges_px: &edges_px, scores: &scores };
+        let lifted = LiftedBoxes {
+            rows: &rows,
+            centres_in_camera: &centres,
+            covariances: &covariances,
+            diameters_m: &diameters_m,
+            diameter_sigmas_m: &diameter_sigmas_m,
+        };
+        let numbers = py.detach(|| self.tracker.update(frame, &pose, &boxes, &lifted)).map_err(wrong)?;
+        Ok(PyArray1::from_iter(py, numbers.into_iter().map(|number| number.map_or(-1, |number| number as i64))))
+    }
+
+    #[pyo3(signature = (min_views=None))]
+    fn finish(&self, py: Python<'_>, min_views: Option<usize>) -> PyTracks {
+        PyTracks(py.detach(|| self.tracker.finish(min_views.unwrap_or(self.min_views))))
+    }
+}
+
+/// The fruits of a visit.
+#[pyclass(name = "Tracks", module = "pomona._core", frozen)]
+pub struct PyTracks(Tracks);
+
+#[pymethods]
+impl PyTracks {
+    #[getter]
+    fn numbers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.numbers.iter().map(|&number| number as i64))
+    }
+
+    #[getter]
+    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let flat = PyArray1::from_iter(py, self.0.centres.iter().flat_map(|centre| centre.iter().copied()));
+        flat.reshape([self.0.centres.len(), 3])
+    }
+
+    #[getter]
+    fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        // Symmetric: the order of rows and columns makes no difference.
+        let flat = PyArray1::from_iter(py, self.0.covariances.iter().flat_map(|matrix| matrix.iter().copied()));
+        flat.reshape([self.0.covariances.len(), 3, 3])
+    }
+
+    #[getter]
+    fn radii_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.0.radii_m)
+    }
+
+    #[getter]
+    fn radius_sigmas_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.0.radius_sigmas_m)
+    }
+
+    #[getter]
+    fn n_views<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.views.iter().map(|&views| views as i64))
+    }
+
+    #[getter]
+    fn evidence<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.0.evidence)
+    }
+
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.sightings.iter().map(|sighting| sighting.frame))
+    }
+
+    #[getter]
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.sightings.iter().map(|sighting| sighting.row as i64))
+    }
+
+    #[getter]
+    fn fruits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.sightings.iter().map(|sighting| sighting.fruit as i64))
+    }
+
+    #[getter]
+    fn shared<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_iter(py, self.0.sightings.iter().map(|sighting| sighting.shared))
+    }
+}
+
+/// For every fruit the smallest row of those that are the same fruit.
+#[pyfunction]
+#[pyo3(signature = (*, centres, covariances, radii_m, frames, fruits, place_sigma_m, config))]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+#[expect(clippy::too_many_arguments, reason = "a struct of arrays")]
+pub fn one_fruit_each<'py>(
+    py: Python<'py>,
+    centres: PyReadonlyArray2<'py, f64>,
+    covariances: PyReadonlyArray3<'py, f64>,
+    radii_m: PyReadonlyArray1<'py, f64>,
+    frames: PyReadonlyArray1<'py, i64>,
+    fruits: PyReadonlyArray1<'py, i64>,
+    place_sigma_m: f64,
+    config: &str,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let config = parsed(config)?.tracking;
+    let centres = points(&centres)?;
+    let covariances = matrices(&covariances)?;
+    let radii_m = radii_m.as_array().to_vec();
+    if covariances.len() != centres.len() || radii_m.len() != centres.len() {
+        return Err(wrong("expected a centre, a covariance and a radius for each fruit"));
+    }
+    let bodies: Vec<_> = centres
+        .iter()
+        .zip(covariances)
+        .zip(radii_m)
+        .map(|((centre, covariance), radius_m)| Body { centre: centre.coords, covariance, radius_m })
+        .collect();
+    let mut frames_of: Vec<Vec<i64>> = vec![Vec::new(); bodies.len()];
+    for (&frame, fruit) in frames.as_array().iter().zip(rows(&fruits)?) {
+        frames_of.get_mut(fruit).ok_or_else(|| wrong("fruits: a sighting names a row beyond the last"))?.push(frame);
+    }
+    for frames in &mut frames_of {
+        frames.sort_unstable();
+    }
+    let labels = py.detach(|| merge_duplicates(&bodies, &frames_of, place_sigma_m, &config));
+    Ok(PyArray1::from_iter(py, labels.into_iter().map(|label| label as i64)))
+}
+
+fn boxes(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 4]>> {
+    let rows = rows.as_array();
+    if rows.ncols() != 4 {
+        return Err(wrong(format!("boxes_px: found {} columns, expected 4 (xmin, ymin, xmax, ymax)", rows.ncols())));
+    }
+    Ok(rows.outer_iter().map(|edges| [edges[0], edges[1], edges[2], edges[3]]).collect())
+}
+
+fn matrices(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
+    let all = all.as_array();
+    if all.shape()[1..] != [3, 3] {
+        return Err(wrong("covariances: expected an array of shape (N, 3, 3)"));
+    }
+    Ok(all.outer_iter().map(|one| Matrix3::from_fn(|row, column| one[[row, column]])).collect())
+}
+
+fn rows(rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
+    rows.as_array().iter().map(|&row| usize::try_from(row).map_err(|_| wrong("a row is negative"))).collect()
+}
