@@ -36,7 +36,7 @@ class Decoder(Protocol):
 
 @dataclass(frozen=True)
 class Layout:
-    """What is known of a network's outputs.
+    """What is known of a network.
 
     Attributes
     ----------
@@ -48,12 +48,15 @@ class Layout:
         Whether `orig_target_sizes` is an input.
     claim : Claim
         What the file says.
+    named : bool
+        Whether the file or the user names the family, so that the outputs need not.
     """
 
     outputs: Outputs
     size_px: tuple[int, int]
     takes_sizes: bool
     claim: Claim
+    named: bool
 
     @property
     def n_names(self) -> int | None:
@@ -94,12 +97,9 @@ def _dense(layout: Layout, per_cell: int, *, objectness: bool, transposed: bool)
     rows, columns = layout.outputs[name].shape[:: -1 if transposed else 1]
     n_masks = 0 if prototypes is None else len(layout.outputs[prototypes])
     n_classes = columns - 4 - objectness - n_masks
-    if layout.n_names is None:
-        # One class makes rows of YOLOv5 as long as those of chosen boxes: the count of cells tells them apart.
-        recognised = n_classes >= 1 and rows in {per_cell * cells for cells in cells_of(layout.size_px)}
-    else:
-        recognised = n_classes == layout.n_names
-    if not recognised:
+    # One class makes rows of YOLOv5 as long as those of chosen boxes: the count of cells tells them apart.
+    counted = layout.named or rows in {per_cell * cells for cells in cells_of(layout.size_px)}
+    if not counted or n_classes < 1 or layout.n_names not in (None, n_classes):
         return None
     return DenseDecoder(name, prototypes, n_classes, objectness, transposed)
 

@@ -7,7 +7,7 @@ multiplies our coordinates by new/old, and padding adds whole pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,14 +84,15 @@ def prepare(
     """
     old_px = (picture.shape[1], picture.shape[0])
     new_px, corner_px = _fit(old_px, size_px, preparation.fit)
-    ordered = picture[:, :, ::-1] if preparation.channels == "RGB" else picture
-    canvas = np.full((size_px[1], size_px[0], 3), PADDING, np.float32)
+    resized = _resized(picture, new_px, preparation.resize)
+    given = np.full((3, size_px[1], size_px[0]), PADDING, np.float32)
     inside = np.s_[corner_px[1] : corner_px[1] + new_px[1], corner_px[0] : corner_px[0] + new_px[0]]
-    canvas[inside] = _resized(np.ascontiguousarray(ordered), new_px, preparation.resize)
-    mean, std = np.array(preparation.mean, np.float32), np.array(preparation.std, np.float32)
-    normal = (canvas / np.float32(preparation.divide_by) - mean) / std
-    placement = Placement((new_px[0] / old_px[0], new_px[1] / old_px[1]), corner_px)
-    return normal.transpose(2, 0, 1), placement
+    for plane, channel in enumerate((2, 1, 0) if preparation.channels == "RGB" else (0, 1, 2)):
+        given[plane][inside] = resized[:, :, channel]
+        # (value / divide_by - mean) / std
+        given[plane] *= np.float32(1 / (preparation.divide_by * preparation.std[plane]))
+        given[plane] -= np.float32(preparation.mean[plane] / preparation.std[plane])
+    return given, Placement((new_px[0] / old_px[0], new_px[1] / old_px[1]), corner_px)
 
 
 def _fit(old_px: tuple[int, int], size_px: tuple[int, int], fit: str) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -106,13 +107,13 @@ def _fit(old_px: tuple[int, int], size_px: tuple[int, int], fit: str) -> tuple[t
     return new_px, ((size_px[0] - new_px[0]) // 2, (size_px[1] - new_px[1]) // 2)
 
 
-def _resized(picture: NDArray[np.uint8], size_px: tuple[int, int], how: str) -> NDArray[np.float32]:
+def _resized(picture: NDArray[np.uint8], size_px: tuple[int, int], how: str) -> NDArray[Any]:
     import cv2
 
     if how == "smooth":
         return _smoothly_resized(picture, size_px)
     source = picture.astype(np.float32) if how == "float" else picture
-    return np.asarray(cv2.resize(source, size_px, interpolation=cv2.INTER_LINEAR), np.float32)
+    return np.asarray(cv2.resize(source, size_px, interpolation=cv2.INTER_LINEAR))
 
 
 def _smoothly_resized(picture: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.float32]:

@@ -105,7 +105,7 @@ def identify(network: Network, family: str | None = None, size_px: tuple[int, in
     key = None if asked is None else _known(network, asked, claim.source if family is None else "the setting")
     size_px = _size(network, size_px or claim.size_px)
     # A network in the wrong clothes runs as well: only the shapes of what comes out count here, not what it finds.
-    layout = Layout(_outputs_for_nothing(network, size_px), size_px, network.takes_sizes, claim)
+    layout = Layout(_outputs_for_nothing(network, size_px), size_px, network.takes_sizes, claim, asked is not None)
     for name, candidate in FAMILIES.items():
         decoder = candidate.decoder(layout) if key in (None, name) else None
         if decoder is not None:
