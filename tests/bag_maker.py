@@ -10,13 +10,15 @@ from typing import Any
 import cv2
 import numpy as np
 from rosbags import rosbag1, rosbag2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.spatial.transform import Rotation
 
 SIZE = (64, 48)
 START_NS = 1_723_190_400 * 10**9  # 2024-08-09T08:00:00 UTC
 STEP_NS = 100_000_000
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.LATEST)
+ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
 
 FORMATS = ("ros1", "ros1 lz4", "sqlite3", "ros2 mcap", "mcap", "mcap lz4")
 
@@ -88,6 +90,18 @@ def stereo(n_frames=4, *, left="/stereo/left", right="/stereo/right", baseline_m
     return entries
 
 
+def odometry(topic: str, stamp_ns: int, pose, child="base_link", frame="odom") -> Entry:
+    """A pose (4, 4) of the body; an empty child makes it a PoseStamped."""
+    fields = {"stamp_ns": stamp_ns, "frame_id": frame, "pose": np.asarray(pose)}
+    kind = "nav_msgs/msg/Odometry" if child else "geometry_msgs/msg/PoseStamped"
+    return topic, stamp_ns, kind, fields | ({"child_frame_id": child} if child else {})
+
+
+def tf(topic: str, stamp_ns: int, *transforms: tuple[str, str, Any]) -> Entry:
+    """Transforms (parent, child, parent_from_child)."""
+    return topic, stamp_ns, "tf2_msgs/msg/TFMessage", {"at_ns": stamp_ns, "transforms": transforms}
+
+
 def message(store, kind: str, fields: dict[str, Any]):
     """Build a message of either ROS from flat fields."""
     types, ros1 = store.types, store is ROS1
@@ -97,6 +111,14 @@ def message(store, kind: str, fields: dict[str, Any]):
         stamp = types["builtin_interfaces/msg/Time"](sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
         header = {"stamp": stamp, "frame_id": frame} | ({"seq": 0} if ros1 else {})
         fields["header"] = types["std_msgs/msg/Header"](**header)
+    if kind == "tf2_msgs/msg/TFMessage":
+        return _tf_message(store, fields)
+    if "pose" in fields:
+        fields["pose"] = _pose(store, fields["pose"], covariance="Odometry" in kind)
+    if kind == "nav_msgs/msg/Odometry":
+        zero = types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+        twist = types["geometry_msgs/msg/Twist"](linear=zero, angular=zero)
+        fields["twist"] = types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=np.zeros(36))
     if kind == "sensor_msgs/msg/Image":
         fields.setdefault("is_bigendian", 0)
     if kind == "sensor_msgs/msg/CameraInfo":
@@ -106,6 +128,37 @@ def message(store, kind: str, fields: dict[str, Any]):
         if not ros1:
             fields = {name.lower(): value for name, value in fields.items()}
     return types[kind](**fields)
+
+
+def _quaternion(store, pose):
+    turn = Rotation.from_matrix(np.asarray(pose)[:3, :3]).as_quat()
+    return store.types["geometry_msgs/msg/Quaternion"](**dict(zip("xyzw", turn.tolist(), strict=True)))
+
+
+def _pose(store, pose, *, covariance: bool):
+    place = dict(zip("xyz", np.asarray(pose)[:3, 3].tolist(), strict=True))
+    point = store.types["geometry_msgs/msg/Point"](**place)
+    plain = store.types["geometry_msgs/msg/Pose"](position=point, orientation=_quaternion(store, pose))
+    if not covariance:
+        return plain
+    return store.types["geometry_msgs/msg/PoseWithCovariance"](pose=plain, covariance=np.zeros(36))
+
+
+def _tf_message(store, fields):
+    types = store.types
+    entries = []
+    for parent, child, pose in fields["transforms"]:
+        stamp_ns = fields["at_ns"]
+        stamp = types["builtin_interfaces/msg/Time"](sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+        header = {"stamp": stamp, "frame_id": parent} | ({"seq": 0} if store is ROS1 else {})
+        place = dict(zip("xyz", np.asarray(pose)[:3, 3].tolist(), strict=True))
+        transform = types["geometry_msgs/msg/Transform"](
+            translation=types["geometry_msgs/msg/Vector3"](**place), rotation=_quaternion(store, pose)
+        )
+        stamped = types["geometry_msgs/msg/TransformStamped"]
+        header = types["std_msgs/msg/Header"](**header)
+        entries.append(stamped(header=header, child_frame_id=child, transform=transform))
+    return types["tf2_msgs/msg/TFMessage"](transforms=entries)
 
 
 def write_bag(path: Path, entries: Iterable[Entry], form: str) -> Path:

@@ -17,7 +17,10 @@ LONGEST_GAP_S = 0.1
 
 
 def poses_at(
-    times_s: NDArray[np.float64], known_s: NDArray[np.float64], known: NDArray[np.float64]
+    times_s: NDArray[np.float64],
+    known_s: NDArray[np.float64],
+    known: NDArray[np.float64],
+    longest_gap_s: float = LONGEST_GAP_S,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Interpolate poses: positions linearly, rotations along the shortest arc.
 
@@ -27,13 +30,15 @@ def poses_at(
         When poses are wanted.
     known_s, known : (K,) and (K, 4, 4) float64
         Poses and their times, ascending.
+    longest_gap_s : float
+        Poses farther apart than this have none between them.
 
     Returns
     -------
     poses : (F, 4, 4) float64
         Of the rows that have one; the identity elsewhere.
     has_pose : (F,) bool
-        False outside the known times, and inside gaps over `LONGEST_GAP_S`.
+        False outside the known times, and inside gaps over `longest_gap_s`.
     """
     from scipy.spatial.transform import Rotation, Slerp
 
@@ -43,7 +48,7 @@ def poses_at(
     after = np.searchsorted(known_s, times_s).clip(0, len(known_s) - 1)
     before = np.where(known_s[after] == times_s, after, after - 1).clip(0)
     has_pose = (known_s[before] <= times_s) & (times_s <= known_s[after])
-    has_pose &= known_s[after] - known_s[before] <= LONGEST_GAP_S
+    has_pose &= known_s[after] - known_s[before] <= longest_gap_s
     wanted_s = times_s[has_pose]
     if len(known_s) == 1:
         poses[has_pose] = known[0]
@@ -54,7 +59,7 @@ def poses_at(
     return poses, has_pose
 
 
-def posed_rows(path: Path, has_pose: NDArray[np.bool_]) -> NDArray[np.int64]:
+def posed_rows(path: Path, has_pose: NDArray[np.bool_], longest_gap_s: float = LONGEST_GAP_S) -> NDArray[np.int64]:
     """Rows that have a pose; says how many have none.
 
     Raises
@@ -67,7 +72,7 @@ def posed_rows(path: Path, has_pose: NDArray[np.bool_]) -> NDArray[np.int64]:
         raise PomonaError(f"{path}: found no pose at the time of any picture, expected the same clock")
     if missing:
         message = (
-            f"{path}: {missing} of {len(has_pose)} frames have no pose within {LONGEST_GAP_S:g} s and are left out"
+            f"{path}: {missing} of {len(has_pose)} frames have no pose within {longest_gap_s:g} s and are left out"
         )
         warnings.warn(message, PomonaWarning, stacklevel=4)
     return np.flatnonzero(has_pose)

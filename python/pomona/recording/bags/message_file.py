@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import struct
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -10,7 +11,10 @@ from typing import Any, Protocol
 
 from pomona.errors import PomonaError
 
-__all__ = ["Message", "MessageFile", "Topic", "decoded", "missing_extra", "stamp_ns"]
+__all__ = ["TREES", "Message", "MessageFile", "Topic", "decoded", "missing_extra", "stamp_ns"]
+
+TREES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+"""Types of the tree of transforms; the second one is from before 2013, and says the same."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +105,9 @@ def decoded(message: Message) -> Any:
         When the body is not what the type says.
     """
     from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_typestore
 
     ros1 = message.topic.encoding == "ros1"
-    store = _stores.get(ros1)
-    if store is None:
-        store = _stores[ros1] = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
+    store = _definitions(ros1)
     decode = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     try:
         return decode(message.body, message.topic.type)
@@ -115,8 +116,16 @@ def decoded(message: Message) -> Any:
         raise PomonaError(f"{message.topic.name}: not a {message.topic.type} ({reason})") from None
 
 
-_stores: dict[bool, Any] = {}
-"""Definitions of ROS 1 and of ROS 2: they take a while to make, and sensor_msgs has not changed in either."""
+@functools.cache
+def _definitions(ros1: bool) -> Any:
+    """Definitions of ROS 1 or ROS 2: they take a while to make, and sensor_msgs has not changed in either."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
+    for name in TREES:
+        if name not in store.fielddefs:
+            store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name))
+    return store
 
 
 def missing_extra(path: Path) -> PomonaError:

@@ -14,15 +14,22 @@ from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.camera_info import camera_of, rig_of, says_rectified
 from pomona.recording.bags.contents import Contents, PictureTopic, read_contents
+from pomona.recording.bags.frames_of_reference import path_between
 from pomona.recording.bags.message_file import MessageFile
+from pomona.recording.bags.poses import Known, camera_poses
 from pomona.recording.bags.topics import Roles, chosen_topics
 from pomona.recording.pairing import half_period, mutually_nearest
+from pomona.recording.poses_in_time import LONGEST_GAP_S, posed_rows, poses_at
 from pomona.recording.rectification import Optics, rectified
 from pomona.recording.rig_files import find_optics
+from pomona.trajectory import Trajectory
 
 __all__ = ["BAG_SUFFIXES", "open_bag", "recognises"]
 
 BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+
+LOST_POSES, SLOWEST_GAP_S = 2.5, 0.5
+"""Poses are taken across two that were lost, and no farther: a vehicle in a row moves half a metre in half a second."""
 
 
 def recognises(place: Path) -> bool:
@@ -55,7 +62,8 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
     _require_kinds(path, contents)
     optics = _optics(path, roles, contents, calibration)
     rows = _simultaneous(path, contents.pictures)
-    return BagRecording(path, file, roles, optics, contents.pictures, rows, None)
+    rows, trajectory = _posed(path, contents, rows, camera_poses(path, file, roles, contents), optics)
+    return BagRecording(path, file, roles, optics, contents.pictures, rows, trajectory)
 
 
 def _open_file(path: Path) -> MessageFile:
@@ -75,6 +83,26 @@ def _parts(folder: Path) -> tuple[Path, ...]:
     """Files of a bag that was split, in the order of their numbers."""
     files = (file for file in folder.iterdir() if file.is_file() and file.suffix in (".mcap", ".db3"))
     return tuple(sorted(files, key=lambda file: [int(digits) for digits in re.findall(r"\d+", file.stem)]))
+
+
+def _posed(
+    path: Path, contents: Contents, rows: dict[str, NDArray[np.int64]], known: Known | None, optics: Optics
+) -> tuple[dict[str, NDArray[np.int64]], Trajectory | None]:
+    """Give the frames that have a pose, and their poses; all, and none, where the bag has no poses."""
+    if known is None:
+        return rows, None
+    known_ns, session_from_left = known
+    first = next(iter(contents.pictures))
+    taken_ns = contents.pictures[first].stamps_ns[rows[first]]
+    # Differences of nanoseconds are exact as integers, and only then.
+    known_s = (known_ns - known_ns[0]) / 1e9
+    longest_gap_s = float(np.clip(LOST_POSES * 2 * half_period(known_s), LONGEST_GAP_S, SLOWEST_GAP_S))
+    poses, has_pose = poses_at((taken_ns - known_ns[0]) / 1e9, known_s, session_from_left, longest_gap_s)
+    posed = posed_rows(path, has_pose, longest_gap_s)
+    rows = {kind: of_kind[posed] for kind, of_kind in rows.items()}
+    left_from_rectified = np.eye(4)
+    left_from_rectified[:3, :3] = optics.rectified_from_left.T
+    return rows, Trajectory(rows[first], taken_ns[posed] / 1e9, poses[posed] @ left_from_rectified)
 
 
 def _require_kinds(path: Path, contents: Contents) -> None:
@@ -110,8 +138,13 @@ def _optics(path: Path, roles: Roles, contents: Contents, calibration: Path | No
             wanted = f"{picture.rpartition('/')[0]}/camera_info"
             raise PomonaError(f"{path}: {picture}: found no camera_info for it, expected {wanted} or --calibration")
         cameras.append(camera_of(path, info, contents.infos[info], is_rectified=says_rectified(picture)))
-    rig = rig_of((path,), cameras[0], cameras[1] if stereo else None, None)
-    return rectified(rig, first.size_px, stereo=stereo)
+    if not stereo:
+        return rectified(rig_of((path,), cameras[0], None, None), first.size_px, stereo=False)
+    right_from_left = path_between(contents.static, contents.pictures["right"].frame, first.frame)
+    if right_from_left is not None and not right_from_left[:3, 3].any():
+        right_from_left = None  # both pictures are said to be of one frame, as image_proc has it
+    rig = rig_of((path,), cameras[0], cameras[1], right_from_left)
+    return rectified(rig, first.size_px, stereo=True)
 
 
 def _simultaneous(path: Path, pictures: dict[str, PictureTopic]) -> dict[str, NDArray[np.int64]]:
