@@ -1,3 +1,5 @@
+import csv
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,6 +7,7 @@ from hypothesis import strategies as st
 
 from depth_scene import CAMERA, Sphere, box_of, picture
 from pomona.depth import Refusal, lift
+from pomona.errors import PomonaError
 
 APPLE = Sphere((0.1, -0.05, 1.3), 0.075)
 
@@ -148,3 +151,16 @@ def test_a_fruit_twice_as_far_with_the_same_outline_is_twice_as_large():
     np.testing.assert_allclose(box_of(near), box_of(far), atol=1e-9)
     ratio = lift_one(picture([far]), box_of(far)).diameters_m / lift_one(picture([near]), box_of(near)).diameters_m
     assert ratio[0] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_whole_fruits_of_the_captures_are_round(shared_data):
+    # Longer than 1.15 times their width they count as partly hidden.
+    with (shared_data / "kinect_apples" / "114012_boxes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    sides = [(float(row["xmax"]) - float(row["xmin"]), float(row["ymax"]) - float(row["ymin"])) for row in rows]
+    assert np.mean([max(side) / min(side) < 1.15 for side in sides]) > 0.6
+
+
+def test_a_depth_picture_of_another_size_is_refused():
+    with pytest.raises(PomonaError, match="expected 640 x 480"):
+        lift(picture([])[:200], np.empty((0, 4)), CAMERA)

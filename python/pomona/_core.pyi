@@ -1,9 +1,21 @@
-from typing import TypedDict, final
+from typing import Protocol, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MapIndex", "Match", "Tracker", "Tracks", "__version__", "default_config", "describe", "one_fruit_each"]
+__all__ = [
+    "MapIndex",
+    "Match",
+    "Tracker",
+    "Tracks",
+    "__version__",
+    "default_config",
+    "describe",
+    "fuse_centres",
+    "fuse_diameters",
+    "lift",
+    "one_fruit_each",
+]
 
 __version__: str
 
@@ -13,6 +25,20 @@ class _Arrays(TypedDict):
     diameters_m: NDArray[np.float64] | None
     view_frames: NDArray[np.int64] | None
     view_fruits: NDArray[np.int64] | None
+
+class _Camera(Protocol):
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def fx(self) -> float: ...
+    @property
+    def fy(self) -> float: ...
+    @property
+    def cx(self) -> float: ...
+    @property
+    def cy(self) -> float: ...
 
 @final
 class Match:
@@ -118,3 +144,15 @@ def one_fruit_each(
 ) -> NDArray[np.int64]: ...
 def default_config() -> str: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+def fuse_centres(
+    centres: NDArray[np.float64], covariances: NDArray[np.float64], rays: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def fuse_diameters(
+    diameters_m: NDArray[np.float64], sigmas_m: NDArray[np.float64], hidden: NDArray[np.float64]
+) -> tuple[float, float]: ...
+def lift(
+    depth_m: NDArray[np.float32],
+    boxes_px: NDArray[np.float64],
+    depth_sigma_per_m2: NDArray[np.float64],
+    camera: _Camera,
+) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

@@ -24,15 +24,7 @@ pub struct Arrays<'py> {
 impl Arrays<'_> {
     /// Copies the arrays into a cloud of the core.
     pub fn to_cloud(&self) -> PyResult<FruitCloud> {
-        let covariances = match &self.covariances {
-            Some(all) if all.shape()[1..] != [3, 3] => {
-                return Err(PyValueError::new_err("covariances: expected an array of shape (N, 3, 3)"));
-            }
-            Some(all) => {
-                Some(all.as_array().outer_iter().map(|c| Matrix3::from_fn(|row, column| c[[row, column]])).collect())
-            }
-            None => None,
-        };
+        let covariances = self.covariances.as_ref().map(matrices).transpose()?;
         let views = match (&self.view_frames, &self.view_fruits) {
             (Some(frames), Some(fruits)) => Some(Views {
                 frames: frames.as_array().to_vec(),
@@ -63,4 +55,12 @@ pub fn points(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Point3<f64>>> {
         return Err(PyValueError::new_err(format!("positions: found {found} columns, expected 3 (x, y, z)")));
     }
     Ok(rows.outer_iter().map(|p| Point3::new(p[0], p[1], p[2])).collect())
+}
+
+/// Matrices of an (N, 3, 3) array.
+pub fn matrices(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
+    if all.shape()[1..] != [3, 3] {
+        return Err(PyValueError::new_err("covariances: expected an array of shape (N, 3, 3)"));
+    }
+    Ok(all.as_array().outer_iter().map(|one| Matrix3::from_fn(|row, column| one[[row, column]])).collect())
 }

@@ -1,7 +1,9 @@
 //! Python bindings of the pomona core: thin, no logic. One file per core module.
 
+mod camera;
 mod cloud;
 mod descriptor;
+mod lifting;
 mod matching;
 mod tracking;
 
@@ -16,6 +18,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<tracking::PyTracks>()?;
     module.add_function(wrap_pyfunction!(tracking::one_fruit_each, module)?)?;
     module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
+    module.add_function(wrap_pyfunction!(lifting::fuse_centres, module)?)?;
+    module.add_function(wrap_pyfunction!(lifting::fuse_diameters, module)?)?;
+    module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())
 }

@@ -8,6 +8,7 @@
 //! into the map.
 
 pub mod assignment;
+pub mod camera;
 pub mod clique;
 pub mod cloud;
 pub mod codebook;
@@ -19,6 +20,7 @@ pub mod error;
 mod evidence;
 pub mod geometry;
 pub mod index;
+pub mod lifting;
 pub mod matching;
 mod paper;
 pub mod ransac;

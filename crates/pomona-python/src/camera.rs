@@ -1,0 +1,29 @@
+//! A camera from what Python passes.
+
+use pomona::camera::Camera;
+use pyo3::prelude::*;
+
+/// The fields of a calibration that the core needs.
+#[derive(FromPyObject)]
+pub struct Fields {
+    #[pyo3(attribute)]
+    width: usize,
+    #[pyo3(attribute)]
+    height: usize,
+    #[pyo3(attribute)]
+    fx: f64,
+    #[pyo3(attribute)]
+    fy: f64,
+    #[pyo3(attribute)]
+    cx: f64,
+    #[pyo3(attribute)]
+    cy: f64,
+}
+
+impl Fields {
+    /// The same as the core has it.
+    pub fn to_camera(&self) -> Camera {
+        let &Self { width, height, fx, fy, cx, cy } = self;
+        Camera { width, height, fx, fy, cx, cy }
+    }
+}
