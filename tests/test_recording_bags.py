@@ -426,6 +426,63 @@ def test_a_damaged_chunk_costs_its_own_pictures(tmp_path, form):
     assert all(any(np.array_equal(left, original) for original in originals) for left in lefts.values())
 
 
+@pytest.mark.filterwarnings("ignore:.*others are left out")
+@pytest.mark.parametrize("form", ["ros1", "ros1 lz4", "sqlite3"])
+@pytest.mark.parametrize("share", [0.4, 0.7])
+def test_a_ros_bag_cut_off_in_the_middle_is_used_as_far_as_it_goes(pomona, tmp_path, form, share):
+    """Of ROS 1 the index is lost; rosbag1 writes chunks of 1 MB, so the pictures are large enough for some of them."""
+    size = (640, 360)
+    entries = []
+    for row in range(20):
+        at = START_NS + row * STEP_NS
+        for side, shift in (("left", 0.0), ("right", -600 * 0.12)):
+            entries.append(info(f"/{side}/camera_info", at, shift, size=size, f=600.0))
+            entries.append(image(f"/{side}/image_rect", at, picture(row, size), "bgr8"))
+    bag = write_bag(tmp_path / "row", entries, form)
+    file = bag if bag.is_file() else next(bag.glob("*.db3"))
+    with file.open("rb+") as content:
+        content.truncate(int(share * file.stat().st_size))
+    with pytest.warns(PomonaWarning, match="cut off.*: what is there is used"):
+        recording = open_recording(bag)
+    assert abs(len(recording) - 20 * share) <= 3
+    for frame in recording.frames():
+        assert np.array_equal(frame.read_left(), picture(frame.number, size))
+        assert np.array_equal(frame.read_right(), picture(frame.number, size))
+    code, printed, errors = pomona("info", bag, "--check")
+    assert (code, errors.count("cut off")) == (0, 1)
+    assert "unreadable     0" in printed
+
+
+@pytest.mark.parametrize("name", ["row.bag", "row.bag.active"])
+def test_a_bag_that_was_never_closed(tmp_path, name):
+    """The recorder writes the place of the index when it closes the bag."""
+    bag = write_bag(tmp_path / "closed", stereo(4), "ros1")
+    content = bytearray(bag.read_bytes())
+    place = content.index(b"index_pos=") + len(b"index_pos=")
+    content[place : place + 8] = bytes(8)
+    (tmp_path / name).write_bytes(content)
+    with pytest.warns(PomonaWarning, match="not closed"):
+        recording = open_recording(tmp_path / name)
+    assert all(np.array_equal(frame.read_left(), picture(frame.number)) for frame in recording.frames([1, 2, 3]))
+    assert len(recording) == 4
+
+
+def test_a_damaged_chunk_of_a_bag_without_index(tmp_path):
+    bag = write_bag(tmp_path / "closed", stereo(200), "ros1 lz4")
+    content = bytearray(bag.read_bytes())
+    place = content.index(b"index_pos=") + len(b"index_pos=")
+    content[place : place + 8] = bytes(8)
+    magic = b"\x04\x22\x4d\x18"  # of an LZ4 frame; the format has no checksums, so only its structure can be broken
+    second = content.index(magic, content.index(magic) + 1)
+    content[second : second + 8] = bytes(8)
+    bag.write_bytes(content)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        recording = open_recording(bag)
+    assert sum("is damaged and left out" in str(warning.message) for warning in caught) == 1
+    assert 50 < len(recording) < 200
+
+
 @pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])
 def test_what_is_no_bag_is_refused(tmp_path, form):
     bag = write_bag(tmp_path / "row", stereo(1), form)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.recording.bags.message_file import Message, Topic, missing_extra
+from pomona.recording.bags.message_file import Message, Topic, missing_extra, ros2_name
 
 __all__ = ["MAGIC", "McapFile"]
 
@@ -172,6 +172,4 @@ def _logged_ns(head: bytes) -> int:
 def _topic(channel: Any, schemas: dict[int, Any]) -> Topic:
     schema = schemas.get(channel.schema_id)
     name = "" if schema is None else str(schema.name)
-    # ROS 1 and some writers leave out what ROS 2 puts in the middle.
-    name = name.replace("/", "/msg/") if name.count("/") == 1 else name
-    return Topic(str(channel.topic), name, str(channel.message_encoding))
+    return Topic(str(channel.topic), ros2_name(name), str(channel.message_encoding))

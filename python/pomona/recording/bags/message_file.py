@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from pomona.errors import PomonaError
 
-__all__ = ["TREES", "Message", "MessageFile", "Topic", "decoded", "missing_extra", "stamp_ns"]
+__all__ = ["TREES", "Message", "MessageFile", "Topic", "decoded", "missing_extra", "ros2_name", "stamp_ns"]
 
 TREES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 """Types of the tree of transforms; the second one is from before 2013, and says the same."""
@@ -126,6 +126,11 @@ def _definitions(ros1: bool) -> Any:
         if name not in store.fielddefs:
             store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name))
     return store
+
+
+def ros2_name(kind: str) -> str:
+    """Name of a type as ROS 2 writes it; ROS 1 and some writers leave out the middle."""
+    return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind
 
 
 def missing_extra(path: Path) -> PomonaError:

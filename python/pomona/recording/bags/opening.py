@@ -15,7 +15,7 @@ from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.camera_info import camera_of, rig_of, says_rectified
 from pomona.recording.bags.contents import Contents, PictureTopic, read_contents
 from pomona.recording.bags.frames_of_reference import path_between
-from pomona.recording.bags.message_file import MessageFile
+from pomona.recording.bags.message_file import MessageFile, missing_extra
 from pomona.recording.bags.poses import Known, camera_poses
 from pomona.recording.bags.topics import Roles, chosen_topics
 from pomona.recording.pairing import half_period, mutually_nearest
@@ -26,7 +26,8 @@ from pomona.trajectory import Trajectory
 
 __all__ = ["BAG_SUFFIXES", "open_bag", "recognises"]
 
-BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+BAG_SUFFIXES = (".bag", ".mcap", ".db3", ".active")
+"""`.bag.active` is the name of a ROS 1 bag as long as it is recorded."""
 
 LOST_POSES, SLOWEST_GAP_S = 2.5, 0.5
 """Poses are taken across two that were lost, and no farther: a vehicle in a row moves half a metre in half a second."""
@@ -56,6 +57,10 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
     PomonaError
         When pictures or cameras are missing, not clear, or do not fit together.
     """
+    try:
+        import rosbags  # noqa: F401
+    except ImportError:
+        raise missing_extra(path) from None
     file = _open_file(path)
     roles = chosen_topics(path, file.topics, topics)
     contents = read_contents(file, roles)
@@ -68,15 +73,30 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
 
 def _open_file(path: Path) -> MessageFile:
     from pomona.recording.bags.joined import JoinedBags
-    from pomona.recording.bags.mcap_file import McapFile
     from pomona.recording.bags.ros_bag import RosBag
+    from pomona.recording.bags.sqlite_rest import is_cut_off
 
     parts = (path,) if path.is_file() else _parts(path)
-    if parts and all(part.suffix == ".mcap" for part in parts):
-        return McapFile.open(path) if path.is_file() else JoinedBags(path, tuple(map(McapFile.open, parts)))
-    if path.is_dir() and not (path / "metadata.yaml").is_file():
-        return JoinedBags(path, tuple(RosBag.open(part, (part,)) for part in parts))
-    return RosBag.open(path, (path,) if path.is_file() else tuple(sorted(file for file in path.iterdir())))
+    described = path.is_dir() and (path / "metadata.yaml").is_file()
+    if described and not any(part.suffix == ".mcap" or is_cut_off(part) for part in parts):
+        return RosBag.open(path, tuple(sorted(path.iterdir())))
+    opened = tuple(map(_open_part, parts))
+    return opened[0] if path.is_file() else JoinedBags(path, opened)
+
+
+def _open_part(file: Path) -> MessageFile:
+    from pomona.recording.bags.mcap_file import McapFile
+    from pomona.recording.bags.ros1_rest import Ros1Rest, has_no_index
+    from pomona.recording.bags.ros_bag import RosBag
+    from pomona.recording.bags.sqlite_rest import SqliteRest, is_cut_off
+
+    if file.suffix == ".mcap":
+        return McapFile.open(file)
+    if file.suffix == ".db3" and is_cut_off(file):
+        return SqliteRest.open(file)
+    if file.suffix == ".active" or (file.suffix == ".bag" and has_no_index(file)):
+        return Ros1Rest.open(file)
+    return RosBag.open(file, (file,))
 
 
 def _parts(folder: Path) -> tuple[Path, ...]:

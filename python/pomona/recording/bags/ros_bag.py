@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pomona.errors import PomonaError
-from pomona.recording.bags.message_file import Message, Topic, missing_extra
+from pomona.recording.bags.message_file import Message, Topic
 
 __all__ = ["RosBag"]
 
@@ -43,15 +43,20 @@ class RosBag:
             connections = [each for each in reader.connections if each.topic in topics]
             if not connections:
                 return
-            for connection, logged_ns, body in reader.messages(connections, start=start_ns):
+            messages = reader.messages(connections, start=start_ns)
+            while True:
+                try:
+                    connection, logged_ns, body = next(messages)
+                except StopIteration:
+                    return
+                except Exception as error:
+                    raise PomonaError(f"{self.path}: damaged ({_first_line(error)})") from None
                 yield Message(self.topics[connection.topic], logged_ns, bytes(body))
 
 
 def _opened(path: Path) -> Any:
-    try:
-        from rosbags import rosbag1, rosbag2
-    except ImportError:
-        raise missing_extra(path) from None
+    from rosbags import rosbag1, rosbag2
+
     reader: Any = (rosbag1 if path.suffix == ".bag" else rosbag2).Reader(path)
     return _Opened(path, reader)
 
@@ -66,8 +71,11 @@ class _Opened:
         try:
             return self.reader.__enter__()
         except Exception as error:  # its own errors, SQLite's, and those of what a damaged header makes it do
-            reason = (str(error).splitlines() or [type(error).__name__])[0]
-            raise PomonaError(f"{self.path}: not a bag, or a damaged one ({reason})") from None
+            raise PomonaError(f"{self.path}: not a bag, or a damaged one ({_first_line(error)})") from None
 
     def __exit__(self, *_: object) -> None:
         self.reader.close()
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

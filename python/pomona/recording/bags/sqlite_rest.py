@@ -1,0 +1,84 @@
+"""What is left of a ROS 2 bag in SQLite that was cut off: its rows in order, up to the first that is missing."""
+
+from __future__ import annotations
+
+import sqlite3
+import warnings
+from collections.abc import Collection, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.bags.message_file import Message, Topic
+
+__all__ = ["SqliteRest", "is_cut_off"]
+
+HEADER_BYTES = 100
+
+
+def is_cut_off(path: Path) -> bool:
+    """Whether the header of a database promises more pages than there are (sqlite.org/fileformat, 1.3)."""
+    with path.open("rb") as file:
+        header = file.read(HEADER_BYTES)
+    if not header.startswith(b"SQLite format 3\0") or len(header) < HEADER_BYTES:
+        return False
+    page = int.from_bytes(header[16:18], "big")
+    return int.from_bytes(header[28:32], "big") * (65536 if page == 1 else page) > path.stat().st_size
+
+
+@dataclass(frozen=True, eq=False)
+class SqliteRest:
+    """See `MessageFile`."""
+
+    path: Path
+    topics: dict[str, Topic]
+
+    kind = "ROS 2 bag"
+
+    @classmethod
+    def open(cls, path: Path) -> SqliteRest:
+        """Read the topics.
+
+        Raises
+        ------
+        PomonaError
+            When not even those are left.
+        """
+        try:
+            with closing(_connected(path)) as database:
+                rows = database.execute("SELECT name, type, serialization_format FROM topics").fetchall()
+        except sqlite3.Error as error:
+            raise PomonaError(f"{path}: cut off before the first message ({error})") from None
+        warnings.warn(f"{path}: cut off: what is there is used", PomonaWarning, stacklevel=5)
+        return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in rows})
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file itself."""
+        return (self.path,)
+
+    def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
+        """Read in the order in which the recorder wrote; the index by time lies at the end and may be lost."""
+        with closing(_connected(self.path)) as database:
+            names = dict(database.execute("SELECT id, name FROM topics"))
+            rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+            while True:
+                try:
+                    row = rows.fetchone()
+                except sqlite3.DatabaseError:
+                    return
+                if row is None:
+                    return
+                topic, logged_ns, body = self.topics.get(names.get(row[0], "")), row[1], row[2]
+                if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
+                    yield Message(topic, logged_ns, body)
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    # A generator may be finished by another thread than the one that began it.
+    database = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro", uri=True, check_same_thread=False)
+    # Else SQLite refuses a file that is shorter than its header says.
+    database.execute("PRAGMA writable_schema = ON")
+    return database
