@@ -130,7 +130,7 @@ def test_classes_are_one_fruit_unless_told_otherwise(tmp_path):
     assert found_in(OnnxDetector.open(path, classes=(1,)), picture) == ([moved], [0.6])
     with pytest.raises(PomonaError, match=r"model.onnx: class: found 'plum', expected apple, pear$"):
         OnnxDetector.open(path, classes=("plum",))
-    with pytest.raises(PomonaError, match="class: found 2"):
+    with pytest.raises(PomonaError, match="class: found 2, expected apple, pear"):
         OnnxDetector.open(path, classes=(2,))
 
 
@@ -200,7 +200,10 @@ def test_rfdetr_says_which_slots_are_things(tmp_path):
     # Without the metadata the last slot stands for nothing; with it, slot 3 is a thing, and the strongest.
     both = OnnxDetector.open(path)(Frame(0, read_left=lambda: red_rectangle(320, 256)))
     assert len(both) == 2
+    assert OnnxDetector.open(path).description.endswith("fruits are of 2 classes: green, red")
     assert "rfdetr_inference" in OnnxDetector.open(path).description
+    with pytest.raises(PomonaError, match="class: found 2, expected green, red"):
+        OnnxDetector.open(path, classes=(2,))
 
 
 def test_the_user_knows_best(tmp_path):

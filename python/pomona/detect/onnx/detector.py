@@ -126,11 +126,8 @@ class OnnxDetector:
         return f"{self.path}: {title}; input {size} {signature.preparation}; {self._classes()}"
 
     def _classes(self) -> str:
-        names, count = self.signature.names or {}, self.signature.decoder.n_classes
-        if self.selection.classes is not None:
-            chosen = self.selection.classes.tolist()
-        else:
-            chosen = list(names) or list(range(count or 0))
+        names, wanted = self.signature.names or {}, self.selection.classes
+        chosen = list(self.signature.decoder.classes or ()) if wanted is None else wanted.tolist()
         shown = ", ".join(names.get(number, str(number)) for number in chosen[:5]) + ", ..." * (len(chosen) > 5)
         return f"fruits are of {len(chosen)} classes: {shown}" if chosen else "fruits are of all classes"
 

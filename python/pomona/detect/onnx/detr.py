@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pomona.detect.onnx.candidates import Candidates, Selection, from_centres, select
 from pomona.detect.onnx.network import Outputs
@@ -17,7 +17,7 @@ __all__ = ["ChosenDecoder", "LogitDecoder", "NormalisedDecoder"]
 class ChosenDecoder:
     """Reads `labels`, `boxes` (corners, scaled to `orig_target_sizes`) and `scores`: RT-DETR, D-FINE, DEIM."""
 
-    n_classes: int | None = None
+    classes: Sequence[int] | None = None
 
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates of one picture."""
@@ -34,6 +34,11 @@ class NormalisedDecoder:
     boxes: str
     size_px: tuple[int, int]
     n_classes: int
+
+    @property
+    def classes(self) -> Sequence[int]:
+        """Numbers of the classes."""
+        return range(self.n_classes)
 
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates of one picture."""
@@ -52,24 +57,21 @@ class LogitDecoder:
         Names of the outputs.
     size_px : (int, int)
         Width and height of the input.
-    classes : (C,) int64
+    classes : sequence of int
         Those of the logits that stand for things and not for none.
-    n_classes : int
-        Logits in a row.
     """
 
     boxes: str
     logits: str
     masks: str | None
     size_px: tuple[int, int]
-    classes: NDArray[np.int64]
-    n_classes: int
+    classes: Sequence[int]
 
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates of one picture."""
         # Each class has a probability of its own: sigmoid, not softmax. Beyond 60 float64 has no more to say.
         probabilities = 1 / (1 + np.exp(-np.clip(outputs[self.logits].astype(np.float64), -60, 60)))
-        classes = self.classes if selection.classes is None else np.intersect1d(selection.classes, self.classes)
+        classes = np.array(self.classes if selection.classes is None else selection.classes, np.int64)
         rows, scores, best = select(probabilities, Selection(selection.min_score, classes))
         boxes_px = from_centres(outputs[self.boxes][rows]) * np.tile(self.size_px, 2)
         masks = None if self.masks is None else outputs[self.masks]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,8 +27,8 @@ class Decoder(Protocol):
     """Reads the outputs for one picture."""
 
     @property
-    def n_classes(self) -> int | None:
-        """Classes that it can tell, None where only the outputs for a picture say so."""
+    def classes(self) -> Sequence[int] | None:
+        """Numbers of the classes that it can tell, None where only the outputs for a picture say so."""
 
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates that the selection wants."""
@@ -61,7 +61,12 @@ class Layout:
     @property
     def n_names(self) -> int | None:
         """Classes that the file names."""
-        return None if self.claim.names is None else max(self.claim.names, default=-1) + 1
+        return None if self.claim.names is None else len(self.claim.names)
+
+    @property
+    def classes(self) -> Sequence[int] | None:
+        """Their numbers."""
+        return None if self.claim.names is None else tuple(sorted(self.claim.names))
 
 
 @dataclass(frozen=True)
@@ -134,12 +139,12 @@ def _end_to_end(layout: Layout) -> Decoder | None:
     n_masks = 0 if prototypes is None else len(layout.outputs[prototypes])
     if name is None or layout.outputs[name].shape[1] != 6 + n_masks:
         return None
-    return EndToEndDecoder(name, prototypes, layout.n_names)
+    return EndToEndDecoder(name, prototypes, layout.classes)
 
 
 def _rtdetr(layout: Layout) -> Decoder | None:
     named = layout.takes_sizes and {"labels", "boxes", "scores"} <= layout.outputs.keys()
-    return ChosenDecoder(layout.n_names) if named else None
+    return ChosenDecoder(layout.classes) if named else None
 
 
 def _rtdetr_ultralytics(layout: Layout) -> Decoder | None:
@@ -160,10 +165,10 @@ def _rfdetr(layout: Layout) -> Decoder | None:
     masks = roles.get("pred_masks", others[0] if len(others) == 1 else None)
     slots = outputs[logits].shape[1]
     if layout.claim.names is not None:
-        classes = np.array([number for number in sorted(layout.claim.names) if number < slots], np.int64)
+        classes = tuple(number for number in sorted(layout.claim.names) if number < slots)
     else:  # numbers counted from 0 leave a last slot that stands for nothing
-        classes = np.arange(slots if slots in (1, COCO_SLOTS) else slots - 1)
-    return LogitDecoder(boxes, logits, masks if masks in outputs else None, layout.size_px, classes, slots)
+        classes = tuple(range(slots if slots in (1, COCO_SLOTS) else slots - 1))
+    return LogitDecoder(boxes, logits, masks if masks in outputs else None, layout.size_px, classes)
 
 
 _RTDETR = Preparation(fit="stretch", resize="smooth")

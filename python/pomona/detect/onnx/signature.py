@@ -72,13 +72,13 @@ class Signature:
         if classes is None:
             return Selection(min_score)
         numbers = {name: number for number, name in (self.names or {}).items()}
-        count = self.decoder.n_classes
+        known = self.decoder.classes
         chosen = []
         for wanted in classes:
             number = numbers.get(str(wanted), int(wanted) if str(wanted).isdecimal() else -1)
-            if number < 0 or (count is not None and number >= count):
-                known = ", ".join(numbers) if numbers else f"a number below {count}" if count else "a number"
-                raise PomonaError(f"{where}: class: found {wanted!r}, expected {known[:200]}")
+            if number < 0 or (known is not None and number not in known):
+                expected = ", ".join(map(str, numbers or known or ())) or "a number"
+                raise PomonaError(f"{where}: class: found {wanted!r}, expected {expected[:200]}")
             chosen.append(number)
         return Selection(min_score, np.unique(np.array(chosen, np.int64)))
 

@@ -7,7 +7,7 @@ families an objectness, a score for each class, in -seg models coefficients that
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +79,11 @@ class DenseDecoder:
     transposed: bool
     cells: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
+    @property
+    def classes(self) -> Sequence[int]:
+        """Numbers of the classes."""
+        return range(self.n_classes)
+
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates of one picture."""
         head = outputs[self.boxes].T if self.transposed else outputs[self.boxes]
@@ -103,7 +108,7 @@ class EndToEndDecoder:
 
     boxes: str
     prototypes: str | None
-    n_classes: int | None = None
+    classes: Sequence[int] | None = None
 
     def __call__(self, outputs: Outputs, selection: Selection) -> Candidates:
         """Give the candidates of one picture."""
