@@ -173,10 +173,39 @@ def test_frames_without_poses_are_refused(pomona, tmp_path):
     assert_refused(pomona("scan", folder, "-o", output), output, "2 frames without poses", "poses_tum.txt")
 
 
-def test_frames_with_boxes_without_ids_are_refused(pomona, tmp_path):
-    folder = make_recording(tmp_path / "row", (0.0, 0.1), ids=False)
-    output = tmp_path / "fruits.csv"
-    assert_refused(pomona("scan", folder, "-o", output), output, "boxes without ids in 2 frames")
+@pytest.mark.parametrize("frames", [2, 8])
+def test_boxes_without_ids_are_tracked(pomona, tmp_path, frames):
+    folder = make_recording(tmp_path / "2024-08-09", tuple(0.03 * np.arange(frames)), ids=False)
+    assert pomona("scan", folder, "-o", tmp_path / "fruits.csv").returncode == 0
+    cloud = FruitCloud.read(tmp_path / "fruits.csv")
+    assert cloud.ids == ("1", "2", "3")
+    assert cloud.n_views.tolist() == [frames] * 3
+    np.testing.assert_allclose(cloud.positions, [fruit.centre for fruit in FRUITS.values()], atol=0.001)
+
+
+def test_ids_can_be_left_aside(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", tuple(0.03 * np.arange(6)))
+    boxes = folder / "detections.csv"
+    boxes.write_text(boxes.read_text().replace(",a\n", ",x\n", 2))  # two of them misnamed
+    assert pomona("scan", folder, "-o", tmp_path / "named.csv").returncode == 0
+    assert pomona("scan", folder, "-o", tmp_path / "tracked.csv", "--retrack").returncode == 0
+    assert len(FruitCloud.read(tmp_path / "named.csv")) == 4
+    assert len(FruitCloud.read(tmp_path / "tracked.csv")) == 3
+
+
+def test_a_setting_of_the_tracker(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", tuple(0.03 * np.arange(6)), ids=False)
+    settings = tmp_path / "pomona.toml"
+    boxes = folder / "detections.csv"
+    lines = boxes.read_text().splitlines()
+    boxes.write_text("\n".join(lines[:1] + [line for line in lines[1:] if not line.startswith(("4", "5"))]) + "\n")
+    for least, found in ((4, 3), (5, 0)):
+        settings.write_text(f"[tracking]\nmin_views = {least}\n")
+        assert pomona("scan", folder, "-o", tmp_path / "fruits.csv", "--config", settings).returncode == 0
+        assert len(FruitCloud.read(tmp_path / "fruits.csv")) == found
+    settings.write_text("[tracking]\nviews = 3\n")
+    output = tmp_path / "other.csv"
+    assert_refused(pomona("scan", folder, "-o", output, "--config", settings), output, "views")
 
 
 def test_a_recording_without_depth_is_refused(pomona, row, tmp_path):

@@ -220,6 +220,11 @@ class Tracker:
         except ValueError as error:
             raise PomonaError(f"frame {frame_number}: {error}") from None
 
+    @property
+    def min_views(self) -> int:
+        """Frames that must have seen a fruit: the setting `tracking.min_views`."""
+        return self._core.min_views
+
     def finish(self, min_views: int | None = None) -> Tracks:
         """Give the fruits seen so far, duplicates joined; the tracker can go on afterwards.
 

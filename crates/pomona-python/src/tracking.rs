@@ -81,6 +81,11 @@ impl PyTracker {
         Ok(PyArray1::from_iter(py, numbers.into_iter().map(|number| number.map_or(-1, |number| number as i64))))
     }
 
+    #[getter]
+    fn min_views(&self) -> usize {
+        self.min_views
+    }
+
     #[pyo3(signature = (min_views=None))]
     fn finish(&self, py: Python<'_>, min_views: Option<usize>) -> PyTracks {
         PyTracks(py.detach(|| self.tracker.finish(min_views.unwrap_or(self.min_views))))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from pomona.recording import Recording
-    from pomona.survey import Part, Progress, Survey
+    from pomona.survey import Kept, Survey
 
 SUFFIXES = (".gpkg", ".csv", ".ply")
 
@@ -23,17 +21,27 @@ INTERRUPTED = 130
 
 def scan(
     recording: Path = typer.Argument(
-        metavar="RECORDING", help="Stereo video, folder of stereo or depth pictures, bag: whatever `pomona info` knows."
+        metavar="RECORDING", help="Stereo or depth recording, whatever `pomona info` reads."
     ),
     output: Path = typer.Option(..., "-o", "--output", help="Session to write: .gpkg, or its fruits as .csv or .ply."),
     detections: Path | None = typer.Option(
         None, metavar="FILE", help="Boxes: our CSV, MOTChallenge text or COCO json; else detections.csv in the folder."
     ),
+    model: Path | None = typer.Option(None, metavar="ONNX", help="Detector that finds the boxes, instead of a file."),
+    family: str | None = typer.Option(None, help="Family of the model, where the file does not say it."),
+    min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least confidence of the model's boxes."),
+    classes: str | None = typer.Option(None, metavar="NAME,...", help="Classes of the model that are fruits."),
+    tiles: str | None = typer.Option(None, metavar="auto|off|NxM", help="Tiles of a large picture for the model."),
     calibration: Path | None = typer.Option(
         None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
     ),
+    topics: str | None = typer.Option(
+        None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
+    ),
     stereo: bool = typer.Option(False, "--stereo", help="Depth from left and right, even where depth was recorded."),
     odometry: bool = typer.Option(False, "--odometry", help="Poses from the pictures, even where they were recorded."),
+    retrack: bool = typer.Option(False, "--retrack", help="Track the boxes, even where they have ids."),
+    config: Path | None = typer.Option(None, metavar="TOML", help="Settings; `pomona config` prints them all."),
     every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
     first: int | None = typer.Option(None, "--from", metavar="FRAME", help="First frame to take, by its number."),
     last: int | None = typer.Option(None, "--to", metavar="FRAME", help="Last frame to take."),
@@ -47,75 +55,104 @@ def scan(
 ) -> None:
     """Find every fruit of RECORDING once, in 3D, with diameter and covariance, and write the session.
 
-    More than one frame needs poses, and an id for each box. Ctrl-C ends the scan early: the session of the frames so
-    far is written, exit code 130.
+    Poses come with the recording, else from its pictures. Boxes with ids are taken for the fruits that they name,
+    others are tracked. Ctrl-C ends the scan early: the session of the frames so far is written, exit code 130.
     """
+    from pomona.cli import scan_output
     from pomona.cli.progress import first_interrupt
-    from pomona.detect.opening import open_detections
+    from pomona.detect.opening import open_detector
     from pomona.recording import open_recording
+    from pomona.recording.bags.topics import parsed_topics
     from pomona.recording.selected import selected
-    from pomona.survey import Kept, write_stages, write_survey
+    from pomona.recording.swapped import check_sides
+    from pomona.settings import Settings
     from pomona.survey import scan as scan_recording
-    from pomona.survey.preview import require_preview
 
-    _require_writable(output)
-    if preview is not None:
-        _require_suffix(preview, (".mp4",))
+    _require_writable(output, preview)
     _require_date(date)
-    whole = open_recording(recording, calibration=calibration)
-    boxes = detections or recording / "detections.csv"
-    detector = open_detections(boxes, whole.calibration, whole.numbers)
-    if preview is not None:
-        require_preview(whole)
-    opened = selected(whole, every=every, first=first, last=last)
-    choices = {"stereo": stereo, "odometry": odometry}
-    kept = None if keep is None else Kept(keep, _made_from(opened, [boxes], stereo))
-    with _progress(opened) as progress, first_interrupt() as stop:
-        survey = scan_recording(opened, detector, **choices, keep=kept, progress=progress, stop=stop)
-    configuration = {"scan": {**choices, "boxes": str(boxes.resolve()), "every": every}}
-    written = write_survey(
-        output,
-        survey,
-        opened,
-        name=name or opened.name,
-        date=date or _date(opened),
-        configuration=configuration,
-        inputs=[boxes],
+    overrides = Settings.load(config, {}).overrides
+    chosen = None if topics is None else parsed_topics(topics)
+    whole = open_recording(recording, calibration=calibration, topics=chosen)
+    _require_drawable(whole, preview)
+    detector = open_detector(
+        detections, model, whole, family=family, min_score=min_score, classes=_classes(classes), tiles=tiles
     )
-    if keep is not None:
-        write_stages(keep, survey)
-    if preview is not None:
-        _draw(preview, opened, survey)
-    summary = _summary(opened, survey, written)
-    typer.echo(_dumps(summary) if json else _as_text(summary))
+    opened = selected(whole, every=every, first=first, last=last)
+    looks = {"detector": detector.configuration, "stereo": stereo}
+    kept = None if keep is None else _kept(keep, opened, detector.path, looks)
+    check_sides(opened)
+    choices = {"stereo": stereo, "odometry": odometry, "retrack": retrack}
+    with scan_output.scanning(opened, detector.description) as progress, first_interrupt() as stop:
+        survey = scan_recording(opened, detector, **choices, config=overrides, keep=kept, progress=progress, stop=stop)
+    configuration = {"scan": {**looks, **choices, "every": every}, **overrides}
+    written = _write(output, survey, opened, name, date, configuration, detector.path)
+    _write_extras(keep, preview, opened, survey)
+    found = scan_output.summary(opened, survey, written)
+    typer.echo(_dumps(found) if json else scan_output.as_text(found))
     if survey.stopped is not None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _made_from(recording: Recording, boxes: list[Path], stereo: bool) -> dict[str, Any]:
-    """Say all that looking at one frame depends on."""
+def _classes(text: str | None) -> tuple[str | int, ...] | None:
+    return None if text is None else tuple(int(name) if name.isdecimal() else name for name in text.split(","))
+
+
+def _kept(folder: Path, recording: Recording, detector: Path, looks: dict[str, Any]) -> Kept:
+    """Open the folder of what is kept, with all that looking at one frame depends on."""
     from pomona import __version__
+    from pomona.survey import Kept
     from pomona.survey.files import identity
 
-    return {
-        "version": __version__,
-        "recording": str(recording.path.resolve()),
-        "files": identity(dict.fromkeys([*recording.inputs(), *boxes])),
-        "stereo": stereo,
-    }
+    files = identity(dict.fromkeys([*recording.inputs(), detector]))
+    return Kept(folder, {"version": __version__, "recording": str(recording.path.resolve()), "files": files, **looks})
 
 
-def _draw(preview: Path, recording: Recording, survey: Survey) -> None:
+def _write(
+    output: Path,
+    survey: Survey,
+    recording: Recording,
+    name: str | None,
+    date: str | None,
+    configuration: dict[str, Any],
+    detector: Path,
+) -> list[Path]:
+    from pomona.survey import write_survey
+
+    return write_survey(
+        output,
+        survey,
+        recording,
+        name=name or recording.name,
+        date=date or _date(recording),
+        configuration=configuration,
+        inputs=[detector],
+    )
+
+
+def _write_extras(keep: Path | None, preview: Path | None, recording: Recording, survey: Survey) -> None:
     from pomona.cli.progress import counting
+    from pomona.survey import write_stages
     from pomona.survey.preview import write_preview
 
-    with counting("drawing", len(recording)) as progress:
-        write_preview(preview, recording, survey, progress)
+    if keep is not None:
+        write_stages(keep, survey)
+    if preview is not None:
+        with counting("drawing", len(recording)) as progress:
+            write_preview(preview, recording, survey, progress)
 
 
-def _require_writable(output: Path) -> None:
+def _require_writable(output: Path, preview: Path | None) -> None:
     """Refuse before the work, not after it."""
     _require_suffix(output, SUFFIXES)
+    if preview is not None:
+        _require_suffix(preview, (".mp4",))
+
+
+def _require_drawable(recording: Recording, preview: Path | None) -> None:
+    from pomona.survey.preview import require_preview
+
+    if preview is not None:
+        require_preview(recording)
 
 
 def _require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -155,79 +192,7 @@ def _date(recording: Recording) -> str:
     return day
 
 
-@contextmanager
-def _progress(recording: Recording) -> Iterator[Progress | None]:
-    """Show frames, rate, fruits and time left on the standard error of a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    columns = (
-        "scanning",
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]:.1f} frames/s, {task.fields[fruits]} fruits"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("scan", total=len(recording), fruits=0, rate=0.0)
-
-        def show(done: int, _total: int, fruits: int) -> None:
-            elapsed_s = bar.tasks[task].elapsed or 0.0
-            bar.update(task, completed=done, fruits=fruits, rate=done / elapsed_s if elapsed_s else 0.0)
-
-        yield show
-
-
-def _summary(recording: Recording, survey: Survey, written: list[Path]) -> dict[str, Any]:
-    import numpy as np
-
-    diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
-    return {
-        "output": [str(path) for path in written],
-        "recording": str(recording.path),
-        "n_frames": len(recording),
-        "n_skipped_frames": len(survey.skipped),
-        "stopped_after_frame": survey.stopped,
-        "n_boxes": survey.detections,
-        "n_refused": {reason.value: count for reason, count in sorted(survey.refused.items())},
-        "n_fruits": sum(len(part.cloud) for part in survey.parts),
-        "parts": [_of_part(part, path) for part, path in zip(survey.parts, written, strict=True)],
-        "median_diameter_mm": float(1000 * np.median(diameters_m)) if len(diameters_m) else None,
-    }
-
-
-def _of_part(part: Part, path: Path) -> dict[str, Any]:
-    frames = part.trajectory.frames.tolist()
-    return {
-        "output": str(path),
-        "first_frame": min(frames, default=None),
-        "last_frame": max(frames, default=None),
-        "n_fruits": len(part.cloud),
-        "began": part.began,
-    }
-
-
 def _dumps(value: Any) -> str:
     import json
 
     return json.dumps(value)
-
-
-def _as_text(summary: dict[str, Any]) -> str:
-    size = summary["median_diameter_mm"]
-    fruits = f"{summary['n_fruits']} fruits" + ("" if size is None else f", median diameter {size:.1f} mm")
-    lines = [f"{summary['output'][0]}: {fruits}, from {summary['n_boxes']} boxes in {summary['n_frames']} frames"]
-    lines += [f"  {count} boxes without a place: {reason}" for reason, count in summary["n_refused"].items()]
-    if summary["stopped_after_frame"] is not None:
-        lines.append(f"  stopped after frame {summary['stopped_after_frame']}: what was found till then is written")
-    if len(summary["parts"]) > 1:
-        lines += [
-            f"  {part['output']}: frames {part['first_frame']} to {part['last_frame']}, {part['n_fruits']} fruits"
-            + (f": {part['began']}" if part["began"] else "")
-            for part in summary["parts"]
-        ]
-    return "\n".join(lines)

@@ -98,7 +98,7 @@ def _write(file: Path, look: Look) -> None:
 
 def _read(file: Path, frame: int) -> Look:
     try:
-        with np.load(file, allow_pickle=False) as arrays:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             ids = tuple(json.loads(str(arrays["ids"]))) if "ids" in arrays else None
             refused = json.loads(str(arrays["refused"]))
             return Look(

@@ -13,6 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.survey.motion import Camera
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of
+from pomona.tracking import Tracker, Tracks
 from pomona.trajectory import Trajectory
 
 __all__ = ["Boxes", "OpenPart", "Part"]
@@ -72,53 +73,120 @@ class OpenPart:
         Which part of the recording.
     began : str or None
         Why it began.
+    tracker : Tracker or None
+        Tells which boxes are one fruit; None where the boxes carry names, or there is one frame.
+    min_views : int
+        Frames that must have seen a fruit.
     """
 
-    def __init__(self, number: int, began: str | None) -> None:
-        self._number, self._began = number, began
+    def __init__(self, number: int, began: str | None, tracker: Tracker | None, min_views: int) -> None:
+        self._number, self._began, self._tracker, self._min_views = number, began, tracker, min_views
         self._looks: list[Look] = []
         self._times_s: list[float] = []
-        self._seen: Counter[str] = Counter()
+        self._seen: Counter[str | int] = Counter()
 
-    def add(self, look: Look, time_s: float) -> None:
+    def add(self, look: Look, time_s: float, session_from_camera: NDArray[np.float64]) -> None:
         """Take the next frame."""
         self._looks.append(look)
         self._times_s.append(time_s)
-        self._seen.update(look.detections.ids or ())
-
-    def __len__(self) -> int:
-        return len(self._looks)
+        if self._tracker is None:
+            self._seen.update(_names(look))
+        else:
+            numbers = self._tracker.update(look.frame, session_from_camera, look.detections, look.lifted)
+            self._seen.update(numbers[numbers >= 0].tolist())
 
     @property
     def n_fruits(self) -> int:
         """How many fruits there are so far, near enough to show while the work goes on."""
-        return len(self._seen)
+        return sum(views >= self._min_views for views in self._seen.values())
 
     def closed(self, camera: Camera) -> Part:
         """Make the fruits of all the frames."""
-        frames = [look.frame for look in self._looks]
         sightings = Sightings.of(self._looks)
-        owners, names = self._owners()
-        session_from_camera = camera.refined(self._number, frames, sightings, owners[sightings.boxes])
-        row_of, named = _measured(owners, sightings, names)
-        measured = np.flatnonzero(owners[sightings.boxes] >= 0)
-        fruits = row_of[owners[sightings.boxes[measured]]]
-        cloud = fruits_of(sightings.select(measured), fruits, self._looks, session_from_camera, named)
-        trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), session_from_camera)
-        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners]), self._began)
+        tracks = None if self._tracker is None else self._tracker.finish(min_views=1)
+        owners = self._named() if tracks is None else self._tracked(tracks)
+        frames = [look.frame for look in self._looks]
+        poses = camera.refined(self._number, frames, sightings, owners.of(sightings))
+        if tracks is not None:
+            # Fragments of one fruit that drift kept apart come together once poses and places are refined.
+            measured, row_of = self._fused(sightings, owners, poses)
+            owners = self._tracked(_joined(tracks, measured, row_of).seen_in(self._min_views))
+        cloud, row_of = self._fused(sightings, owners, poses)
+        trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), poses)
+        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners.fruits]), self._began)
 
-    def _owners(self) -> tuple[NDArray[np.int64], list[str]]:
-        """Fruit of each box of the part as a row of the names, -1 for none."""
-        # Only a single frame comes without names: there a box is a fruit.
-        ids = [name for look in self._looks for name in look.detections.ids or map(str, range(len(look.detections)))]
+    def _fused(
+        self, sightings: Sightings, owners: _Owners, poses: NDArray[np.float64]
+    ) -> tuple[FruitCloud, NDArray[np.int64]]:
+        """Give the fruits that have a place in 3D, in the order of their first sightings, and the row of each or -1."""
+        fruits = owners.of(sightings)
+        row_of, named = _measured(fruits, owners.names)
+        rows = np.flatnonzero(fruits >= 0)
+        return fruits_of(sightings.select(rows), row_of[fruits[rows]], self._looks, poses, named), row_of
+
+    def _named(self) -> _Owners:
+        """Take the names that the boxes carry; without any, of a single frame, each box is a fruit."""
+        ids = [name for look in self._looks for name in _names(look)]
         row_of = {name: row for row, name in enumerate(dict.fromkeys(ids))}
-        return np.array([row_of[name] for name in ids], np.int64), list(row_of)
+        fruits = np.array([row_of[name] for name in ids], np.int64)
+        return _Owners(fruits, np.ones(len(fruits), bool), list(row_of))
+
+    def _tracked(self, tracks: Tracks) -> _Owners:
+        """Take what the tracker says; a box around two fruits shows one of them, but not its place or size."""
+        first_box = np.cumsum([0, *(len(look.detections) for look in self._looks)])
+        row_of_frame = {look.frame: row for row, look in enumerate(self._looks)}
+        boxes = first_box[[row_of_frame[frame] for frame in tracks.frames.tolist()]] + tracks.rows
+        fruits, measures = np.full(first_box[-1], -1, np.int64), np.zeros(first_box[-1], bool)
+        fruits[boxes], measures[boxes] = tracks.fruits, ~tracks.shared
+        return _Owners(fruits, measures, [str(number) for number in range(1, len(tracks) + 1)])
 
 
-def _measured(
-    owners: NDArray[np.int64], sightings: Sightings, names: Sequence[str]
-) -> tuple[NDArray[np.int64], list[str]]:
-    """Count off the fruits that have a place in 3D, in the order in which they were first seen.
+@dataclass(frozen=True, eq=False)
+class _Owners:
+    """The fruit in each box of a part.
+
+    Attributes
+    ----------
+    fruits : (B,) int64
+        Row in `names`, -1 for none.
+    measures : (B,) bool
+        Whether the box is around that fruit alone.
+    names : list of N str
+    """
+
+    fruits: NDArray[np.int64]
+    measures: NDArray[np.bool_]
+    names: list[str]
+
+    def of(self, sightings: Sightings) -> NDArray[np.int64]:
+        """Fruit that each sighting measures, (S,), -1 for none."""
+        return np.where(self.measures[sightings.boxes], self.fruits[sightings.boxes], -1)
+
+
+def _names(look: Look) -> Sequence[str]:
+    ids = look.detections.ids
+    return [str(row) for row in range(len(look.detections))] if ids is None else ids
+
+
+def _joined(tracks: Tracks, measured: FruitCloud, row_of: NDArray[np.int64]) -> Tracks:
+    """Join the tracks that are one fruit by the places that fusion found; the rest stay where the tracker had them."""
+    known = np.flatnonzero(row_of[:-1] >= 0)
+    centres, covariances = tracks.centres.copy(), tracks.covariances.copy()
+    centres[known] = measured.positions[row_of[known]]
+    if measured.covariances is not None:
+        covariances[known] = measured.covariances[row_of[known]]
+    return tracks.at(centres, covariances).joined()
+
+
+def _measured(fruits: NDArray[np.int64], names: Sequence[str]) -> tuple[NDArray[np.int64], list[str]]:
+    """Count off the fruits that have sightings, in the order in which they were first seen.
+
+    Parameters
+    ----------
+    fruits : (S,) int64
+        Fruit of each sighting, -1 for none.
+    names : sequence of N str
+        Names of the fruits.
 
     Returns
     -------
@@ -127,7 +195,6 @@ def _measured(
     names : list of str
         Names in the new order.
     """
-    fruits = owners[sightings.boxes]
     found, first = np.unique(fruits[fruits >= 0], return_index=True)
     found = found[np.argsort(first, kind="stable")]
     row_of = np.full(len(names) + 1, -1, np.int64)

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from pomona.survey.motion import Camera, Place, camera_of
 from pomona.survey.part import OpenPart, Part
 from pomona.survey.prefetch import prefetched
 from pomona.survey.seeing import Look, Seeing
+from pomona.tracking import Tracker
 from pomona.trajectory import Trajectory
 
 __all__ = ["Progress", "Survey", "scan"]
@@ -78,6 +81,8 @@ def scan(
     *,
     stereo: bool = False,
     odometry: bool = False,
+    retrack: bool = False,
+    config: Mapping[str, Any] | None = None,
     keep: Kept | None = None,
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
@@ -89,11 +94,15 @@ def scan(
     recording : Recording
         With depth, or left and right, pictures.
     detector : Detector
-        Gives boxes. Their ids say which boxes are one fruit.
+        Gives boxes. Where they have ids, those say which boxes are one fruit; else the boxes are tracked.
     stereo : bool
         Measure depth from left and right even where there are depth pictures.
     odometry : bool
         Find the poses even where the recording has some.
+    retrack : bool
+        Track the boxes even where they have ids.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`; the tracker's is `tracking`.
     keep : Kept, optional
         Where what single frames show is kept, so that a scan that is started again need not look twice.
     progress : callable, optional
@@ -109,10 +118,8 @@ def scan(
     """
     seeing = Seeing(recording, detector, stereo=stereo)
     camera = camera_of(recording, odometry=odometry)
-    if len(recording) > 1 and not getattr(detector, "with_ids", False):
-        found = f"boxes without ids in {len(recording)} frames"
-        raise PomonaError(f"{recording.path}: found {found}, expected an id for each")
-    findings = _Findings()
+    named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
+    findings = _Findings(partial(_open_part, recording, None if named else config or {}))
     look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
     with ThreadPoolExecutor(1, "pomona-look") as looker, closing(frames):
@@ -137,10 +144,19 @@ def _placed(camera: Camera, frame: Frame) -> Place:
         return Place(None, broken=str(error))
 
 
+def _open_part(recording: Recording, config: Mapping[str, Any] | None, number: int, began: str | None) -> OpenPart:
+    """Open a part whose boxes are tracked, or, without a configuration, go by their names."""
+    tracker = None if config is None else Tracker(recording.calibration, config)
+    # Of a recording with fewer frames than a track needs, fruits are in all of them.
+    least = 1 if tracker is None else min(tracker.min_views, len(recording))
+    return OpenPart(number, began, tracker, least)
+
+
 class _Findings:
     """What there is so far: the closed frames of each part, and the frames that could not be used."""
 
-    def __init__(self) -> None:
+    def __init__(self, open_part: Callable[[int, str | None], OpenPart]) -> None:
+        self._open_part = open_part
         self._parts: list[OpenPart] = []
         self._detections = 0
         self._refused = Counter[Refusal]()
@@ -162,10 +178,10 @@ class _Findings:
             self.skipped[frame.number] = f"frame {frame.number}: {place.broken}"
             return
         if place.part >= len(self._parts):
-            self._parts.append(OpenPart(place.part, place.broken))
+            self._parts.append(self._open_part(place.part, place.broken))
         # Where nobody noted the time, frames are numbered: order is all that is known.
         time_s = float(frame.number if frame.time_s is None else frame.time_s)
-        self._parts[place.part].add(look, time_s)
+        self._parts[place.part].add(look, time_s, place.session_from_camera)
         self._detections += len(look.detections)
         self._refused += look.lifted.refused
 

@@ -1,0 +1,89 @@
+"""What `pomona scan` shows: progress on the standard error, the summary on the standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from pomona.recording import Recording
+    from pomona.survey import Part, Progress, Survey
+
+
+@contextmanager
+def scanning(recording: Recording, boxes: str) -> Iterator[Progress | None]:
+    """Show where the boxes come from, frames, rate, fruits and time left on the standard error of a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    console.print(boxes, style="dim", highlight=False)
+    columns = (
+        "scanning",
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]:.1f} frames/s, {task.fields[fruits]} fruits"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("scan", total=len(recording), fruits=0, rate=0.0)
+
+        def show(done: int, _total: int, fruits: int) -> None:
+            elapsed_s = bar.tasks[task].elapsed or 0.0
+            bar.update(task, completed=done, fruits=fruits, rate=done / elapsed_s if elapsed_s else 0.0)
+
+        yield show
+
+
+def summary(recording: Recording, survey: Survey, written: list[Path]) -> dict[str, Any]:
+    """Put in numbers what was found and where it was written."""
+    import numpy as np
+
+    diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
+    return {
+        "output": [str(path) for path in written],
+        "recording": str(recording.path),
+        "n_frames": len(recording),
+        "n_skipped_frames": len(survey.skipped),
+        "stopped_after_frame": survey.stopped,
+        "n_boxes": survey.detections,
+        "n_refused": {reason.value: count for reason, count in sorted(survey.refused.items())},
+        "n_fruits": sum(len(part.cloud) for part in survey.parts),
+        "parts": [_of_part(part, path) for part, path in zip(survey.parts, written, strict=True)],
+        "median_diameter_mm": float(1000 * np.median(diameters_m)) if len(diameters_m) else None,
+    }
+
+
+def _of_part(part: Part, path: Path) -> dict[str, Any]:
+    frames = part.trajectory.frames.tolist()
+    return {
+        "output": str(path),
+        "first_frame": min(frames, default=None),
+        "last_frame": max(frames, default=None),
+        "n_fruits": len(part.cloud),
+        "began": part.began,
+    }
+
+
+def as_text(found: dict[str, Any]) -> str:
+    """Say the same in words."""
+    size = found["median_diameter_mm"]
+    fruits = f"{found['n_fruits']} fruits" + ("" if size is None else f", median diameter {size:.1f} mm")
+    lines = [f"{found['output'][0]}: {fruits}, from {found['n_boxes']} boxes in {found['n_frames']} frames"]
+    lines += [f"  {count} boxes without a place: {reason}" for reason, count in found["n_refused"].items()]
+    if found["stopped_after_frame"] is not None:
+        lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
+    if len(found["parts"]) > 1:
+        lines += [
+            f"  {part['output']}: frames {part['first_frame']} to {part['last_frame']}, {part['n_fruits']} fruits"
+            + (f": {part['began']}" if part["began"] else "")
+            for part in found["parts"]
+        ]
+    return "\n".join(lines)
