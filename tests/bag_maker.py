@@ -113,6 +113,8 @@ def message(store, kind: str, fields: dict[str, Any]):
         fields["header"] = types["std_msgs/msg/Header"](**header)
     if kind == "tf2_msgs/msg/TFMessage":
         return _tf_message(store, fields)
+    if kind == "geometry_msgs/msg/Transform":
+        return _transform(store, fields["matrix"])
     if "pose" in fields:
         fields["pose"] = _pose(store, fields["pose"], covariance="Odometry" in kind)
     if kind == "nav_msgs/msg/Odometry":
@@ -144,6 +146,12 @@ def _pose(store, pose, *, covariance: bool):
     return store.types["geometry_msgs/msg/PoseWithCovariance"](pose=plain, covariance=np.zeros(36))
 
 
+def _transform(store, matrix):
+    place = dict(zip("xyz", np.asarray(matrix)[:3, 3].tolist(), strict=True))
+    translation = store.types["geometry_msgs/msg/Vector3"](**place)
+    return store.types["geometry_msgs/msg/Transform"](translation=translation, rotation=_quaternion(store, matrix))
+
+
 def _tf_message(store, fields):
     types = store.types
     entries = []
@@ -151,13 +159,9 @@ def _tf_message(store, fields):
         stamp_ns = fields["at_ns"]
         stamp = types["builtin_interfaces/msg/Time"](sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
         header = {"stamp": stamp, "frame_id": parent} | ({"seq": 0} if store is ROS1 else {})
-        place = dict(zip("xyz", np.asarray(pose)[:3, 3].tolist(), strict=True))
-        transform = types["geometry_msgs/msg/Transform"](
-            translation=types["geometry_msgs/msg/Vector3"](**place), rotation=_quaternion(store, pose)
-        )
         stamped = types["geometry_msgs/msg/TransformStamped"]
         header = types["std_msgs/msg/Header"](**header)
-        entries.append(stamped(header=header, child_frame_id=child, transform=transform))
+        entries.append(stamped(header=header, child_frame_id=child, transform=_transform(store, pose)))
     return types["tf2_msgs/msg/TFMessage"](transforms=entries)
 
 

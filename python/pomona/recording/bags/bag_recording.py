@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pomona.recording.bags.contents import PictureTopic
 from pomona.recording.bags.message_file import Message, MessageFile, decoded
 from pomona.recording.bags.pictures import colour_of, depth_of
+from pomona.recording.bags.registration import Registration
 from pomona.recording.bags.topics import Roles
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name, date_of_ns
@@ -39,6 +40,8 @@ class BagRecording:
         For `left`, `right`, `depth`, as there are.
     rows : dict
         For each of them the (F,) rows of its topic that make up the frames, ascending.
+    registration : Registration or None
+        For depth of another camera than the left one.
     """
 
     path: Path
@@ -48,6 +51,7 @@ class BagRecording:
     pictures: dict[str, PictureTopic]
     rows: dict[str, NDArray[np.int64]]
     trajectory: Trajectory | None
+    registration: Registration | None = None
 
     @property
     def calibration(self) -> Calibration:
@@ -140,5 +144,5 @@ class BagRecording:
             raise UnreadablePictureError(f"{where}: the message is corrupt") from None
         if kind == "depth":
             depth_m = depth_of(where, content, pictures.size_px, self.calibration.depth_unit_m)
-            return self.optics.depth(depth_m)
+            return self.optics.depth(depth_m) if self.registration is None else self.registration(depth_m)
         return getattr(self.optics, kind)(colour_of(where, content, pictures.size_px))

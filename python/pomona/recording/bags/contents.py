@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import Message, MessageFile, Topic, decoded, stamp_ns
 from pomona.recording.bags.pictures import is_depth, size_of
+from pomona.recording.bags.realsense import is_depth_unit, is_extrinsics, static_transform, stream_frame
 from pomona.recording.bags.topics import Roles
 
 __all__ = ["Contents", "PictureTopic", "read_contents"]
 
 STATIC = "/tf_static"
+
+DEPTH_UNIT_M = 0.001
+"""Whole numbers are millimetres (REP 118), unless a recorder says otherwise."""
 
 AFTER_STAMP = 12
 """Bytes of sequence number or encapsulation and of the time, before what a camera_info says."""
@@ -57,11 +61,14 @@ class Contents:
         For each topic of a camera_info the different ones on it, decoded.
     static : list
         Decoded `TransformStamped` that hold for the whole recording.
+    depth_unit_m : float
+        A step of depth pictures of whole numbers.
     """
 
     pictures: dict[str, PictureTopic]
     infos: dict[str, list[Any]]
     static: list[Any]
+    depth_unit_m: float = DEPTH_UNIT_M
 
 
 @dataclass(eq=False)
@@ -96,8 +103,9 @@ def read_contents(file: MessageFile, roles: Roles) -> Contents:
     seen = {topic: _Seen(file.topics[topic]) for topic in roles.pictures.values()}
     info_topics = [name for name in (roles.left_info, roles.right_info, roles.depth_info) if name is not None]
     infos: dict[str, dict[bytes, Any]] = {name: {} for name in info_topics}
-    static: list[Any] = []
-    for message in file.messages({*seen, *infos, STATIC}):
+    found = Contents({}, {}, [])
+    places = {name for name in file.topics if name == STATIC or is_extrinsics(name) or is_depth_unit(name)}
+    for message in file.messages({*seen, *infos, *places}):
         name = message.topic.name
         if name in seen:
             seen[name].add(message)
@@ -105,10 +113,15 @@ def read_contents(file: MessageFile, roles: Roles) -> Contents:
             said = message.body[AFTER_STAMP:]
             if said not in infos[name]:
                 infos[name][said] = decoded(message)
+        elif name == STATIC:
+            found.static.extend(decoded(message).transforms)
+        elif is_extrinsics(name):
+            found.static.append(static_transform(name, decoded(message)))
         else:
-            static.extend(decoded(message).transforms)
-    pictures = {kind: _listed(file, seen[topic]) for kind, topic in roles.pictures.items()}
-    return Contents(pictures, {name: list(each.values()) for name, each in infos.items()}, static)
+            found.depth_unit_m = float(decoded(message).data)
+    found.pictures.update({kind: _listed(file, seen[topic]) for kind, topic in roles.pictures.items()})
+    found.infos.update({name: list(each.values()) for name, each in infos.items()})
+    return found
 
 
 def _listed(file: MessageFile, seen: _Seen) -> PictureTopic:
@@ -124,5 +137,5 @@ def _listed(file: MessageFile, seen: _Seen) -> PictureTopic:
         row = int(back[0]) + 1
         times = f"from {stamps_ns[row - 1] / 1e9:.3f} s to {stamps_ns[row] / 1e9:.3f} s"
         raise PomonaError(f"{where}: picture {row}: time goes back {times}, expected ascending times")
-    example = seen.example
-    return PictureTopic(seen.topic, stamps_ns, logged_ns, seen.size_px, is_depth(example), str(example.header.frame_id))
+    frame = stream_frame(seen.topic.name) or str(seen.example.header.frame_id)
+    return PictureTopic(seen.topic, stamps_ns, logged_ns, seen.size_px, is_depth(seen.example), frame)

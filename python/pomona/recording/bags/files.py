@@ -1,0 +1,61 @@
+"""From a path to what reads the bag there; each kind is imported when it is met."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pomona.recording.bags.message_file import MessageFile
+
+__all__ = ["BAG_SUFFIXES", "open_messages", "recognises"]
+
+BAG_SUFFIXES = (".bag", ".mcap", ".db3", ".active")
+"""`.bag.active` is the name of a ROS 1 bag as long as it is recorded."""
+
+
+def recognises(place: Path) -> bool:
+    """Whether a file or a folder is a bag."""
+    if place.is_file():
+        return place.suffix in BAG_SUFFIXES
+    return (place / "metadata.yaml").is_file() or bool(_parts(place))
+
+
+def open_messages(path: Path) -> MessageFile:
+    """Open a file, or the folder of a ROS 2 bag, whole or cut off.
+
+    Raises
+    ------
+    PomonaError
+        When it is no bag.
+    """
+    from pomona.recording.bags.joined import JoinedBags
+    from pomona.recording.bags.ros_bag import RosBag
+    from pomona.recording.bags.sqlite_rest import is_cut_off
+
+    parts = (path,) if path.is_file() else _parts(path)
+    described = path.is_dir() and (path / "metadata.yaml").is_file()
+    if described and not any(part.suffix == ".mcap" or is_cut_off(part) for part in parts):
+        return RosBag.open(path, tuple(sorted(path.iterdir())))
+    opened = tuple(map(_open_part, parts))
+    return opened[0] if path.is_file() else JoinedBags(path, opened)
+
+
+def _open_part(file: Path) -> MessageFile:
+    from pomona.recording.bags.mcap_file import McapFile
+    from pomona.recording.bags.ros1_rest import Ros1Rest, has_no_index
+    from pomona.recording.bags.ros_bag import RosBag
+    from pomona.recording.bags.sqlite_rest import SqliteRest, is_cut_off
+
+    if file.suffix == ".mcap":
+        return McapFile.open(file)
+    if file.suffix == ".db3" and is_cut_off(file):
+        return SqliteRest.open(file)
+    if file.suffix == ".active" or (file.suffix == ".bag" and has_no_index(file)):
+        return Ros1Rest.open(file)
+    return RosBag.open(file, (file,))
+
+
+def _parts(folder: Path) -> tuple[Path, ...]:
+    """Files of a bag that was split, in the order of their numbers."""
+    files = (file for file in folder.iterdir() if file.is_file() and file.suffix in (".mcap", ".db3"))
+    return tuple(sorted(files, key=lambda file: [int(digits) for digits in re.findall(r"\d+", file.stem)]))
