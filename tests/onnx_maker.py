@@ -108,39 +108,42 @@ def cells(width, height, strides=(8, 16, 32)):
     return sum((width // stride) * (height // stride) for stride in strides)
 
 
+def with_mask(graph, corners, hits):
+    """Corners drawn too large, the coefficients of a mask that says better, and the output of its prototypes."""
+    loose = [graph.add("Add", corner, np.float32(by)) for corner, by in zip(corners, (-6, -7, 9, 5), strict=True)]
+    shapes = graph.add("AveragePool", hits, kernel_shape=[4, 4], strides=[4, 4])
+    first = graph.add("Sub", shapes, np.float32(0.5))
+    others = graph.add("Concat", *[graph.add("Add", first, np.float32(7))] * 31, axis=1)
+    return loose, [20.0] + [0.0] * 31, {"output1": graph.add("Concat", first, others, axis=1)}
+
+
 def yolov8(path, width, height, *, classes=2, double=False, metadata=None, masks=False, **options):
     graph = Graph(width, height, **options)
     corners, seen, hits = find_red(graph)
-    if masks:  # drawn too large; the mask says better
-        corners = [graph.add("Add", corner, np.float32(by)) for corner, by in zip(corners, (-6, -7, 9, 5), strict=True)]
+    corners, coefficients, shapes = with_mask(graph, corners, hits) if masks else (corners, [], {})
     box, strong, weak = centred(graph, corners), *scaled(graph, [seen, seen], (0.9, 0.6))
-    coefficients = [20.0] + [0.0] * 31 if masks else []
     rows = [graph.row(*box, strong, *[0.01] * (classes - 1), *coefficients)]
     if double:
         moved = [graph.add("Add", box[0], np.float32(1)), *box[1:]]
         rows.append(graph.row(*moved, 0.01, weak, *[0.01] * (classes - 2)))
     head = graph.add("Transpose", among(graph, rows, cells(width, height)), perm=[0, 2, 1])
-    outputs = {"output0": head}
-    if masks:
-        shapes = graph.add("AveragePool", hits, kernel_shape=[4, 4], strides=[4, 4])
-        first = graph.add("Sub", shapes, np.float32(0.5))
-        others = graph.constant(np.ones((1, 31, height // 4, width // 4), np.float32))
-        outputs["output1"] = graph.add("Concat", first, others, axis=1)
-    return graph.write(path, outputs, metadata)
+    return graph.write(path, {"output0": head, **shapes}, metadata)
 
 
-def yolov5(path, width, height, *, classes=1, metadata=None, **options):
+def yolov5(path, width, height, *, classes=1, metadata=None, masks=False, **options):
     graph = Graph(width, height, **options)
-    corners, seen, _ = find_red(graph)
-    row = graph.row(*centred(graph, corners), *scaled(graph, [seen], (0.9,)), *[0.8] * classes)
-    return graph.write(path, {"output0": among(graph, [row], 3 * cells(width, height))}, metadata)
+    corners, seen, hits = find_red(graph)
+    corners, coefficients, shapes = with_mask(graph, corners, hits) if masks else (corners, [], {})
+    row = graph.row(*centred(graph, corners), *scaled(graph, [seen], (0.9,)), *[0.8] * classes, *coefficients)
+    return graph.write(path, {"output0": among(graph, [row], 3 * cells(width, height)), **shapes}, metadata)
 
 
-def end_to_end(path, width, height, *, metadata=None, **options):
+def end_to_end(path, width, height, *, metadata=None, masks=False, **options):
     graph = Graph(width, height, **options)
-    corners, seen, _ = find_red(graph)
-    row = graph.row(*corners, *scaled(graph, [seen], (0.9,)), 0)
-    return graph.write(path, {"output0": among(graph, [row], 300)}, metadata)
+    corners, seen, hits = find_red(graph)
+    corners, coefficients, shapes = with_mask(graph, corners, hits) if masks else (corners, [], {})
+    row = graph.row(*corners, *scaled(graph, [seen], (0.9,)), 0, *coefficients)
+    return graph.write(path, {"output0": among(graph, [row], 300), **shapes}, metadata)
 
 
 def yolox(path, width, height, *, decoded=False, metadata=None):

@@ -99,6 +99,8 @@ def test_a_picture_smaller_than_the_input(tmp_path):
     ("kind", "options", "size_px"),
     [
         ("yolov8", {"masks": True}, (320, 200)),
+        ("yolov5", {"masks": True}, (320, 200)),
+        ("end_to_end", {"masks": True}, (320, 200)),
         ("rfdetr", {"masks": "masks"}, (320, 256)),
         ("rfdetr", {"masks": "4245"}, (320, 256)),  # so the first exports named it
     ],

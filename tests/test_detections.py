@@ -226,6 +226,8 @@ def test_no_file_and_a_folder_are_told(tmp_path):
         open_detections(tmp_path / "none.csv", CAMERA, (0,))
     with pytest.raises(PomonaError, match="cannot be read"):
         open_detections(tmp_path, CAMERA, (0,))
+    with pytest.raises(PomonaError, match=r"found a model, expected boxes: .*; a model goes with --model"):
+        open_detections(tmp_path / "apples.onnx", CAMERA, (0,))
 
 
 @dataclass

@@ -91,6 +91,8 @@ def _boxes(path: Path, text: str, calibration: Calibration, numbers: Sequence[in
 
 
 def _text(path: Path) -> str:
+    if path.suffix.lower() == ".onnx":
+        raise PomonaError(f"{path}: found a model, expected {EXPECTED}; a model goes with --model")
     try:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:

@@ -16,7 +16,7 @@ from pomona.recording import Calibration
 __all__ = ["ListedBox", "by_frame", "number_in"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ListedBox:
     """One box of a file.
 

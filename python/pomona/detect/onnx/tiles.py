@@ -20,8 +20,8 @@ OVERLAP = 0.2
 """Part of a tile that its neighbour sees too; a fruit smaller than that is whole in one of them."""
 
 MAX_SHRINK = 2.0
-"""Without a word of the user the picture is cut when the network would see it at less than half its size: then fruits
-that are large enough to be lifted, 15 px or so, would be smaller than a cell of the finest grid, 8 px."""
+"""Without a word of the user the picture is cut when the network would see it at less than half its size: then a fruit
+of 16 px would be smaller than a cell of the finest grid, 8 px, and one with its neighbour."""
 
 SAME_IOU = 0.5
 """Two boxes of one fruit agree in the strip at least so far; those of neighbours in a cluster do not."""
