@@ -229,7 +229,8 @@ def test_two_cameras_are_not_guessed(tmp_path):
 
 
 def test_a_bag_without_pictures_says_what_it_has(tmp_path):
-    refused(write_bag(tmp_path / "row", [info("/a/camera_info", START_NS)], "mcap"), "found no pictures")
+    bag = write_bag(tmp_path / "row", [info("/a/camera_info", START_NS)], "mcap")
+    refused(bag, "found no pictures, but /a/camera_info (sensor_msgs/msg/CameraInfo), expected sensor_msgs/msg/Image")
 
 
 def test_pairs_are_made_by_time(tmp_path):
@@ -481,6 +482,38 @@ def test_a_damaged_chunk_of_a_bag_without_index(tmp_path):
         recording = open_recording(bag)
     assert sum("is damaged and left out" in str(warning.message) for warning in caught) == 1
     assert 50 < len(recording) < 200
+
+
+def test_a_damaged_chunk_of_a_closed_bag(tmp_path):
+    bag = write_bag(tmp_path / "row", stereo(200), "ros1 lz4")
+    content = bytearray(bag.read_bytes())
+    magic = b"\x04\x22\x4d\x18"
+    second = content.index(magic, content.index(magic) + 1)
+    content[second : second + 8] = bytes(8)
+    bag.write_bytes(content)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        recording = open_recording(bag)
+        frames = list(recording.frames())
+    assert sum("is damaged and left out" in str(warning.message) for warning in caught) == 1
+    assert 50 < len(recording) == len(frames) < 200
+    assert unreadable_frames(recording) == {}
+
+
+@pytest.mark.filterwarnings("ignore:.*others are left out")
+def test_a_damaged_page_of_a_database(tmp_path):
+    """Rows are read up to the damage, which lies behind three quarters of them."""
+    bag = write_bag(tmp_path / "row", stereo(200), "sqlite3")
+    file = next(bag.glob("*.db3"))
+    content = bytearray(file.read_bytes())
+    place = len(content) * 3 // 4 // 4096 * 4096
+    content[place : place + 3 * 4096] = b"\xff" * (3 * 4096)
+    file.write_bytes(content)
+    with pytest.warns(PomonaWarning, match="cut off or damaged: what is there is used"):
+        recording = open_recording(bag)
+    assert 140 <= len(recording) <= 155
+    for frame in recording.frames():
+        assert np.array_equal(frame.read_left(), picture(frame.number))
 
 
 @pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])

@@ -87,8 +87,8 @@ class BagRecording:
 
     def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
         """Read frame by frame; a picture is decoded when it is asked for."""
-        times_s = self.times_s
-        chosen = [row for row, _ in chosen_rows(self.numbers, numbers)]
+        times_s, all_numbers = self.times_s, self.numbers
+        chosen = [row for row, _ in chosen_rows(all_numbers, numbers)]
         streams = [self._messages(kind, self.rows[kind][chosen].tolist()) for kind in self.pictures]
         for row, messages in zip(chosen, zip(*streams, strict=True), strict=True):
             readers = {
@@ -96,7 +96,7 @@ class BagRecording:
                 for kind, message in zip(self.pictures, messages, strict=True)
             }
             yield Frame(
-                number=self.numbers[row],
+                number=all_numbers[row],
                 time_s=float(times_s[row]),
                 session_from_camera=None if self.trajectory is None else self.trajectory.session_from_camera[row],
                 **readers,

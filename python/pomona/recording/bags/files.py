@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pomona.recording.bags.message_file import MessageFile
 
-__all__ = ["BAG_SUFFIXES", "open_messages", "recognises"]
+__all__ = ["BAG_SUFFIXES", "open_messages", "recognises", "rest_of"]
 
 BAG_SUFFIXES = (".bag", ".mcap", ".db3", ".active")
 """`.bag.active` is the name of a ROS 1 bag as long as it is recorded."""
@@ -29,21 +29,36 @@ def open_messages(path: Path) -> MessageFile:
         When it is no bag.
     """
     from pomona.recording.bags.joined import JoinedBags
-    from pomona.recording.bags.ros_bag import RosBag
     from pomona.recording.bags.sqlite_rest import is_cut_off
 
     parts = (path,) if path.is_file() else _parts(path)
     described = path.is_dir() and (path / "metadata.yaml").is_file()
     if described and not any(part.suffix == ".mcap" or is_cut_off(part) for part in parts):
-        return RosBag.open(path, tuple(sorted(path.iterdir())))
+        return _ros_bag(path, tuple(sorted(path.iterdir())))
     opened = tuple(map(_open_part, parts))
     return opened[0] if path.is_file() else JoinedBags(path, opened)
+
+
+def rest_of(path: Path) -> MessageFile:
+    """Open what can be read of a damaged ROS bag.
+
+    Raises
+    ------
+    PomonaError
+        When nothing can.
+    """
+    from pomona.recording.bags.joined import JoinedBags
+    from pomona.recording.bags.ros1_rest import Ros1Rest
+    from pomona.recording.bags.sqlite_rest import SqliteRest
+
+    if path.is_file():
+        return SqliteRest.open(path) if path.suffix == ".db3" else Ros1Rest.open(path)
+    return JoinedBags(path, tuple(map(SqliteRest.open, _parts(path))))
 
 
 def _open_part(file: Path) -> MessageFile:
     from pomona.recording.bags.mcap_file import McapFile
     from pomona.recording.bags.ros1_rest import Ros1Rest, has_no_index
-    from pomona.recording.bags.ros_bag import RosBag
     from pomona.recording.bags.sqlite_rest import SqliteRest, is_cut_off
 
     if file.suffix == ".mcap":
@@ -52,7 +67,18 @@ def _open_part(file: Path) -> MessageFile:
         return SqliteRest.open(file)
     if file.suffix == ".active" or (file.suffix == ".bag" and has_no_index(file)):
         return Ros1Rest.open(file)
-    return RosBag.open(file, (file,))
+    return _ros_bag(file, (file,))
+
+
+def _ros_bag(path: Path, files: tuple[Path, ...]) -> MessageFile:
+    from pomona.recording.bags.ros_bag import DamagedBagError, RosBag
+
+    try:
+        return RosBag.open(path, files)
+    except DamagedBagError:
+        if path.is_dir() and not _parts(path):
+            raise
+        return rest_of(path)
 
 
 def _parts(folder: Path) -> tuple[Path, ...]:

@@ -9,10 +9,11 @@ from pomona.errors import PomonaError
 from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.cameras import optics_of, registration_of, without_depth
 from pomona.recording.bags.contents import Contents, read_contents
-from pomona.recording.bags.files import open_messages
+from pomona.recording.bags.files import open_messages, rest_of
 from pomona.recording.bags.frames import posed, simultaneous
 from pomona.recording.bags.message_file import missing_extra
 from pomona.recording.bags.poses import camera_poses
+from pomona.recording.bags.ros_bag import DamagedBagError
 from pomona.recording.bags.topics import chosen_topics
 
 __all__ = ["open_bag"]
@@ -41,7 +42,11 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
         raise missing_extra(path) from None
     file = open_messages(path)
     roles = chosen_topics(path, file.topics, topics)
-    contents = read_contents(file, roles)
+    try:
+        contents = read_contents(file, roles)
+    except DamagedBagError:
+        file = rest_of(path)
+        contents = read_contents(file, roles)
     _require_kinds(path, contents)
     optics = optics_of(path, roles, contents, calibration)
     try:

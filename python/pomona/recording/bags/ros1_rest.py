@@ -1,4 +1,4 @@
-"""What is left of a ROS 1 bag without an index: the recorder was killed, or the file was cut off.
+"""What is left of a ROS 1 bag whose recorder was killed, or that was cut off or damaged.
 
 Records are walked from the beginning (http://wiki.ros.org/Bags/Format/2.0): u32 length of the header, header,
 u32 length of the content, content; a header is fields of u32 length and `name=value`.
@@ -69,7 +69,8 @@ class Ros1Rest:
                 raise PomonaError(f"{path}: not a ROS 1 bag of version 2.0, or one without its beginning")
             chunks = tuple(_chunks(file))
         opened = cls(path, chunks, {})
-        warnings.warn(f"{path}: cut off or not closed: what is there is used", PomonaWarning, stacklevel=5)
+        if has_no_index(path):
+            warnings.warn(f"{path}: cut off or not closed: what is there is used", PomonaWarning, stacklevel=5)
         for _ in opened.messages(()):
             pass
         opened.topics.update({topic.name: topic for topic in opened._connections.values()})

@@ -10,7 +10,11 @@ from typing import Any
 from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import Message, Topic
 
-__all__ = ["RosBag"]
+__all__ = ["DamagedBagError", "RosBag"]
+
+
+class DamagedBagError(PomonaError):
+    """A bag cannot be read to its end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +32,7 @@ class RosBag:
 
         Raises
         ------
-        PomonaError
+        DamagedBagError
             When it cannot be read.
         """
         ros1 = path.suffix == ".bag"
@@ -38,7 +42,13 @@ class RosBag:
         return cls(path, "ROS 1 bag" if ros1 else "ROS 2 bag", topics, files)
 
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
-        """Read in order of the time of logging."""
+        """Read in order of the time of logging.
+
+        Raises
+        ------
+        DamagedBagError
+            Where it cannot be read any further.
+        """
         with _opened(self.path) as reader:
             connections = [each for each in reader.connections if each.topic in topics]
             if not connections:
@@ -50,7 +60,7 @@ class RosBag:
                 except StopIteration:
                     return
                 except Exception as error:
-                    raise PomonaError(f"{self.path}: damaged ({_first_line(error)})") from None
+                    raise DamagedBagError(f"{self.path}: damaged ({_first_line(error)})") from None
                 yield Message(self.topics[connection.topic], logged_ns, bytes(body))
 
 
@@ -71,7 +81,7 @@ class _Opened:
         try:
             return self.reader.__enter__()
         except Exception as error:  # its own errors, SQLite's, and those of what a damaged header makes it do
-            raise PomonaError(f"{self.path}: not a bag, or a damaged one ({_first_line(error)})") from None
+            raise DamagedBagError(f"{self.path}: not a bag, or a damaged one ({_first_line(error)})") from None
 
     def __exit__(self, *_: object) -> None:
         self.reader.close()

@@ -1,4 +1,4 @@
-"""What is left of a ROS 2 bag in SQLite that was cut off: its rows in order, up to the first that is missing."""
+"""What is left of a ROS 2 bag in SQLite that was cut off or damaged: its rows in order, up to the first lost one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sqlite3
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote
 
@@ -34,6 +34,7 @@ class SqliteRest:
 
     path: Path
     topics: dict[str, Topic]
+    _told: list[bool] = field(default_factory=list)
 
     kind = "ROS 2 bag"
 
@@ -50,8 +51,7 @@ class SqliteRest:
             with closing(_connected(path)) as database:
                 rows = database.execute("SELECT name, type, serialization_format FROM topics").fetchall()
         except sqlite3.Error as error:
-            raise PomonaError(f"{path}: cut off before the first message ({error})") from None
-        warnings.warn(f"{path}: cut off: what is there is used", PomonaWarning, stacklevel=5)
+            raise PomonaError(f"{path}: not a ROS 2 bag, or one cut off before its first message ({error})") from None
         return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in rows})
 
     @property
@@ -67,13 +67,21 @@ class SqliteRest:
             while True:
                 try:
                     row = rows.fetchone()
-                except sqlite3.DatabaseError:
+                except sqlite3.DatabaseError as error:
+                    self._tell(error)
                     return
                 if row is None:
                     return
                 topic, logged_ns, body = self.topics.get(names.get(row[0], "")), row[1], row[2]
                 if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
                     yield Message(topic, logged_ns, body)
+
+    def _tell(self, error: sqlite3.DatabaseError) -> None:
+        """Say it once, not each time the rows are read."""
+        if not self._told:
+            self._told.append(True)
+            message = f"{self.path}: cut off or damaged: what is there is used ({error})"
+            warnings.warn(message, PomonaWarning, stacklevel=3)
 
 
 def _connected(path: Path) -> sqlite3.Connection:

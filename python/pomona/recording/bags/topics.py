@@ -30,6 +30,9 @@ SIDES = (
 COLOUR = re.compile(r"(?:^|[/_])(?:color|colour|rgb)(?:[/_]|$|_?\d)", re.IGNORECASE)
 DEPTH = re.compile(r"depth", re.IGNORECASE)
 ALIGNED = re.compile(r"registered|aligned|to_colou?r|to_rgb", re.IGNORECASE)
+SHOWN = 5
+"""Topics that a message names at most."""
+
 NO_PICTURE = re.compile(r"confidence|disparity|mask|theora|ffmpeg|thermal", re.IGNORECASE)
 
 
@@ -84,7 +87,13 @@ def chosen_topics(path: Path, topics: Mapping[str, Topic], given: Mapping[str, s
             found = ", ".join(sorted(topics)) or "none"
             raise PomonaError(f"{path}: {role}: found no topic {name}, expected one of {found}")
     if "left" not in given and "depth" not in given:
-        given = {**_found(path, image_topics(topics)), **given}
+        names = image_topics(topics)
+        if not names:
+            others = ", ".join(f"{name} ({topic.type})" for name, topic in sorted(topics.items())[:SHOWN])
+            more = " ..." if len(topics) > SHOWN else ""
+            expected = " or ".join(IMAGE_TYPES)
+            raise PomonaError(f"{path}: found no pictures, but {others or 'nothing'}{more}, expected {expected}")
+        given = {**_found(path, names), **given}
     for kind in ("left", "right", "depth"):
         info = _info_topic(given[kind], topics) if kind in given else None
         if info is not None:
@@ -111,7 +120,7 @@ def _found(path: Path, names: list[str]) -> dict[str, str]:
     singles = colours or [name for name in names if name not in depths]
     if len(cameras) <= 1 and len(singles) == 1 and depths:
         return {"left": singles[0], "depth": _best_depth(singles[0], depths) or depths[0]}
-    found = ", ".join(names) or "no pictures"
+    found = ", ".join(names)
     raise PomonaError(
         f"{path}: found {found}, expected one camera with left and right, or with colour and depth: "
         "choose with --topics left=/...,right=/..."
