@@ -86,6 +86,7 @@ class _Lifted(TypedDict):
     covariances: NDArray[np.float64]
     diameters_m: NDArray[np.float64]
     diameter_sigmas_m: NDArray[np.float64]
+    support: NDArray[np.float64]
 
 @final
 class Tracker:

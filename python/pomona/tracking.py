@@ -214,6 +214,7 @@ class Tracker:
             "covariances": np.ascontiguousarray(lifted.covariances, np.float64),
             "diameters_m": np.ascontiguousarray(lifted.diameters_m, np.float64),
             "diameter_sigmas_m": np.ascontiguousarray(lifted.diameter_sigmas_m, np.float64),
+            "support": np.ascontiguousarray(lifted.support, np.float64),
         }
         try:
             return self._core.update(frame_number, pose.tolist(), detections.boxes_px, detections.scores, arrays)

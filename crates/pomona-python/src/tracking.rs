@@ -31,6 +31,8 @@ pub struct LiftedArrays<'py> {
     diameters_m: PyReadonlyArray1<'py, f64>,
     #[pyo3(item)]
     diameter_sigmas_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    support: PyReadonlyArray1<'py, f64>,
 }
 
 /// A tracker and what it knows.
@@ -69,6 +71,7 @@ impl PyTracker {
         let covariances = matrices(&lifted.covariances)?;
         let diameters_m = lifted.diameters_m.as_array().to_vec();
         let diameter_sigmas_m = lifted.diameter_sigmas_m.as_array().to_vec();
+        let support = lifted.support.as_array().to_vec();
         let boxes = Boxes { edges_px: &edges_px, scores: &scores };
         let lifted = LiftedBoxes {
             rows: &rows,
@@ -76,6 +79,7 @@ impl PyTracker {
             covariances: &covariances,
             diameters_m: &diameters_m,
             diameter_sigmas_m: &diameter_sigmas_m,
+            support: &support,
         };
         let numbers = py.detach(|| self.tracker.update(frame, &pose, &boxes, &lifted)).map_err(wrong)?;
         Ok(PyArray1::from_iter(py, numbers.into_iter().map(|number| number.map_or(-1, |number| number as i64))))

@@ -57,6 +57,7 @@ impl Seen {
             covariances: &self.covariances,
             diameters_m: &self.diameters_m,
             diameter_sigmas_m: &self.diameter_sigmas_m,
+            support: &vec![0.7; self.rows.len()],
         };
         tracker.update(frame, pose, &Boxes { edges_px: &self.edges_px, scores: &scores }, &lifted).expect("fits")
     }

@@ -1,10 +1,9 @@
 //! Which box shows which fruit, such that the summed log-odds are largest.
 
-use super::camera::Camera;
-use super::config::TrackingConfig;
 use super::likelihood::{Weighed, weigh};
 use super::observation::Observation;
 use super::prediction::Prediction;
+use super::unknown::{Conditions, Unknown};
 use crate::assignment::assign;
 use std::collections::BTreeMap;
 
@@ -21,13 +20,13 @@ pub(crate) struct Association {
 pub(crate) fn associate(
     predictions: &[Prediction],
     observations: &[Observation],
-    camera: &Camera,
-    config: &TrackingConfig,
+    unknown: &[Unknown],
+    conditions: &Conditions<'_>,
 ) -> Association {
     let mut weighed = BTreeMap::new();
     for (p, prediction) in predictions.iter().enumerate() {
         for (o, observation) in observations.iter().enumerate() {
-            if let Some(found) = weigh(prediction, observation, camera, config) {
+            if let Some(found) = weigh(prediction, observation, &unknown[o], conditions) {
                 weighed.insert((p, o), found);
             }
         }

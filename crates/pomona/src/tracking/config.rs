@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct TrackingConfig {
     /// Frames that must have seen a fruit for it to be reported.
     pub min_views: usize,
+    /// Frames after which a frame is assigned once more, and for good.
+    pub lag: usize,
     /// Standard deviation of one edge of a box, pixels.
     pub edge_sigma_px: f64,
     /// Boxes of fruits never seen before in one frame, on average.
@@ -17,7 +19,7 @@ pub struct TrackingConfig {
     pub false_per_frame: f64,
     /// Probability that a fruit in the picture is found.
     pub detection_probability: f64,
-    /// Probability that the depth of a box is not the fruit's.
+    /// Probability that the depth of a box is not the fruit's, before it is learned.
     pub depth_outliers: f64,
     /// Mean part of its size that a partly hidden fruit lacks.
     pub hidden_mean: f64,
@@ -40,6 +42,8 @@ impl Default for TrackingConfig {
         Self {
             // The paper's; a box that shows no fruit does not come five times to one place.
             min_views: 5,
+            // Longer than a fruit stays in view: after that nothing more is learned about it.
+            lag: 30,
             // Half a pixel of rounding, and what people and detectors disagree by on a clear outline.
             edge_sigma_px: 1.0,
             // At three fruits on each centimetre of way and 15 cm a frame; only its logarithm counts.
@@ -48,8 +52,8 @@ impl Default for TrackingConfig {
             false_per_frame: 4.0,
             // Leaves hide a fruit in about every second frame.
             detection_probability: 0.5,
-            // Boxes of the rendered row whose exact depth is a leaf's: 1 %; stereo adds those whose match is wrong.
-            depth_outliers: 0.1,
+            // Between a depth camera's 1 % and the half of a poor stereo pair's. It is learned within some frames.
+            depth_outliers: 0.2,
             // Boxes around what is seen of fruits that show 30 to 90 % of their face lack a fifth of the width.
             hidden_mean: 0.2,
             // Visual odometry over 0.2 m is 1 % wrong, half a pixel at 1.5 m.
@@ -68,6 +72,11 @@ impl Default for TrackingConfig {
 }
 
 impl TrackingConfig {
+    /// Standard deviation of the camera's place after a way, metres.
+    pub(crate) fn drift_m(&self, way_m: f64) -> f64 {
+        (self.drift_per_metre * way_m).min(self.max_drift_m)
+    }
+
     /// Checks the ranges.
     ///
     /// # Errors
@@ -100,6 +109,7 @@ impl TrackingConfig {
             require(name, value, value > 0.0 && value < 1.0, "a probability between 0 and 1")?;
         }
         require("tracking.merge_log_odds", self.merge_log_odds, self.merge_log_odds.is_finite(), "a finite number")?;
+        require("tracking.lag", self.lag as f64, self.lag > 0, "at least 1")?;
         require("tracking.min_views", self.min_views as f64, self.min_views > 0, "at least 1")
     }
 }

@@ -1,7 +1,9 @@
 //! A fruit that is known: where it is, how large, and what speaks for it.
 
+use super::birth::Birth;
 use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
+use super::known::Instant;
 use super::likelihood::Residual;
 use super::observation::Lift;
 use super::prediction::Appearance;
@@ -17,6 +19,14 @@ pub(crate) struct Estimate {
     pub covariance: Matrix3<f64>,
 }
 
+/// A place that a fruit may have instead of its estimate.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Doubt {
+    pub estimate: Estimate,
+    /// Log-odds of the fruit's estimate against this one.
+    pub log_odds: f64,
+}
+
 /// The radius by its logarithm, because errors of outlines are in proportion.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Size {
@@ -28,35 +38,23 @@ pub(crate) struct Size {
 #[derive(Debug, Clone)]
 pub(crate) struct Landmark {
     pub estimate: Estimate,
-    /// Where it is if the depth of its first box was a leaf's; dropped when a second box decides.
-    pub doubt: Option<Estimate>,
+    /// Where it is otherwise: by its size or by the depth of its first box. Dropped when more boxes decide.
+    pub doubt: Option<Doubt>,
     pub size: Size,
     pub views: usize,
-    /// Frames of the tracker, not of the recording: the first is 0.
-    pub last_seen: u64,
-    /// Way of the camera when it was last seen, metres.
-    pub last_way_m: f64,
+    pub last_seen: Instant,
     /// Log-odds that it is a fruit and not a false box.
     pub evidence: f64,
-    /// Bit k is set when the frame `last_seen - k` saw it.
+    /// Bit k is set when the frame k before the last that saw it did so, too.
     seen_in: u64,
     /// The fruit that it turned out to be.
     pub merged_into: Option<usize>,
 }
 
 impl Landmark {
-    pub fn born(estimate: Estimate, doubt: Option<Estimate>, size: Size, evidence: f64, now: u64, way_m: f64) -> Self {
-        Self {
-            estimate,
-            doubt,
-            size,
-            views: 1,
-            last_seen: now,
-            last_way_m: way_m,
-            evidence,
-            seen_in: 1,
-            merged_into: None,
-        }
+    pub fn born(birth: Birth, now: Instant) -> Self {
+        let Birth { estimate, doubt, size, evidence } = birth;
+        Self { estimate, doubt, size, views: 1, last_seen: now, evidence, seen_in: 1, merged_into: None }
     }
 
     pub fn radius_m(&self) -> f64 {
@@ -64,18 +62,17 @@ impl Landmark {
     }
 
     /// Notes that this frame saw it.
-    pub fn hit(&mut self, now: u64, way_m: f64, evidence: f64) {
-        self.seen_in = shifted(self.seen_in, now - self.last_seen) | 1;
+    pub fn hit(&mut self, now: Instant, evidence: f64) {
+        self.seen_in = shifted(self.seen_in, now.frame - self.last_seen.frame) | 1;
         self.last_seen = now;
-        self.last_way_m = way_m;
         self.views += 1;
         self.evidence += evidence;
     }
 
     /// Number of the remembered frames that saw both.
     pub fn frames_shared_with(&self, other: &Self) -> usize {
-        let latest = self.last_seen.max(other.last_seen);
-        let aligned = |one: &Self| shifted(one.seen_in, latest - one.last_seen);
+        let latest = self.last_seen.frame.max(other.last_seen.frame);
+        let aligned = |one: &Self| shifted(one.seen_in, latest - one.last_seen.frame);
         (aligned(self) & aligned(other)).count_ones() as usize
     }
 
@@ -84,13 +81,10 @@ impl Landmark {
         self.estimate = fused(&self.estimate, &other.estimate);
         self.doubt = None;
         self.size.add(other.size.ln_radius, other.size.variance);
-        let latest = self.last_seen.max(other.last_seen);
-        self.seen_in =
-            shifted(self.seen_in, latest - self.last_seen) | shifted(other.seen_in, latest - other.last_seen);
-        if other.last_seen > self.last_seen {
-            self.last_way_m = other.last_way_m;
-        }
-        self.last_seen = latest;
+        let [older, latest] =
+            if self.last_seen.frame < other.last_seen.frame { [&*self, other] } else { [other, &*self] };
+        let seen_in = latest.seen_in | shifted(older.seen_in, latest.last_seen.frame - older.last_seen.frame);
+        (self.last_seen, self.seen_in) = (latest.last_seen, seen_in);
         self.views += other.views;
         self.evidence += other.evidence;
     }
@@ -138,10 +132,9 @@ impl Estimate {
     /// A robust Kalman step with what one box showed.
     pub fn observe(&mut self, appearance: &Appearance, residual: &Residual, camera: &Camera, pose: &Pose) {
         let jacobian = camera.projection_jacobian(&appearance.in_camera) * pose.rotation.transpose();
-        let step = if residual.depth_fits > 0.5 {
-            self.step_with_depth(&jacobian, residual)
-        } else {
-            self.step_across(&jacobian, residual)
+        let step = match &residual.lifted {
+            Some((value, noise)) if residual.depth_fits > 0.5 => self.step_with_depth(&jacobian, value, noise),
+            _ => self.step_across(&jacobian.fixed_rows::<2>(0).into(), &residual.across.0, &residual.across.1),
         };
         if let Some((centre, covariance)) = step {
             self.centre += centre;
@@ -149,22 +142,30 @@ impl Estimate {
         }
     }
 
-    fn step_with_depth(&self, jacobian: &Matrix3<f64>, residual: &Residual) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-        let spread = jacobian * self.covariance * jacobian.transpose();
-        let distance2 = residual.value.dot(&((spread + residual.noise).try_inverse()? * residual.value));
-        // Cauchy's weight, as in the fusion of sightings: 3 is what the distance is on average.
-        let noise = residual.noise * (1.0 + distance2 / 3.0);
-        let gain = self.covariance * jacobian.transpose() * (spread + noise).try_inverse()?;
-        Some((gain * residual.value, self.covariance - gain * jacobian * self.covariance))
-    }
-
-    fn step_across(&self, jacobian: &Matrix3<f64>, residual: &Residual) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-        let jacobian: Matrix2x3<f64> = jacobian.fixed_rows::<2>(0).into();
-        let value: Vector2<f64> = residual.value.xy();
-        let noise: Matrix2<f64> = residual.noise.fixed_view::<2, 2>(0, 0).into();
+    fn step_with_depth(
+        &self,
+        jacobian: &Matrix3<f64>,
+        value: &Vector3<f64>,
+        noise: &Matrix3<f64>,
+    ) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         let spread = jacobian * self.covariance * jacobian.transpose();
         let distance2 = value.dot(&((spread + noise).try_inverse()? * value));
-        let gain = self.covariance * jacobian.transpose() * (spread + noise * (1.0 + distance2 / 2.0)).try_inverse()?;
+        // Cauchy's weight, as in the fusion of sightings: 3 is what the distance is on average.
+        let noise = noise * (1.0 + distance2 / 3.0);
+        let gain = self.covariance * jacobian.transpose() * (spread + noise).try_inverse()?;
+        Some((gain * value, self.covariance - gain * jacobian * self.covariance))
+    }
+
+    fn step_across(
+        &self,
+        jacobian: &Matrix2x3<f64>,
+        value: &Vector2<f64>,
+        noise: &Matrix2<f64>,
+    ) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+        let spread = jacobian * self.covariance * jacobian.transpose();
+        let distance2 = value.dot(&((spread + noise).try_inverse()? * value));
+        let noise = noise * (1.0 + distance2 / 2.0);
+        let gain = self.covariance * jacobian.transpose() * (spread + noise).try_inverse()?;
         Some((gain * value, self.covariance - gain * jacobian * self.covariance))
     }
 }

@@ -1,30 +1,22 @@
 //! Log-odds that a box shows a known fruit, against a box that shows something new.
 //!
-//! With the predicted middle and depth m of covariance P and what the box says, z of covariance R, S = P + R,
+//! With the predicted middle and depth m of covariance P, z of covariance C what depth says and (u, v) of covariance R the
+//! middle of the box,
 //!
-//!     ln p(z | fruit) = ln[(1 - e) N3(z - m; S) + e N2(z - m; S) q(z_Z - m_Z)] + ln p(size | fruit)
+//!     p(box | fruit) = [ t N3(z - m; P + C) + w(z_Z) N2((u, v) - m; P + R) ] p(size | fruit)
 //!
-//! where e is the probability that the depth is not the fruit's and q its density then: mostly that of a leaf in front,
-//! for nothing is seen through an apple. A box without depth has N2 alone. R grows by what the box lacks of the predicted
-//! outline: a part that hides may be on either side, so the middle of what shows lies anywhere within half of it. An edge
-//! that the picture cuts says nothing; then the other edge places the fruit.
+//! where t is the probability that a depth is the fruit's and w the density of a wrong one ([`super::trust`]). A box
+//! without depth has N2 alone. C and R grow by what the box lacks of the predicted outline: the hidden part may be on
+//! either side, so the middle of what shows lies anywhere within half of it. An edge that the picture cuts says nothing;
+//! then the other edge places the fruit.
 
 use super::camera::Camera;
 use super::config::TrackingConfig;
 use super::observation::{Observation, Side};
 use super::prediction::{Appearance, Prediction};
+use super::unknown::{Conditions, NEW_LN_SIZES, Unknown};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::PI;
-
-/// Wrong depths: part that is nearer than the fruit, its mean distance, that of the others, metres. Of the rendered row's
-/// 12 wrong ones of 2,700, 11 are a leaf's, 3 to 30 cm in front.
-const NEARER: f64 = 0.9;
-const LEAF_AHEAD_M: f64 = 0.2;
-const GAP_BEHIND_M: f64 = 0.5;
-
-/// Depths over which new fruits are spread, metres, and logarithms of sizes.
-const NEW_DEPTHS_M: f64 = 2.0;
-const NEW_LN_SIZES: f64 = 1.5;
 
 /// How far outlines of one fruit differ from those of a sphere, over its size.
 const ROUNDNESS: f64 = 0.05;
@@ -35,16 +27,16 @@ const HIDDEN: f64 = 0.5;
 /// Standard deviations beyond which a box is not weighed: 1e-6 of a normal distribution.
 const GATE: f64 = 5.0;
 
-/// What a box says against what was predicted.
+/// What a box says against what was predicted: observed less predicted, with the covariance of the observation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
-    /// Column, row (pixels), depth (metres): observed less predicted; 0 where the box is silent.
-    pub value: Vector3<f64>,
-    /// Covariance of the observation.
-    pub noise: Matrix3<f64>,
+    /// Middle of the box, pixels.
+    pub across: (Vector2<f64>, Matrix2<f64>),
+    /// Column, row (pixels) and depth (metres) that depth gives.
+    pub lifted: Option<(Vector3<f64>, Matrix3<f64>)>,
     /// Probability that the depth is the fruit's; 0 where there is none.
     pub depth_fits: f64,
-    /// Log density of place and depth.
+    /// Log density of place, depth and size.
     pub log_density: f64,
 }
 
@@ -53,122 +45,104 @@ pub(crate) struct Residual {
 pub(crate) struct Weighed {
     /// Log-odds against something new.
     pub log_odds: f64,
-    pub likely: Residual,
+    /// None where the box is out of the gate; then `doubt` is not.
+    pub likely: Option<Residual>,
     pub doubt: Option<Residual>,
 }
 
-/// None where the box lies outside of the gate.
+/// None where the box lies outside of the gates.
 pub(crate) fn weigh(
     prediction: &Prediction,
     observation: &Observation,
-    camera: &Camera,
-    config: &TrackingConfig,
+    unknown: &Unknown,
+    conditions: &Conditions<'_>,
 ) -> Option<Weighed> {
     let judge = |appearance: &Appearance| {
-        let residual = residual(appearance, observation, camera, config)?;
-        let size = size_log_density(appearance, prediction.ln_radius_variance, observation, config);
-        Some((residual, residual.log_density + size))
+        let mut residual = residual(appearance, observation, unknown, conditions)?;
+        residual.log_density +=
+            size_log_density(appearance, prediction.ln_radius_variance, observation, conditions.config);
+        Some(residual)
     };
     let likely = judge(&prediction.likely);
-    let doubt = prediction.doubt.as_ref().and_then(judge);
-    let wrong = config.depth_outliers;
-    let log_density = match (likely, doubt) {
-        (Some((_, a)), Some((_, b))) => log_sum((1.0 - wrong).ln() + a, wrong.ln() + b),
-        (Some((_, a)), None) => a,
-        (None, Some((_, b))) => wrong.ln() + b,
-        (None, None) => return None,
+    let (doubt, log_odds) = match &prediction.doubt {
+        Some((appearance, log_odds)) => (judge(appearance), *log_odds),
+        None => (None, f64::INFINITY),
     };
-    let log_odds = log_density - something_new(observation, camera, config) + odds_of_detection(config);
-    let likely = likely.map_or_else(out_of_gate, |found| found.0);
-    Some(Weighed { log_odds, likely, doubt: doubt.map(|found| found.0) })
-}
-
-fn odds_of_detection(config: &TrackingConfig) -> f64 {
-    (config.detection_probability / (1.0 - config.detection_probability)).ln()
-}
-
-/// A residual that no estimate takes up.
-fn out_of_gate() -> Residual {
-    Residual { value: Vector3::zeros(), noise: Matrix3::identity(), depth_fits: 0.0, log_density: f64::NEG_INFINITY }
-}
-
-/// Log density of a box that shows no known fruit: anywhere in the picture, at any depth, of any size.
-pub(crate) fn something_new(observation: &Observation, camera: &Camera, config: &TrackingConfig) -> f64 {
-    let [width, height] = camera.size_px;
-    let per_picture = (config.new_per_frame + config.false_per_frame) / (width * height);
-    let depths = if observation.lift.is_some() { NEW_DEPTHS_M } else { 1.0 };
-    (per_picture / depths / NEW_LN_SIZES).ln()
+    let density = |residual: &Option<Residual>| residual.as_ref().map_or(f64::NEG_INFINITY, |one| one.log_density);
+    let weight = -(-log_odds).exp().ln_1p(); // ln of the probability of `likely`
+    let log_density = log_sum(weight + density(&likely), weight - log_odds + density(&doubt));
+    if log_density == f64::NEG_INFINITY {
+        return None;
+    }
+    let found = conditions.config.detection_probability;
+    let log_odds = log_density - unknown.log_density + (found / (1.0 - found)).ln();
+    Some(Weighed { log_odds, likely, doubt })
 }
 
 fn residual(
     appearance: &Appearance,
     observation: &Observation,
-    camera: &Camera,
-    config: &TrackingConfig,
+    unknown: &Unknown,
+    conditions: &Conditions<'_>,
 ) -> Option<Residual> {
-    let mut value = Vector3::zeros();
-    let mut noise = Matrix3::zeros();
-    if let Some(lift) = &observation.lift {
-        value = lift.seen - appearance.seen;
-        noise = lift.covariance;
-    }
+    let Conditions { camera, config, .. } = conditions;
+    let (mut value, mut noise, mut lack2) = (Vector2::zeros(), Matrix2::zeros(), Vector3::zeros());
     for axis in 0..2 {
-        let (across, variance, slack2) = along_axis(axis, appearance, &observation.sides[axis], camera, config);
-        if observation.lift.is_none() {
-            value[axis] = across;
-            noise[(axis, axis)] = variance;
-        }
-        noise[(axis, axis)] += slack2;
-        if value[axis].powi(2) > GATE * GATE * (noise[(axis, axis)] + appearance.covariance[(axis, axis)]) {
-            return None;
-        }
+        let along = along_axis(axis, appearance, &observation.sides[axis], camera, config);
+        (value[axis], noise[(axis, axis)], lack2[axis]) = (along.value, along.variance + along.lack2, along.lack2);
     }
-    let (log_density, depth_fits) = log_density(&value, &(appearance.covariance + noise), observation, config);
-    Some(Residual { value, noise, depth_fits, log_density })
+    let spread = Matrix2::from(appearance.covariance.fixed_view::<2, 2>(0, 0));
+    let lifted = observation
+        .lift
+        .map(|lift| (lift.seen - appearance.seen, lift.covariance + Matrix3::from_diagonal(&lack2)))
+        .filter(|(value, noise)| lies_in_gate(&value.xy(), &(spread + noise.fixed_view::<2, 2>(0, 0))));
+    if lifted.is_none() && !lies_in_gate(&value, &(spread + noise)) {
+        return None;
+    }
+    let across = log_normal2(&value, &(spread + noise));
+    let (log_density, depth_fits) = match (&observation.lift, &unknown.trust) {
+        (Some(lift), Some(trust)) => {
+            let density =
+                |(value, noise): (Vector3<f64>, Matrix3<f64>)| log_normal3(&value, &(appearance.covariance + noise));
+            let fits = trust.fits.ln() + lifted.map_or(f64::NEG_INFINITY, density);
+            let wrong = trust.wrong_density(lift.seen.z, appearance.seen.z).ln() + across;
+            let either = log_sum(fits, wrong);
+            (either, (fits - either).exp())
+        }
+        _ => (across, 0.0),
+    };
+    Some(Residual { across: (value, noise), lifted, depth_fits, log_density })
 }
 
-/// Residual of a box along one axis of the picture, its variance, and what the hidden part adds to it.
-fn along_axis(
-    axis: usize,
-    appearance: &Appearance,
-    side: &Side,
-    camera: &Camera,
-    config: &TrackingConfig,
-) -> (f64, f64, f64) {
+fn lies_in_gate(value: &Vector2<f64>, covariance: &Matrix2<f64>) -> bool {
+    (0..2).all(|axis| value[axis].powi(2) <= GATE * GATE * covariance[(axis, axis)])
+}
+
+/// A box along one axis of the picture.
+struct Along {
+    /// Residual of its middle, or of its free edge, pixels.
+    value: f64,
+    variance: f64,
+    /// What the hidden part adds to the variance.
+    lack2: f64,
+}
+
+fn along_axis(axis: usize, appearance: &Appearance, side: &Side, camera: &Camera, config: &TrackingConfig) -> Along {
     let predicted = appearance.outline[axis];
     let edge2 = config.edge_sigma_px.powi(2);
-    // The middle of what shows lies anywhere within half of what lacks: variance of a uniform distribution.
-    let lack = (predicted.half() - side.edges.half()).max(0.0);
     match side.cut {
         [false, false] => {
-            (camera.middle_and_ratio(axis, side.edges).0 - appearance.seen[axis], edge2 / 2.0, lack * lack / 3.0)
+            let value = camera.middle_and_ratio(axis, side.edges).0 - appearance.seen[axis];
+            // The middle of what shows lies anywhere within half of what lacks: variance of a uniform distribution.
+            let lack = (predicted.half() - side.edges.half()).max(0.0);
+            Along { value, variance: edge2 / 2.0, lack2: lack * lack / 3.0 }
         }
-        [true, true] => (0.0, camera.size_px[axis].powi(2), 0.0),
+        [true, true] => Along { value: 0.0, variance: camera.size_px[axis].powi(2), lack2: 0.0 },
         [low_is_cut, _] => {
-            let free = if low_is_cut { side.edges.high - predicted.high } else { side.edges.low - predicted.low };
-            let hidden = config.hidden_mean * predicted.half();
-            (free, edge2 + hidden * hidden, 0.0)
+            let value = if low_is_cut { side.edges.high - predicted.high } else { side.edges.low - predicted.low };
+            Along { value, variance: edge2 + (config.hidden_mean * predicted.half()).powi(2), lack2: 0.0 }
         }
     }
-}
-
-/// Log density of a residual, and the probability that its depth is the fruit's.
-fn log_density(
-    value: &Vector3<f64>,
-    covariance: &Matrix3<f64>,
-    observation: &Observation,
-    config: &TrackingConfig,
-) -> (f64, f64) {
-    let across = log_normal2(&value.xy(), &covariance.fixed_view::<2, 2>(0, 0).into());
-    if observation.lift.is_none() {
-        return (across, 0.0);
-    }
-    let wrong = config.depth_outliers;
-    let fits = (1.0 - wrong).ln() + log_normal3(value, covariance);
-    let (part, mean_m) = if value.z < 0.0 { (NEARER, LEAF_AHEAD_M) } else { (1.0 - NEARER, GAP_BEHIND_M) };
-    let fails = (wrong * part / mean_m).ln() - value.z.abs() / mean_m + across;
-    let either = log_sum(fits, fails);
-    (either, (fits - either).exp())
 }
 
 /// Log density of the logarithm of the box's longer side, over that of the predicted outline: equal up to noise where

@@ -9,7 +9,7 @@
 //! saw both: one fruit seldom has two boxes.
 
 use super::config::TrackingConfig;
-use super::landmark::{Estimate, fused};
+use super::landmark::{Estimate, Landmark, fused};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
@@ -31,6 +31,13 @@ pub struct Body {
     pub covariance: Matrix3<f64>,
     /// Radius, metres.
     pub radius_m: f64,
+}
+
+impl Body {
+    pub(crate) fn of(landmark: &Landmark) -> Self {
+        let Estimate { centre, covariance } = landmark.estimate;
+        Self { centre, covariance, radius_m: landmark.radius_m() }
+    }
 }
 
 /// Log-odds that two records are one fruit, nats; `place_sigma_m` is what places of different times may differ by.

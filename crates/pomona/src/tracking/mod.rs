@@ -12,6 +12,7 @@
 //! 5. Boxes left over may be a second piece of an assigned fruit, or the outline of two fruits ([`sharing`]); the others
 //!    are born as fruits, by their depth or by their size ([`birth`]).
 //! 6. Assigned fruits take up what was seen ([`landmark`]); two that cannot both be there become one ([`merging`]).
+//! 7. The frame that is now `lag` frames old is looked at again, with what is known since ([`settling`]).
 //!
 //! Equations, assumptions and limits: `docs/tracking.md`.
 
@@ -19,16 +20,20 @@ mod association;
 mod birth;
 mod camera;
 mod config;
+mod known;
 mod landmark;
 mod likelihood;
 mod merging;
 mod observation;
 mod population;
 mod prediction;
+mod settling;
 mod sharing;
 mod space;
 mod tracker;
 mod tracks;
+mod trust;
+mod unknown;
 
 pub use camera::{Camera, Pose};
 pub use config::TrackingConfig;

@@ -29,12 +29,20 @@ pub struct LiftedBoxes<'a> {
     pub diameters_m: &'a [f64],
     /// Their standard deviations, what leaves hide included, metres.
     pub diameter_sigmas_m: &'a [f64],
+    /// Part of the outline's pixels whose depth is on the fruit, 0 to 1.
+    pub support: &'a [f64],
 }
 
 impl LiftedBoxes<'_> {
     /// No box has a depth.
-    pub const NONE: Self =
-        Self { rows: &[], centres_in_camera: &[], covariances: &[], diameters_m: &[], diameter_sigmas_m: &[] };
+    pub const NONE: Self = Self {
+        rows: &[],
+        centres_in_camera: &[],
+        covariances: &[],
+        diameters_m: &[],
+        diameter_sigmas_m: &[],
+        support: &[],
+    };
 }
 
 /// One box as the tracker sees it.
@@ -68,6 +76,7 @@ pub(crate) struct Lift {
     pub radius_m: f64,
     /// Standard deviation of the radius over the radius.
     pub radius_sigma: f64,
+    pub support: f64,
 }
 
 /// The observations of one frame, one per box.
@@ -97,6 +106,7 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
         ("covariances", lifted.covariances.len(), n_lifted),
         ("diameters_m", lifted.diameters_m.len(), n_lifted),
         ("diameter_sigmas_m", lifted.diameter_sigmas_m.len(), n_lifted),
+        ("support", lifted.support.len(), n_lifted),
     ] {
         if found != expected {
             return Err(Error::Length { what, found, expected });
@@ -125,7 +135,8 @@ fn lift(camera: &Camera, lifted: &LiftedBoxes<'_>, k: usize) -> Option<Lift> {
         covariance: to_seen * lifted.covariances[k] * to_seen.transpose(),
         radius_m: lifted.diameters_m[k] / 2.0,
         radius_sigma: lifted.diameter_sigmas_m[k] / lifted.diameters_m[k],
+        support: lifted.support[k],
     };
-    let is_finite = lift.seen.iter().chain(lift.covariance.iter()).all(|x| x.is_finite()) && lift.radius_sigma > 0.0;
-    (is_finite && centre.z > 0.0 && lift.radius_m > 0.0).then_some(lift)
+    let is_finite = lift.seen.iter().chain(lift.covariance.iter()).chain([&lift.support]).all(|x| x.is_finite());
+    (is_finite && centre.z > 0.0 && lift.radius_m > 0.0 && lift.radius_sigma > 0.0).then_some(lift)
 }

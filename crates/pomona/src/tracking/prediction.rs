@@ -15,8 +15,8 @@ pub(crate) struct Prediction {
     /// Index of the fruit.
     pub landmark: usize,
     pub likely: Appearance,
-    /// If the depth of its first box was a leaf's.
-    pub doubt: Option<Appearance>,
+    /// Where else it may be, and the log-odds of `likely` against that.
+    pub doubt: Option<(Appearance, f64)>,
     /// Variance of the logarithm of the radius.
     pub ln_radius_variance: f64,
 }
@@ -41,10 +41,10 @@ pub(crate) fn predict(
     way_m: f64,
     config: &TrackingConfig,
 ) -> Option<Prediction> {
-    let drift_m = (config.drift_per_metre * (way_m - landmark.last_way_m)).min(config.max_drift_m);
+    let drift_m = config.drift_m((way_m - landmark.last_seen.way_m).abs());
     let place_variance = config.pose_sigma_m.powi(2) + drift_m.powi(2) + (SHAPE_SIGMA * landmark.radius_m()).powi(2);
     let appear = |estimate: &Estimate| appearance(estimate, landmark.radius_m(), place_variance, camera, pose, config);
-    let doubt = landmark.doubt.as_ref().and_then(appear);
+    let doubt = landmark.doubt.as_ref().and_then(|doubt| Some((appear(&doubt.estimate)?, doubt.log_odds)));
     let likely = appear(&landmark.estimate)?;
     Some(Prediction { landmark: index, likely, doubt, ln_radius_variance: landmark.size.variance })
 }

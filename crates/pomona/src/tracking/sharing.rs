@@ -14,11 +14,43 @@ const BESIDE: f64 = 0.2;
 /// Nats by which the outline of two must explain a box better than the outline of one: twenty to one.
 const CLEARLY: f64 = 3.0;
 
+/// What a box is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Role {
+    /// It shows a known fruit, by prediction.
+    Known(usize),
+    /// It is around two known fruits; the first counts as seen.
+    Shared([usize; 2]),
+    /// A second piece of a fruit that another box shows.
+    Piece,
+    /// None of those.
+    New,
+}
+
+/// What each box is.
+pub(crate) fn roles(
+    predictions: &[Prediction],
+    observations: &[Observation],
+    association: &Association,
+    config: &TrackingConfig,
+) -> Vec<Role> {
+    let role = |o: usize| {
+        let shared = shared_by(o, predictions, observations, association, config);
+        match (shared, association.prediction_of[o]) {
+            (Some(both), _) => Role::Shared(both),
+            (None, Some(p)) => Role::Known(p),
+            (None, None) if is_second_piece(o, predictions, observations, association, config) => Role::Piece,
+            (None, None) => Role::New,
+        }
+    };
+    (0..observations.len()).map(role).collect()
+}
+
 /// Whether a box without a fruit is a second piece of one that another box shows.
 ///
 /// Both pieces lie within the predicted outline, beside each other, and the depth of the second, where there is one, is
 /// that fruit's: another fruit that shows within this one's outline hangs in front of it.
-pub(crate) fn is_second_piece(
+fn is_second_piece(
     o: usize,
     predictions: &[Prediction],
     observations: &[Observation],
@@ -31,7 +63,7 @@ pub(crate) fn is_second_piece(
         };
         let (piece, main) = (&observations[o], &observations[first]);
         weighed.log_odds > 0.0
-            && (piece.lift.is_none() || weighed.likely.depth_fits > 0.5)
+            && (piece.lift.is_none() || weighed.likely.is_some_and(|likely| likely.depth_fits > 0.5))
             && lies_within(piece, &prediction.likely, config)
             && lies_within(main, &prediction.likely, config)
             && are_beside(piece, main)
@@ -54,7 +86,7 @@ fn are_beside(a: &Observation, b: &Observation) -> bool {
 
 /// The fruits whose outlines together, but not one alone, explain a box: the one that it is assigned to, if any, or the
 /// nearest first.
-pub(crate) fn shared_by(
+fn shared_by(
     o: usize,
     predictions: &[Prediction],
     observations: &[Observation],

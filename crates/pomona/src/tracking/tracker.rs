@@ -4,20 +4,18 @@ use super::association::{Association, associate};
 use super::birth::birth;
 use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
-use super::landmark::Landmark;
+use super::known::{Instant, Known};
 use super::likelihood::Weighed;
-use super::merging::{Body, one_fruit_log_odds};
 use super::observation::{Boxes, LiftedBoxes, Observation, observations};
 use super::population::Population;
-use super::prediction::{Prediction, predict};
-use super::sharing::{is_second_piece, shared_by};
-use super::space::Space;
-use super::tracks::{Sighting, Tracks, root, tracks};
+use super::prediction::Prediction;
+use super::settling::PastFrame;
+use super::sharing::{Role, roles};
+use super::tracks::{Sighting, Tracks, tracks};
+use super::trust::Reliability;
+use super::unknown::{Conditions, unknown};
 use crate::error::{Error, Result};
-use nalgebra::Vector3;
-
-/// Nats by which the depth of a fruit's first box must be beaten or confirmed by the second.
-const DECIDED: f64 = 3.0;
+use std::collections::VecDeque;
 
 /// Largest evidence of one frame, nats: boxes of one fruit err alike.
 const EVIDENCE_OF_A_FRAME: f64 = 3.0;
@@ -27,27 +25,14 @@ const EVIDENCE_OF_A_FRAME: f64 = 3.0;
 pub struct Tracker {
     camera: Camera,
     config: TrackingConfig,
-    landmarks: Vec<Landmark>,
-    space: Space,
+    known: Known,
     population: Population,
+    reliability: Reliability,
+    /// Frames that are not settled, the oldest first.
+    past: VecDeque<PastFrame>,
+    /// Of settled frames.
     sightings: Vec<Sighting>,
-    frames: u64,
-    last_frame: Option<i64>,
-    place: Option<Vector3<f64>>,
-    way_m: f64,
-}
-
-/// What a box is.
-#[derive(Debug, Clone, Copy)]
-enum Role {
-    /// It shows a known fruit, by prediction.
-    Known(usize),
-    /// It is around two known fruits; the first counts as seen.
-    Shared([usize; 2]),
-    /// A second piece of a fruit that another box shows.
-    Piece,
-    /// None of those.
-    New,
+    now: Instant,
 }
 
 impl Tracker {
@@ -60,14 +45,12 @@ impl Tracker {
         Ok(Self {
             camera,
             config,
-            landmarks: Vec::new(),
-            space: Space::default(),
+            known: Known::default(),
             population: Population::default(),
+            reliability: Reliability::new(&config),
+            past: VecDeque::new(),
             sightings: Vec::new(),
-            frames: 0,
-            last_frame: None,
-            place: None,
-            way_m: 0.0,
+            now: Instant::default(),
         })
     }
 
@@ -77,121 +60,94 @@ impl Tracker {
     /// Arrays do not fit together, or the frame's number does not follow the last one's.
     pub fn update(
         &mut self,
-        frame: i64,
+        number: i64,
         session_from_camera: &Pose,
         boxes: &Boxes<'_>,
         lifted: &LiftedBoxes<'_>,
     ) -> Result<Vec<Option<usize>>> {
         let observations = observations(&self.camera, boxes, lifted)?;
-        self.arrive(frame, session_from_camera)?;
-        let predictions = self.predictions(session_from_camera);
-        let association = associate(&predictions, &observations, &self.camera, &self.config);
-        let roles = self.roles(&predictions, &observations, &association);
-        let numbers: Vec<_> = (0..observations.len())
-            .map(|o| match roles[o] {
-                Role::Known(p) => Some(self.see(
-                    &predictions[p],
-                    &observations[o],
-                    &association.weighed[&(p, o)],
-                    session_from_camera,
-                )),
-                Role::Shared([p, _]) => Some(self.see_shared(&predictions[p])),
+        self.arrive(number, session_from_camera)?;
+        observations.iter().filter_map(|one| one.lift.as_ref()).for_each(|lift| self.population.add(lift));
+        let unknown: Vec<_> = observations.iter().map(|one| unknown(one, &self.conditions())).collect();
+        let predictions = self.known.predictions(&self.camera, session_from_camera, self.now.way_m, &self.config);
+        let association = associate(&predictions, &observations, &unknown, &self.conditions());
+        let roles = roles(&predictions, &observations, &association, &self.config);
+        let mut told = Vec::new();
+        for (o, observation) in observations.iter().enumerate() {
+            told.push(match roles[o] {
+                Role::Known(p) => {
+                    let weighed = &association.weighed[&(p, o)];
+                    Some((self.see(&predictions[p], observation, weighed, session_from_camera), false))
+                }
+                Role::Shared([p, _]) => Some((self.see_shared(&predictions[p]), true)),
                 Role::Piece => None,
-                Role::New => self.bear(&observations[o], session_from_camera),
-            })
-            .collect();
-        self.note(frame, &numbers, &roles);
+                Role::New => {
+                    let born = birth(observation, &unknown[o], session_from_camera, &self.conditions());
+                    born.map(|born| (self.known.add(born, session_from_camera, self.now), false))
+                }
+            });
+        }
         self.miss(&predictions, &association, &roles);
-        self.merge_in_view(&predictions);
-        self.frames += 1;
-        Ok(numbers.into_iter().map(|number| number.map(|number| root(&self.landmarks, number))).collect())
+        self.known.merge_in_view(&predictions, self.now, &self.config);
+        let numbers = told.iter().map(|told| told.map(|(fruit, _)| self.known.root(fruit))).collect();
+        self.past.push_back(PastFrame { number, at: self.now, pose: *session_from_camera, observations, told });
+        if self.past.len() > self.config.lag {
+            self.settle_oldest();
+        }
+        Ok(numbers)
     }
 
     /// The fruits seen so far in at least `min_views` frames, duplicates joined.
     pub fn finish(&self, min_views: usize) -> Tracks {
-        tracks(&self.landmarks, &self.sightings, min_views, &self.config)
+        let mut settled = self.clone();
+        while !settled.past.is_empty() {
+            settled.settle_oldest();
+        }
+        tracks(&settled.known, &settled.sightings, min_views, &self.config)
     }
 
-    fn arrive(&mut self, frame: i64, pose: &Pose) -> Result<()> {
-        if let Some(last) = self.last_frame.filter(|&last| frame <= last) {
-            return Err(Error::FrameOrder { found: frame, last });
+    fn arrive(&mut self, number: i64, pose: &Pose) -> Result<()> {
+        if let Some(last) = self.past.back() {
+            if number <= last.number {
+                return Err(Error::FrameOrder { found: number, last: last.number });
+            }
+            self.now.frame += 1;
+            self.now.way_m += (pose.translation - last.pose.translation).norm();
         }
-        self.last_frame = Some(frame);
-        self.way_m += self.place.map_or(0.0, |place| (pose.translation - place).norm());
-        self.place = Some(pose.translation);
         Ok(())
     }
 
-    fn predictions(&self, pose: &Pose) -> Vec<Prediction> {
-        let near = self.space.near_view(&self.camera, pose);
-        near.into_iter()
-            .filter_map(|index| predict(index, &self.landmarks[index], &self.camera, pose, self.way_m, &self.config))
-            .collect()
-    }
-
-    fn roles(&self, predictions: &[Prediction], observations: &[Observation], association: &Association) -> Vec<Role> {
-        (0..observations.len())
-            .map(|o| {
-                let shared = shared_by(o, predictions, observations, association, &self.config);
-                match (shared, association.prediction_of[o]) {
-                    (Some(both), _) => Role::Shared(both),
-                    (None, Some(p)) => Role::Known(p),
-                    (None, None) if is_second_piece(o, predictions, observations, association, &self.config) => {
-                        Role::Piece
-                    }
-                    (None, None) => Role::New,
-                }
-            })
-            .collect()
+    fn conditions(&self) -> Conditions<'_> {
+        Conditions {
+            camera: &self.camera,
+            config: &self.config,
+            size: self.population.size(),
+            reliability: &self.reliability,
+        }
     }
 
     /// A known fruit takes up what its box shows.
     fn see(&mut self, prediction: &Prediction, observation: &Observation, weighed: &Weighed, pose: &Pose) -> usize {
-        let index = prediction.landmark;
-        let landmark = &mut self.landmarks[index];
-        let before = landmark.estimate.centre;
-        landmark.estimate.observe(&prediction.likely, &weighed.likely, &self.camera, pose);
-        settle_doubt(landmark, prediction, weighed, &self.camera, pose, &self.config);
-        if let Some(lift) = observation.lift.filter(|_| weighed.likely.depth_fits > 0.5) {
-            landmark.size.observe(&lift, &self.config);
-            self.population.add(&lift);
+        let likely = self.known.take_up(prediction, weighed, &self.camera, pose);
+        let landmark = &mut self.known.landmarks[prediction.landmark];
+        if let (Some(lift), Some(likely)) = (&observation.lift, likely) {
+            if likely.depth_fits > 0.5 {
+                landmark.size.observe(lift, &self.config);
+            }
+            // Two sightings across the ray say where it is, whatever their depths said.
+            if landmark.views >= 2 && landmark.doubt.is_none() {
+                let is_nearer = lift.seen.z < prediction.likely.seen.z;
+                self.reliability.learn(lift.support, likely.depth_fits, is_nearer);
+            }
         }
-        landmark.hit(self.frames, self.way_m, weighed.log_odds.min(EVIDENCE_OF_A_FRAME));
-        self.space.moved(index, &before, &self.landmarks[index].estimate.centre);
-        index
+        landmark.hit(self.now, weighed.log_odds.min(EVIDENCE_OF_A_FRAME));
+        prediction.landmark
     }
 
     /// A fruit in a box with another one is there, but the box is not its own.
     fn see_shared(&mut self, prediction: &Prediction) -> usize {
-        self.landmarks[prediction.landmark].hit(self.frames, self.way_m, 0.0);
+        self.known.landmarks[prediction.landmark].hit(self.now, 0.0);
         prediction.landmark
-    }
-
-    fn bear(&mut self, observation: &Observation, pose: &Pose) -> Option<usize> {
-        let born = birth(observation, &self.population, &self.camera, pose, &self.config)?;
-        if let Some(lift) = &observation.lift {
-            self.population.add(lift);
-        }
-        let index = self.landmarks.len();
-        self.space.insert(index, &born.estimate.centre);
-        self.space.reach(pose.to_camera(&born.estimate.centre).z);
-        self.landmarks.push(Landmark::born(
-            born.estimate,
-            born.doubt,
-            born.size,
-            born.evidence,
-            self.frames,
-            self.way_m,
-        ));
-        Some(index)
-    }
-
-    fn note(&mut self, frame: i64, numbers: &[Option<usize>], roles: &[Role]) {
-        for (row, (number, role)) in numbers.iter().zip(roles).enumerate() {
-            if let Some(fruit) = *number {
-                self.sightings.push(Sighting { frame, row, fruit, shared: matches!(role, Role::Shared(_)) });
-            }
-        }
     }
 
     /// Fruits that should have shown but did not; not those in a shared box or behind another fruit.
@@ -203,71 +159,20 @@ impl Tracker {
                 && !in_shared_box(p)
                 && !predictions.iter().any(|other| hides(other, prediction));
             if is_missed {
-                self.landmarks[prediction.landmark].evidence += (1.0 - self.config.detection_probability).ln();
+                self.known.landmarks[prediction.landmark].evidence += (1.0 - self.config.detection_probability).ln();
             }
         }
     }
 
-    /// Joins fruits that this frame saw with others in view that are at the same place.
-    fn merge_in_view(&mut self, predictions: &[Prediction]) {
-        let in_view: Vec<usize> = predictions.iter().map(|prediction| prediction.landmark).collect();
-        for (k, &a) in in_view.iter().enumerate() {
-            for &b in &in_view[k + 1..] {
-                if self.are_one(a, b) {
-                    self.merge(a, b);
-                }
-            }
-        }
-    }
-
-    fn are_one(&self, a: usize, b: usize) -> bool {
-        let [first, second] = [&self.landmarks[a], &self.landmarks[b]];
-        let is_open = |one: &Landmark| one.merged_into.is_none() && one.doubt.is_none();
-        let was_seen = first.last_seen == self.frames || second.last_seen == self.frames;
-        let apart = (first.estimate.centre - second.estimate.centre).norm();
-        if !was_seen || !is_open(first) || !is_open(second) || apart > 2.0 * (first.radius_m() + second.radius_m()) {
-            return false;
-        }
-        let way_m = (first.last_way_m - second.last_way_m).abs();
-        let drift_m = (self.config.drift_per_metre * way_m).min(self.config.max_drift_m);
-        let together = first.frames_shared_with(second);
-        let [first, second] = [first, second].map(|one| Body {
-            centre: one.estimate.centre,
-            covariance: one.estimate.covariance,
-            radius_m: one.radius_m(),
-        });
-        let place_sigma_m = drift_m.hypot(self.config.pose_sigma_m);
-        one_fruit_log_odds(&first, &second, together, place_sigma_m, &self.config) > self.config.merge_log_odds
-    }
-
-    fn merge(&mut self, into: usize, from: usize) {
-        let other = self.landmarks[from].clone();
-        let before = self.landmarks[into].estimate.centre;
-        self.space.remove(from, &other.estimate.centre);
-        self.landmarks[from].merged_into = Some(into);
-        self.landmarks[into].absorb(&other);
-        self.space.moved(into, &before, &self.landmarks[into].estimate.centre);
-    }
-}
-
-/// The second box of a fruit says whether the first one's depth was the fruit's.
-fn settle_doubt(
-    landmark: &mut Landmark,
-    prediction: &Prediction,
-    weighed: &Weighed,
-    camera: &Camera,
-    pose: &Pose,
-    config: &TrackingConfig,
-) {
-    let Some(mut doubt) = landmark.doubt.take() else { return };
-    let (Some(appearance), Some(residual)) = (&prediction.doubt, &weighed.doubt) else { return };
-    let wrong = config.depth_outliers;
-    let gain = ((1.0 - wrong) / wrong).ln() + weighed.likely.log_density - residual.log_density;
-    doubt.observe(appearance, residual, camera, pose);
-    if gain < 0.0 {
-        landmark.estimate = doubt;
-    } else if gain < DECIDED {
-        landmark.doubt = Some(doubt);
+    fn settle_oldest(&mut self) {
+        let Some(oldest) = self.past.pop_front() else { return };
+        let conditions = Conditions {
+            camera: &self.camera,
+            config: &self.config,
+            size: self.population.size(),
+            reliability: &self.reliability,
+        };
+        self.sightings.extend(oldest.settle(&mut self.known, &conditions));
     }
 }
 

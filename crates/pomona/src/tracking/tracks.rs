@@ -1,6 +1,7 @@
 //! What tracking found: the fruits of the visit and who saw them.
 
 use super::config::TrackingConfig;
+use super::known::Known;
 use super::landmark::Landmark;
 use super::merging::{Body, merge_duplicates};
 use nalgebra::{Matrix3, Vector3};
@@ -41,19 +42,15 @@ pub struct Tracks {
 }
 
 /// Joins duplicates, drops what is no fruit or was seen too rarely.
-pub(crate) fn tracks(
-    landmarks: &[Landmark],
-    sightings: &[Sighting],
-    min_views: usize,
-    config: &TrackingConfig,
-) -> Tracks {
+pub(crate) fn tracks(known: &Known, sightings: &[Sighting], min_views: usize, config: &TrackingConfig) -> Tracks {
+    let landmarks = &known.landmarks;
     let roots: Vec<usize> = (0..landmarks.len()).filter(|&index| landmarks[index].merged_into.is_none()).collect();
     let mut row_of: BTreeMap<usize, usize> = roots.iter().enumerate().map(|(row, &root)| (root, row)).collect();
     let mut frames_of = vec![Vec::new(); roots.len()];
     for sighting in sightings {
-        frames_of[row_of[&root(landmarks, sighting.fruit)]].push(sighting.frame);
+        frames_of[row_of[&known.root(sighting.fruit)]].push(sighting.frame);
     }
-    let bodies: Vec<Body> = roots.iter().map(|&index| body(&landmarks[index])).collect();
+    let bodies: Vec<Body> = roots.iter().map(|&index| Body::of(&landmarks[index])).collect();
     let labels = merge_duplicates(&bodies, &frames_of, config.max_drift_m, config);
     let mut joined: Vec<Landmark> = roots.iter().map(|&index| landmarks[index].clone()).collect();
     for (row, &label) in labels.iter().enumerate() {
@@ -65,20 +62,8 @@ pub(crate) fn tracks(
     for row in row_of.values_mut() {
         *row = labels[*row];
     }
-    let named = sightings.iter().map(|one| Sighting { fruit: row_of[&root(landmarks, one.fruit)], ..*one });
+    let named = sightings.iter().map(|one| Sighting { fruit: row_of[&known.root(one.fruit)], ..*one });
     report(&roots, &joined, &once_a_frame(named), min_views)
-}
-
-/// The record that a record was merged into, in the end.
-pub(crate) fn root(landmarks: &[Landmark], mut index: usize) -> usize {
-    while let Some(next) = landmarks[index].merged_into {
-        index = next;
-    }
-    index
-}
-
-fn body(landmark: &Landmark) -> Body {
-    Body { centre: landmark.estimate.centre, covariance: landmark.estimate.covariance, radius_m: landmark.radius_m() }
 }
 
 /// Merged records may both have a box in one frame: the first stays, an own one before a shared one.
