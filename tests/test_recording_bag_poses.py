@@ -93,6 +93,11 @@ def test_odometry_without_a_way_to_the_camera_is_not_used(tmp_path):
     assert open_recording(bag, topics={"poses": "none"}).trajectory is None
 
 
+def test_odometry_of_the_camera_itself_needs_no_frames(tmp_path):
+    entries = stereo(6) + [odometry("/vio", at, odom_from_base(at), child="/cam") for at in times_ns()]
+    assert_poses(open_recording(write_bag(tmp_path / "row", entries, "ros1")), odom_from_base)
+
+
 def test_of_several_odometries_one_is_chosen_by_hand(tmp_path):
     entries = stereo(6) + statics()
     entries += [odometry("/wheels", at, pose((9, 9, 9))) for at in times_ns()]
@@ -106,7 +111,8 @@ def test_of_several_odometries_one_is_chosen_by_hand(tmp_path):
 def test_stamped_poses_are_the_cameras_when_they_are_given(tmp_path):
     entries = stereo(6) + [odometry("/slam/pose", at, odom_from_base(at), child="") for at in times_ns()]
     bag = write_bag(tmp_path / "row", entries, "sqlite3")
-    assert open_recording(bag).trajectory is None
+    with pytest.warns(PomonaWarning, match="found poses on /slam/pose that do not say of what: not used"):
+        assert open_recording(bag).trajectory is None
     with pytest.warns(PomonaWarning, match="/slam/pose: poses do not say of which frame: taken as the left camera's"):
         recording = open_recording(bag, topics={"poses": "/slam/pose"})
     assert_poses(recording, odom_from_base)

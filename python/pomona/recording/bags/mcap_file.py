@@ -50,6 +50,7 @@ class McapFile:
     topics: dict[str, Topic]
     _channels: dict[int, Topic]
     _damaged: set[int] = field(default_factory=set)
+    _inhabitants: dict[int, frozenset[int]] = field(default_factory=dict)
 
     kind = "MCAP"
 
@@ -87,8 +88,12 @@ class McapFile:
 
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
         """Read in the order of the file, which for one topic is that of logging."""
+        wanted = {number for number, topic in self._channels.items() if topic.name in topics}
         with self.path.open("rb") as file:
             for piece in self.pieces:
+                inhabitants = self._inhabitants.get(piece.offset)
+                if inhabitants is not None and not inhabitants & wanted:
+                    continue  # A raw picture often fills a chunk: that of the other camera need not be decompressed.
                 if start_ns is not None and piece.last_ns < start_ns:
                     continue
                 for logged_ns, channel, body in self._inside(file, piece):
@@ -108,7 +113,10 @@ class McapFile:
             yield logged_ns, channel, content[22:]
             return
         schemas: dict[int, Any] = {}
-        for record in self._records(piece, content):
+        records = self._records(piece, content)
+        channels = frozenset(record.channel_id for record in records if isinstance(record, McapMessage))
+        self._inhabitants.setdefault(piece.offset, channels)
+        for record in records:
             if isinstance(record, McapMessage):
                 yield record.log_time, record.channel_id, record.data
             elif isinstance(record, Schema):

@@ -58,7 +58,13 @@ def camera_poses(path: Path, file: MessageFile, roles: Roles, contents: Contents
         )
         return None
     trees = [name for name, topic in file.topics.items() if topic.type in TREES and name.rpartition("/")[2] == "tf"]
-    return _of_tree(path, file, contents, camera, trees[0]) if len(trees) == 1 else None
+    known = _of_tree(path, file, contents, camera, trees[0]) if len(trees) == 1 else None
+    stamped = sorted(name for name, topic in file.topics.items() if topic.type in STAMPED)
+    if known is None and stamped:
+        _tell(
+            f"{path}: found poses on {', '.join(stamped)} that do not say of what: not used, --topics poses=/... does"
+        )
+    return known
 
 
 def _of_topic(path: Path, file: MessageFile, contents: Contents, camera: str, topic: str) -> Known | None:
