@@ -9,12 +9,15 @@ __all__ = [
     "Tracker",
     "Tracks",
     "__version__",
+    "adjust",
     "default_config",
     "describe",
     "fuse_centres",
     "fuse_diameters",
     "lift",
+    "locate",
     "one_fruit_each",
+    "search_rows",
 ]
 
 __version__: str
@@ -145,6 +148,47 @@ def one_fruit_each(
     place_sigma_m: float,
     config: str,
 ) -> NDArray[np.int64]: ...
+class _Seen(TypedDict):
+    poses: NDArray[np.int64]
+    points: NDArray[np.int64]
+    values: NDArray[np.float64]
+    whitenings: NDArray[np.float64]
+
+class _Between(TypedDict):
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    first_from_second: NDArray[np.float64]
+    information: NDArray[np.float64]
+
+_StereoCamera = tuple[float, float, float, float, float]
+
+def adjust(
+    camera: _StereoCamera,
+    poses: NDArray[np.float64],
+    fixed: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    *,
+    pictures: _Seen | None,
+    places: _Seen | None,
+    relative_poses: _Between | None,
+    wanted: list[tuple[int, int]],
+    max_steps: int | None,
+    first_scale: float | None,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]: ...
+def locate(
+    camera: _StereoCamera,
+    known: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+    expected: list[list[float]],
+    *,
+    sigma_px: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]] | None: ...
+def search_rows(
+    left: NDArray[np.uint8], right: NDArray[np.uint8], points: NDArray[np.float64], farthest_px: int
+) -> NDArray[np.float64]: ...
 def default_config() -> str: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
 def fuse_centres(

@@ -1,10 +1,12 @@
 //! Python bindings of the pomona core: thin, no logic. One file per core module.
 
+mod bundle;
 mod camera;
 mod cloud;
 mod descriptor;
 mod lifting;
 mod matching;
+mod row_search;
 mod tracking;
 
 use pyo3::prelude::*;
@@ -21,6 +23,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lifting::fuse_centres, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::fuse_diameters, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
+    module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;
+    module.add_function(wrap_pyfunction!(bundle::locate, module)?)?;
+    module.add_function(wrap_pyfunction!(row_search::search_rows, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())
 }

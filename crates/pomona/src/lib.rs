@@ -8,6 +8,7 @@
 //! into the map.
 
 pub mod assignment;
+pub mod bundle;
 pub mod camera;
 pub mod clique;
 pub mod cloud;
@@ -24,6 +25,7 @@ pub mod lifting;
 pub mod matching;
 mod paper;
 pub mod ransac;
+pub mod row_search;
 pub mod tracking;
 pub mod verified;
 pub mod voting;

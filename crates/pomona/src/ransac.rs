@@ -122,7 +122,7 @@ fn agreeing(transform: &Similarity, source: &[Point3<f64>], target: &[Point3<f64
 }
 
 /// `SplitMix64` (Steele, Lea and Flood, 2014).
-struct SplitMix(u64);
+pub(crate) struct SplitMix(pub u64);
 
 impl SplitMix {
     fn next(&mut self) -> u64 {
@@ -134,12 +134,12 @@ impl SplitMix {
     }
 
     /// A number below `n`; the bias of n / 2^64 is nothing.
-    fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.next()) * n as u128) >> 64) as usize
     }
 
     /// Three different numbers below `n >= 3`.
-    fn three(&mut self, n: usize) -> [usize; 3] {
+    pub(crate) fn three(&mut self, n: usize) -> [usize; 3] {
         loop {
             let [a, b, c] = std::array::from_fn(|_| self.below(n));
             if a != b && b != c && c != a {

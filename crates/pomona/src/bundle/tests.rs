@@ -1,0 +1,217 @@
+//! Adjustments of made-up drives whose truth is known.
+
+use super::*;
+use crate::ransac::SplitMix;
+use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+
+struct Random(SplitMix);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0.below(1 << 53) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Box and Muller.
+    fn normal(&mut self) -> f64 {
+        let (a, b) = (1.0 - self.uniform(), self.uniform());
+        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
+}
+
+const SIGMA_PX: f64 = 0.5;
+
+fn camera() -> StereoCamera {
+    StereoCamera { focal_px: [417.0, 417.0], centre_px: [320.0, 180.0], baseline_m: 0.12 }
+}
+
+/// A camera that looks sideways at a row of points 1 to 3 m away and drives 0.2 m from pose to pose.
+fn drive(random: &mut Random, n_poses: usize) -> State {
+    let poses = (0..n_poses)
+        .map(|i| {
+            let turn = Vector3::from_fn(|_, _| 0.03 * random.normal());
+            Pose::from_parts(Translation3::new(0.2 * i as f64, 0.01 * random.normal(), 0.0), Rotation3::new(turn))
+        })
+        .collect();
+    let points = (0..30 * n_poses)
+        .map(|_| {
+            let x = 0.2 * n_poses as f64 * random.uniform();
+            Point3::new(x, 1.2 * random.uniform() - 0.6, 1.0 + 2.0 * random.uniform())
+        })
+        .collect();
+    State { poses, points }
+}
+
+/// Noisy pictures of all points in view; a share of them wrong.
+fn pictures(random: &mut Random, truth: &State, wrong: f64) -> Vec<Observation> {
+    let camera = camera();
+    let mut all = Vec::new();
+    for (pose, session_from_camera) in truth.poses.iter().enumerate() {
+        for (point, place) in truth.points.iter().enumerate() {
+            let Some((seen, _)) = camera.project(&session_from_camera.inverse_transform_point(place).coords) else {
+                continue;
+            };
+            if !(0.0..640.0).contains(&seen.x) || !(0.0..360.0).contains(&seen.y) {
+                continue;
+            }
+            let spread = if random.uniform() < wrong { 30.0 } else { SIGMA_PX };
+            let measured = Measured::Picture(seen + Vector3::from_fn(|_, _| spread * random.normal()));
+            all.push(Observation { pose, point, measured, whitening: Matrix3::identity() / SIGMA_PX });
+        }
+    }
+    all
+}
+
+/// The truth, moved by `shift` metres and a third of it in radians; fixed poses stay.
+fn disturbed(random: &mut Random, truth: &State, fixed: &[bool], shift: f64) -> State {
+    let mut state = truth.clone();
+    for (pose, _) in state.poses.iter_mut().zip(fixed).filter(|(_, fixed)| !**fixed) {
+        let xi = Vector6::from_fn(|axis, _| random.normal() * if axis < 3 { shift } else { shift / 3.0 });
+        *pose = pose::moved(pose, &xi);
+    }
+    for point in &mut state.points {
+        *point += Vector3::from_fn(|_, _| shift * random.normal());
+    }
+    state
+}
+
+fn pictured_problem(random: &mut Random, truth: &State, wrong: f64) -> Problem {
+    let fixed = (0..truth.poses.len()).map(|pose| pose == 0).collect();
+    Problem { camera: camera(), fixed, observations: pictures(random, truth, wrong), relative_poses: Vec::new() }
+}
+
+fn errors(found: &Pose, truth: &Pose) -> Vector6<f64> {
+    pose::logarithm(&truth.inv_mul(found))
+}
+
+#[test]
+fn a_window_comes_back_among_wrong_matches() {
+    let mut random = Random(SplitMix(1));
+    let truth = drive(&mut random, 8);
+    let problem = pictured_problem(&mut random, &truth, 0.2);
+    let start = disturbed(&mut random, &truth, &problem.fixed, 0.03);
+    let found = adjust(&problem, start, &Settings::default()).expect("a valid problem");
+    assert!(found.costs[1] < found.costs[0], "{:?}", found.costs);
+    for (pose, true_pose) in found.state.poses.iter().zip(&truth.poses) {
+        let error = errors(pose, true_pose);
+        assert!(error.fixed_rows::<3>(0).norm() < 0.005, "{error}");
+        assert!(error.fixed_rows::<3>(3).norm() < 0.003, "{error}");
+    }
+    assert_eq!(found.state.poses[0], truth.poses[0], "the fixed pose stays");
+}
+
+#[test]
+fn covariances_are_those_of_the_errors() {
+    // Mean of e^T I e over drives is 6 where the information is true. 40 drives x 3 pairs scatter by 0.32.
+    let (mut sum, mut n, mut points, mut n_points) = (0.0, 0.0, 0.0, 0.0);
+    for seed in 0..40 {
+        let mut random = Random(SplitMix(seed));
+        let truth = drive(&mut random, 4);
+        let problem = pictured_problem(&mut random, &truth, 0.0);
+        let plain = Settings { picture_scale2: 1e9, ..Settings::default() };
+        let found = adjust(&problem, truth.clone(), &plain).expect("a valid problem");
+        let pairs = [(0, 1), (1, 2), (2, 3)];
+        for ((first, second), information) in pairs.iter().zip(found.relative_information(&pairs)) {
+            let relative = |state: &State| state.poses[*first].inv_mul(&state.poses[*second]);
+            let error = errors(&relative(&found.state), &relative(&truth));
+            sum += error.dot(&(information.expect("neighbours share points") * error));
+            n += 1.0;
+        }
+        let all_fixed = Problem { fixed: vec![true; 4], ..problem };
+        let found = adjust(&all_fixed, truth.clone(), &plain).expect("a valid problem");
+        for ((point, place), covariance) in found.state.points.iter().zip(&truth.points).zip(&found.point_covariances) {
+            if let Some(factor) = covariance.cholesky() {
+                points += (point - place).dot(&factor.solve(&(point - place)));
+                n_points += 1.0;
+            }
+        }
+    }
+    assert!((sum / n - 6.0).abs() < 1.3, "{}", sum / n);
+    assert!(n_points > 1000.0 && (points / n_points - 3.0).abs() < 0.3, "{}", points / n_points);
+}
+
+#[test]
+fn sightings_of_the_same_fruit_close_a_loop() {
+    // Odometry drifts by 2 cm a step there and back; fruits seen again on the way back bring it home.
+    let mut random = Random(SplitMix(3));
+    let (there, n) = (30, 60);
+    let truth: Vec<Pose> =
+        (0..n).map(|i| Pose::translation(0.2 * f64::from(if i < there { i } else { n - 1 - i }), 0.0, 0.0)).collect();
+    let fruits: Vec<Point3<f64>> =
+        (0..90).map(|i| Point3::new(f64::from(i) / 15.0, random.uniform() - 0.5, 1.0 + random.uniform())).collect();
+    let truth = State { poses: truth, points: fruits };
+    let spread = Matrix3::from_diagonal(&Vector3::new(0.004, 0.004, 0.008));
+    let whitening = spread.try_inverse().expect("regular");
+    let mut observations = Vec::new();
+    for (pose, session_from_camera) in truth.poses.iter().enumerate() {
+        for (point, fruit) in truth.points.iter().enumerate() {
+            let place = session_from_camera.inverse_transform_point(fruit).coords;
+            if place.x.abs() < 0.7 {
+                let seen = place + spread * Vector3::from_fn(|_, _| random.normal());
+                observations.push(Observation { pose, point, measured: Measured::Place(seen), whitening });
+            }
+        }
+    }
+    let deviations = Vector6::new(0.02, 0.02, 0.02, 0.005, 0.005, 0.005);
+    let information = Matrix6::from_diagonal(&deviations.map(|sigma| 1.0 / (sigma * sigma)));
+    let mut start = State { poses: vec![truth.poses[0]], points: truth.points.clone() };
+    let mut relative_poses = Vec::new();
+    for second in 1..truth.poses.len() {
+        let noise = deviations.map(|sigma| sigma * random.normal());
+        let first_from_second = pose::moved(&truth.poses[second - 1].inv_mul(&truth.poses[second]), &noise);
+        relative_poses.push(RelativePose { first: second - 1, second, first_from_second, information });
+        start.poses.push(start.poses[second - 1] * first_from_second);
+    }
+    let mut fixed = vec![false; truth.poses.len()];
+    fixed[0] = true;
+    let problem = Problem { camera: camera(), fixed, observations, relative_poses };
+    let drift = errors(start.poses.last().expect("poses"), truth.poses.last().expect("poses"));
+    let found =
+        adjust(&problem, start, &Settings { first_scale: 1e3, ..Settings::default() }).expect("a valid problem");
+    let left = errors(found.state.poses.last().expect("poses"), truth.poses.last().expect("poses"));
+    assert!(drift.norm() > 0.1, "{drift}");
+    // Ten fruits in common turn the last camera to 7 mrad, which is 1 cm at 1.5 m.
+    assert!(left.norm() < 0.03, "{left}");
+}
+
+#[test]
+fn a_picture_is_located_among_many_wrong_matches() {
+    let mut random = Random(SplitMix(7));
+    let truth = drive(&mut random, 1).poses[0];
+    let camera = camera();
+    let mut known = KnownPoints { points: Vec::new(), covariances: Vec::new(), pixels: Vec::new() };
+    for i in 0..200 {
+        let place = Vector3::new(1.4 * random.uniform() - 0.7, random.uniform() - 0.5, 1.0 + 2.0 * random.uniform());
+        let (seen, _) = camera.project(&place).expect("in front");
+        let wrong = if i < 140 { 40.0 } else { SIGMA_PX };
+        known.points.push(truth * Point3::from(place));
+        known.covariances.push(Matrix3::identity() * 1e-6);
+        known.pixels.push(Vector2::new(seen.x + wrong * random.normal(), seen.y + wrong * random.normal()));
+    }
+    let turn = UnitQuaternion::from_euler_angles(0.02, -0.05, 0.03).to_rotation_matrix();
+    let expected = truth * Pose::from_parts(Translation3::new(0.15, -0.05, 0.1), turn);
+    let found =
+        locate(&camera, &known, &expected, &LocateSettings::default()).expect("valid").expect("60 true matches");
+    let error = errors(&found.pose, &truth);
+    assert!(error.norm() < 0.003, "{error}");
+    assert!(found.inliers[140..].iter().filter(|&&agrees| agrees).count() >= 56);
+    assert!(found.inliers[..140].iter().filter(|&&agrees| agrees).count() <= 5);
+    let known = KnownPoints {
+        points: known.points[..3].to_vec(),
+        covariances: known.covariances[..3].to_vec(),
+        pixels: known.pixels[..3].to_vec(),
+    };
+    assert!(locate(&camera, &known, &expected, &LocateSettings::default()).expect("valid").is_none());
+}
+
+#[test]
+fn rows_that_do_not_exist_are_named() {
+    let mut random = Random(SplitMix(1));
+    let truth = drive(&mut random, 2);
+    let mut problem = pictured_problem(&mut random, &truth, 0.0);
+    problem.observations[5].point = 60;
+    let error = adjust(&problem, truth.clone(), &Settings::default()).expect_err("row 60 of 60");
+    assert_eq!(error.to_string(), "setting observations.point: found row 60, expected one below 60");
+    problem.observations[5].point = 0;
+    problem.fixed.pop();
+    assert!(adjust(&problem, truth, &Settings::default()).is_err());
+}

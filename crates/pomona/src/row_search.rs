@@ -1,0 +1,143 @@
+//! Where the right picture of a rectified pair shows a point of the left one: the most similar patch of the same row.
+//!
+//! Similarity is the normalised cross-correlation, which a different exposure of the two cameras does not change. A match
+//! has to be similar, and clearly more so than any other place of the row: leaves repeat.
+
+/// A grey picture, row by row.
+#[derive(Debug, Clone, Copy)]
+pub struct Grey<'a> {
+    /// Pixels, `width` a row.
+    pub pixels: &'a [u8],
+    /// Pixels of a row.
+    pub width: usize,
+}
+
+/// What counts as a match.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowSearch {
+    /// The patch reaches this far from its centre, pixels. 11 x 11 pixels are a quarter of a leaf at 1.5 m with f = 417 px.
+    pub radius_px: usize,
+    /// Least similarity. On foliage 3 of 4 matches above it are right to a pixel.
+    pub min_similarity: f64,
+    /// How much less similar the second best place has to be, that is any more than 2 px from the best one.
+    pub distinct: f64,
+    /// Largest disparity that is looked for, pixels.
+    pub farthest_px: usize,
+}
+
+impl Default for RowSearch {
+    fn default() -> Self {
+        Self { radius_px: 5, min_similarity: 0.6, distinct: 0.02, farthest_px: 128 }
+    }
+}
+
+/// Places that belong to the best one's own peak.
+const PEAK_PX: usize = 2;
+
+/// Whole-pixel disparity of a point (column, row), `None` where nothing is similar enough, two places are nearly alike,
+/// or the patch reaches over the edge.
+pub fn disparity(left: Grey<'_>, right: Grey<'_>, (column, row): (usize, usize), search: &RowSearch) -> Option<usize> {
+    let r = search.radius_px;
+    let height = left.pixels.len() / left.width.max(1);
+    if column < r || row < r || column + r >= left.width || row + r >= height || right.pixels.len() != left.pixels.len()
+    {
+        return None;
+    }
+    let places = (column - r).min(search.farthest_px) + 1;
+    let first = column + 1 - places - r;
+    let similarity = similarities(left, right, (column - r, row - r), first, places, 2 * r + 1)?;
+    let best = (0..places).max_by(|&a, &b| similarity[a].total_cmp(&similarity[b]))?;
+    let apart = |&place: &usize| place.abs_diff(best) > PEAK_PX;
+    let second = (0..places).filter(apart).map(|place| similarity[place]).fold(-1.0, f64::max);
+    let matches = similarity[best] >= search.min_similarity && second <= similarity[best] - search.distinct;
+    matches.then_some(places - 1 - best)
+}
+
+/// Similarity of the patch of the left picture at `corner` with those of the right one in the same rows that begin at the
+/// columns from `first` on. `None` for a patch without contrast.
+fn similarities(
+    left: Grey<'_>,
+    right: Grey<'_>,
+    corner: (usize, usize),
+    first: usize,
+    places: usize,
+    side: usize,
+) -> Option<Vec<f64>> {
+    let (mut products, mut sums, mut squares) = (vec![0_i32; places], vec![0_i32; places], vec![0_i32; places]);
+    let (mut sum, mut square) = (0_i32, 0_i32);
+    for row in corner.1..corner.1 + side {
+        let patch = &left.pixels[row * left.width + corner.0..][..side];
+        let strip = &right.pixels[row * right.width + first..][..places + side - 1];
+        for (offset, &value) in patch.iter().enumerate() {
+            let value = i32::from(value);
+            sum += value;
+            square += value * value;
+            let windows = products.iter_mut().zip(&mut sums).zip(&mut squares);
+            for (((product, sum), square), &other) in windows.zip(&strip[offset..]) {
+                let other = i32::from(other);
+                *product += value * other;
+                *sum += other;
+                *square += other * other;
+            }
+        }
+    }
+    let n = (side * side) as f64;
+    let spread = |sum: i32, square: i32| f64::from(square) - f64::from(sum).powi(2) / n;
+    let own = spread(sum, square);
+    let similarity = |((product, other_sum), other_square): ((&i32, &i32), &i32)| {
+        let other = spread(*other_sum, *other_square);
+        let common = f64::from(*product) - f64::from(sum) * f64::from(*other_sum) / n;
+        if other < 1.0 { -1.0 } else { common / (own * other).sqrt() }
+    };
+    (own >= 1.0).then(|| products.iter().zip(&sums).zip(&squares).map(similarity).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ransac::SplitMix;
+
+    const WIDTH: usize = 160;
+
+    /// Noise, and the same seen with a disparity, darker.
+    fn pair(disparity: usize) -> (Vec<u8>, Vec<u8>) {
+        let mut random = SplitMix(3);
+        let left: Vec<u8> = (0..WIDTH * 40).map(|_| random.below(256) as u8).collect();
+        let right = (0..left.len())
+            .map(|at| if at % WIDTH + disparity < WIDTH { left[at + disparity] / 2 + 20 } else { 0 })
+            .collect();
+        (left, right)
+    }
+
+    fn grey(pixels: &[u8]) -> Grey<'_> {
+        Grey { pixels, width: WIDTH }
+    }
+
+    #[test]
+    fn finds_the_shift_of_a_darker_picture() {
+        for shift in [0, 1, 37] {
+            let (left, right) = pair(shift);
+            let found = disparity(grey(&left), grey(&right), (90, 20), &RowSearch::default());
+            assert_eq!(found, Some(shift));
+        }
+    }
+
+    #[test]
+    fn what_repeats_or_is_too_far_or_has_no_contrast_has_no_disparity() {
+        let search = RowSearch::default();
+        let (left, right) = pair(37);
+        assert_eq!(disparity(grey(&left), grey(&right), (90, 20), &RowSearch { farthest_px: 30, ..search }), None);
+        let stripes: Vec<u8> = (0..WIDTH * 40).map(|at| if at % WIDTH % 16 < 8 { 200 } else { 30 }).collect();
+        assert_eq!(disparity(grey(&stripes), grey(&stripes), (90, 20), &search), None);
+        let grey_only = vec![90; WIDTH * 40];
+        assert_eq!(disparity(grey(&grey_only), grey(&grey_only), (90, 20), &search), None);
+    }
+
+    #[test]
+    fn patches_over_the_edge_have_no_disparity() {
+        let (left, right) = pair(0);
+        for place in [(2, 20), (90, 4), (WIDTH - 1, 20), (90, 36)] {
+            assert_eq!(disparity(grey(&left), grey(&right), place, &RowSearch::default()), None);
+        }
+    }
+}
