@@ -150,7 +150,8 @@ def open_svo2(path: Path, calibration: Path | None = None) -> VideoRecording:
     except PomonaError as error:
         hint = f"; the camera's own is {own.name}, from its maker" if "found none" in str(error) else ""
         raise PomonaError(f"{error}{hint}") from None
-    return VideoRecording(path, "ZED .svo2", optics, video, video)
+    pairs = np.arange(len(video.times_s)).repeat(2).reshape(-1, 2)
+    return VideoRecording(path, "ZED .svo2", optics, video, video, pairs)
 
 
 def _listed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
+from pomona.recording.pairing import half_period, mutually_nearest
 from pomona.recording.rectification import Optics
 from pomona.recording.rig_files import find_optics
 from pomona.recording.video_file import VideoFile
@@ -53,6 +55,8 @@ class VideoRecording:
     ----------
     left, right : Video
         The same when the pictures are side by side.
+    pairs : (F, 2) int64
+        Rows of left and right that make up the frames, ascending.
     """
 
     path: Path
@@ -60,6 +64,7 @@ class VideoRecording:
     optics: Optics
     left: Video
     right: Video
+    pairs: NDArray[np.int64]
 
     trajectory = None
 
@@ -85,24 +90,24 @@ class VideoRecording:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """From 0, in order of time."""
-        return tuple(range(len(self)))
+        """Rows of the left pictures, from 0, in order of time."""
+        return tuple(self.pairs[:, 0].tolist())
 
     def __len__(self) -> int:
-        return len(self.left.times_s)
+        return len(self.pairs)
 
     def frames(self, numbers: Collection[int] | None = None) -> Iterator[Frame]:
         """Decode frame by frame; a frame that cannot be decoded says so when its pictures are asked for."""
         width = self.calibration.width
         left_of, right_of = (slice(0, width), slice(width, 2 * width)) if self.side_by_side else (slice(None),) * 2
-        rows = [row for row, _ in chosen_rows(self.numbers, numbers)]
-        lefts = self.left.pictures(rows)
-        pairs = (
+        rows = self.pairs[[row for row, _ in chosen_rows(self.numbers, numbers)]].reshape(-1, 2).tolist()
+        lefts = self.left.pictures([row for row, _ in rows])
+        both = (
             ((picture, picture) for picture in lefts)
             if self.side_by_side
-            else zip(lefts, self.right.pictures(rows), strict=True)
+            else zip(lefts, self.right.pictures([row for _, row in rows]), strict=True)
         )
-        for row, (left, right) in zip(rows, pairs, strict=True):
+        for (row, _), (left, right) in zip(rows, both, strict=True):
             yield Frame(
                 number=row,
                 time_s=float(self.left.times_s[row]),
@@ -117,7 +122,8 @@ class VideoRecording:
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {"left": len(self), "right": len(self)}
-        return describe(self, self.kind, self.left.times_s.tolist(), counts, detections=False)
+        times_s = self.left.times_s[self.pairs[:, 0]]
+        return describe(self, self.kind, times_s.tolist(), counts, detections=False)
 
 
 def _columns(
@@ -146,7 +152,7 @@ def open_video(path: Path, calibration: Path | None = None) -> VideoRecording:
     Raises
     ------
     PomonaError
-        When PyAV, a video or the calibration is missing, the videos differ in size, length or time, or times go back.
+        When PyAV, a video or the calibration is missing, the videos differ in size or time, or times go back.
     """
     files = (path,) if path.is_file() else left_and_right(path)
     place = path.parent if path.is_file() else path
@@ -158,25 +164,29 @@ def open_video(path: Path, calibration: Path | None = None) -> VideoRecording:
     elif len(files) == 2 and files[0].stem.lower() == "left":
         left, right = (VideoFile.open(file) for file in files)
         size_px = left.size_px
-        _require_pair(left, right)
+        _require_sizes(left, right)
     else:
         raise PomonaError(f"{path}: found {len(files)} videos, expected left and right, or one side by side")
     kind = "side-by-side video" if left is right else "left and right video"
-    return VideoRecording(path, kind, find_optics(place, size_px, stereo=True, given=calibration), left, right)
+    pairs = np.arange(len(left.times_s)).repeat(2).reshape(-1, 2) if left is right else _pairs(left, right)
+    return VideoRecording(path, kind, find_optics(place, size_px, stereo=True, given=calibration), left, right, pairs)
 
 
-def _require_pair(left: VideoFile, right: VideoFile) -> None:
-    where = f"{left.path} and {right.path.name}"
+def _require_sizes(left: VideoFile, right: VideoFile) -> None:
     if left.size_px != right.size_px:
         sizes = " and ".join("{}x{}".format(*video.size_px) for video in (left, right))
-        raise PomonaError(f"{where}: found {sizes} pixels, expected equal sizes")
-    if len(left.times_s) != len(right.times_s):
-        counts = f"{len(left.times_s)} and {len(right.times_s)}"
-        raise PomonaError(f"{where}: found {counts} frames, expected equal lengths")
-    apart_s = np.abs((left.times_s - left.times_s[0]) - (right.times_s - right.times_s[0]))
-    half_s = float(np.median(np.diff(left.times_s))) / 2 if len(left.times_s) > 1 else np.inf
-    row = int(np.argmax(apart_s))
-    if apart_s[row] > half_s:
-        raise PomonaError(
-            f"{where}: frame {row} was taken {apart_s[row]:.3f} s apart, expected under half a frame: {half_s:.3f} s"
-        )
+        raise PomonaError(f"{left.path} and {right.path.name}: found {sizes} pixels, expected equal sizes")
+
+
+def _pairs(left: VideoFile, right: VideoFile) -> NDArray[np.int64]:
+    """Rows (left, right) of pictures that were taken within half a frame; the videos are said to begin together."""
+    where = f"{left.path} and {right.path.name}"
+    left_s, right_s = (video.times_s - video.times_s[0] for video in (left, right))
+    half_s = half_period(left_s)
+    pairs = mutually_nearest(left_s, right_s, half_s)
+    found = f"found {len(left_s)} and {len(right_s)} frames, {len(pairs)} of them taken within half a frame"
+    if 2 * len(pairs) < min(len(left_s), len(right_s)):
+        raise PomonaError(f"{where}: {found}: {half_s:.3f} s, expected two cameras that run together")
+    if len(pairs) < max(len(left_s), len(right_s)):
+        warnings.warn(f"{where}: {found}; the others are left out", PomonaWarning, stacklevel=4)
+    return pairs
