@@ -173,7 +173,11 @@ def write_bag(path: Path, entries: Iterable[Entry], form: str) -> Path:
     if form.startswith("mcap"):
         return _write_mcap(path.with_suffix(".mcap"), entries, compression="lz4" if "lz4" in form else "zstd")
     plugin = rosbag2.StoragePlugin.MCAP if "mcap" in form else rosbag2.StoragePlugin.SQLITE3
-    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
+    writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+    if "zstd" in form:
+        mode = rosbag2.CompressionMode[form.split()[-1].upper()]
+        writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with writer:
         connections = {}
         for topic, logged_ns, kind, fields in entries:
             if topic not in connections:

@@ -525,6 +525,15 @@ def test_what_is_no_bag_is_refused(tmp_path, form):
     refused(bag, "row", "not a")
 
 
+@pytest.mark.parametrize("form", ["sqlite3 zstd message", "sqlite3 zstd file", "ros2 mcap zstd message"])
+def test_what_the_recorder_compressed(tmp_path, form):
+    recording = open_recording(write_bag(tmp_path / "row", stereo(3), form))
+    assert len(recording) == 3
+    for frame in recording.frames():
+        assert np.array_equal(frame.read_left(), picture(frame.number))
+        assert np.array_equal(frame.read_right(), picture(1000 + frame.number))
+
+
 def test_a_split_bag_is_one_recording(tmp_path):
     """The parts of a recorder that was killed: no metadata.yaml, and part 10 after part 9."""
     (tmp_path / "row").mkdir()

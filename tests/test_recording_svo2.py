@@ -201,3 +201,9 @@ def test_what_is_no_svo2_is_refused(row, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(PomonaError, match=r"pomona\[video\]"):
         open_recording(row / "row.svo2")
+
+
+def test_an_svo_of_before_is_refused(row):
+    (row / "row.svo").write_bytes(b"SVO")
+    with pytest.raises(PomonaError, match=r"row\.svo: only its maker can read an \.svo: convert it to \.svo2"):
+        open_recording(row / "row.svo")

@@ -53,6 +53,8 @@ def open_recording(
             from pomona.recording.svo2 import open_svo2
 
             return open_svo2(place, given)
+        if place.suffix.lower() == ".svo":
+            raise PomonaError(f"{path}: only its maker can read an .svo: convert it to .svo2 with ZED_SVO_Editor")
         if place.suffix.lower() not in VIDEO_SUFFIXES:
             raise PomonaError(f"{path}: found a file, expected {ACCEPTED}")
         return open_video(place, given)

@@ -33,7 +33,8 @@ def open_messages(path: Path) -> MessageFile:
 
     parts = (path,) if path.is_file() else _parts(path)
     described = path.is_dir() and (path / "metadata.yaml").is_file()
-    if described and not any(part.suffix == ".mcap" or is_cut_off(part) for part in parts):
+    own = all(part.suffix == ".db3" and not is_cut_off(part) for part in parts)
+    if described and (own or _is_compressed(path / "metadata.yaml")):
         return _ros_bag(path, tuple(sorted(path.iterdir())))
     opened = tuple(map(_open_part, parts))
     return opened[0] if path.is_file() else JoinedBags(path, opened)
@@ -68,6 +69,12 @@ def _open_part(file: Path) -> MessageFile:
     if file.suffix == ".active" or (file.suffix == ".bag" and has_no_index(file)):
         return Ros1Rest.open(file)
     return _ros_bag(file, (file,))
+
+
+def _is_compressed(metadata: Path) -> bool:
+    """Whether the recorder compressed each message or file by itself; chunks of MCAP are another matter."""
+    mode = re.search(r"^\s*compression_mode:\s*[\"']?(\w+)", metadata.read_text(encoding="utf-8"), re.MULTILINE)
+    return mode is not None and mode[1].lower() in ("message", "file")
 
 
 def _ros_bag(path: Path, files: tuple[Path, ...]) -> MessageFile:
