@@ -22,6 +22,7 @@ def info(
     topics: str | None = typer.Option(
         None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
     ),
+    poses: Path | None = typer.Option(None, metavar="FILE", help="Poses of the left camera: TUM or KITTI text."),
     check: bool = typer.Option(
         False,
         "--check",
@@ -37,7 +38,7 @@ def info(
     from pomona.recording.bags.topics import parsed_topics
 
     opened = open_recording(
-        recording, calibration=calibration, topics=None if topics is None else parsed_topics(topics)
+        recording, calibration=calibration, topics=None if topics is None else parsed_topics(topics), poses=poses
     )
     found = opened.description()
     faults = _checked(opened) if check else None

@@ -35,6 +35,9 @@ def scan(
     calibration: Path | None = typer.Option(
         None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
     ),
+    poses: Path | None = typer.Option(
+        None, metavar="FILE", help="Poses of the left camera, TUM or KITTI text, instead of those recorded."
+    ),
     topics: str | None = typer.Option(
         None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
     ),
@@ -72,7 +75,7 @@ def scan(
     _require_date(date)
     overrides = Settings.load(config, {}).overrides
     chosen = None if topics is None else parsed_topics(topics)
-    whole = open_recording(recording, calibration=calibration, topics=chosen)
+    whole = open_recording(recording, calibration=calibration, topics=chosen, poses=poses)
     _require_drawable(whole, preview)
     detector = open_detector(
         detections, model, whole, family=family, min_score=min_score, classes=_classes(classes), tiles=tiles

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
@@ -80,6 +81,11 @@ class FolderRecording:
     def calibration(self) -> Calibration:
         """The rectified left camera."""
         return self.optics.calibration
+
+    @property
+    def times_s(self) -> NDArray[np.float64] | None:
+        """Those of the poses."""
+        return None if self.trajectory is None else self.trajectory.times_s
 
     def __len__(self) -> int:
         return len(self.numbers)

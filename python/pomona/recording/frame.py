@@ -74,6 +74,10 @@ class Recording(Protocol):
     def numbers(self) -> tuple[int, ...]:
         """Frame numbers in order of time."""
 
+    @property
+    def times_s(self) -> NDArray[np.float64] | None:
+        """Time of each frame, ascending, None where nobody noted it."""
+
     def __len__(self) -> int:
         """Count the frames."""
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.recording.listed import ListedRecording
 from pomona.recording.pictures import numbered_pictures
+from pomona.recording.poses import read_kitti
 from pomona.recording.rectification import Optics, rectified
 from pomona.recording.rectified_pictures import size_of_first
 from pomona.recording.rig import Camera, Rig
@@ -95,15 +96,9 @@ def _poses(path: Path, left: NDArray[np.float64], n_frames: int) -> NDArray[np.f
     """Poses of the left camera; those of the file are of camera 0, beside which the projection says where left is."""
     if not path.is_file():
         return None
-    lines = [line for line in _text(path).splitlines() if line.strip()]
-    if len(lines) != n_frames:
-        raise PomonaError(f"{path}: found {len(lines)} poses, expected one for each of the {n_frames} frames")
-    poses = np.tile(np.eye(4), (n_frames, 1, 1))
-    for row, line in enumerate(lines):
-        poses[row, :3] = _numbers(path, f"line {row + 1}", line, 12).reshape(3, 4)
-    rotations = poses[:, :3, :3]
-    if len(poses) and np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max() > 1e-2:
-        raise PomonaError(f"{path}: found a pose that does not turn but stretch, expected 3x4 rotation and position")
+    poses = read_kitti(path)
+    if len(poses) != n_frames:
+        raise PomonaError(f"{path}: found {len(poses)} poses, expected one for each of the {n_frames} frames")
     camera0_from_left = np.eye(4)
     camera0_from_left[:3, 3] = -np.linalg.solve(left[:, :3], left[:, 3])
     return np.asarray(poses @ camera0_from_left)

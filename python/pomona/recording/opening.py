@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pomona.errors import PomonaError
 from pomona.recording.frame import Recording
+
+if TYPE_CHECKING:
+    from pomona.recording.posed import RectifiedRecording
 
 __all__ = ["ACCEPTED", "open_recording"]
 
@@ -19,7 +23,11 @@ ACCEPTED = (
 
 
 def open_recording(
-    path: str | Path, *, calibration: str | Path | None = None, topics: Mapping[str, str] | None = None
+    path: str | Path,
+    *,
+    calibration: str | Path | None = None,
+    topics: Mapping[str, str] | None = None,
+    poses: str | Path | None = None,
 ) -> Recording:
     """Open a recording and check what can be checked without decoding it.
 
@@ -32,6 +40,8 @@ def open_recording(
     topics : mapping, optional
         Of a bag: the topic of `left`, `right`, `depth`, `left_info`, `right_info`, `depth_info` or `poses`, where it is
         not found by its name.
+    poses : str or Path, optional
+        TUM or KITTI text to take the poses of the left camera from, instead of those of the recording.
 
     Raises
     ------
@@ -39,29 +49,38 @@ def open_recording(
         When there is no recording at `path`, or it is not complete.
     """
     place, given = Path(path), None if calibration is None else Path(calibration)
+    recording = _open(place, given, topics)
+    if poses is None:
+        return recording
+    from pomona.recording.posed import with_poses
+
+    return with_poses(recording, Path(poses))
+
+
+def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> RectifiedRecording:
     if not place.exists():
-        raise PomonaError(f"{path}: not found, expected {ACCEPTED}")
+        raise PomonaError(f"{place}: not found, expected {ACCEPTED}")
     from pomona.recording import bags
     from pomona.recording.video import VIDEO_SUFFIXES, left_and_right, open_video
 
     if bags.recognises(place):
         return bags.open_bag(place, given, topics)
     if topics:
-        raise PomonaError(f"{path}: topics: found no bag, expected one for --topics")
+        raise PomonaError(f"{place}: topics: found no bag, expected one for --topics")
     if not place.is_dir():
         if place.suffix.lower() == ".svo2":
             from pomona.recording.svo2 import open_svo2
 
             return open_svo2(place, given)
         if place.suffix.lower() == ".svo":
-            raise PomonaError(f"{path}: only its maker can read an .svo: convert it to .svo2 with ZED_SVO_Editor")
+            raise PomonaError(f"{place}: only its maker can read an .svo: convert it to .svo2 with ZED_SVO_Editor")
         if place.suffix.lower() not in VIDEO_SUFFIXES:
-            raise PomonaError(f"{path}: found a file, expected {ACCEPTED}")
+            raise PomonaError(f"{place}: found a file, expected {ACCEPTED}")
         return open_video(place, given)
     return _open_layout(place, given) or (open_video(place, given) if left_and_right(place) else _refuse(place))
 
 
-def _open_layout(folder: Path, calibration: Path | None) -> Recording | None:
+def _open_layout(folder: Path, calibration: Path | None) -> RectifiedRecording | None:
     """Open a folder of pictures, None where it is none."""
     from pomona.recording import euroc, kitti, tum_rgbd
     from pomona.recording.folder import FolderRecording
@@ -77,7 +96,7 @@ def _open_layout(folder: Path, calibration: Path | None) -> Recording | None:
     return None
 
 
-def _refuse(folder: Path) -> Recording:
+def _refuse(folder: Path) -> RectifiedRecording:
     inside = sorted(entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if not entry.name.startswith("."))
     found = ", ".join(inside[:5]) + (" ..." if len(inside) > 5 else "") or "nothing"
     raise PomonaError(f"{folder}: no pictures found: found {found}, expected {ACCEPTED}")

@@ -1,4 +1,4 @@
-"""Camera poses as TUM text: `time tx ty tz qx qy qz qw`, one line a frame."""
+"""Camera poses as text: TUM's `time tx ty tz qx qy qz qw`, or KITTI's 3x4 matrices; one line a pose."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["read_tum", "transforms"]
+__all__ = ["is_kitti", "read_kitti", "read_tum", "transforms"]
 
 UNIT_TOLERANCE = 1e-2
 """Quaternions are written with few digits; one that is 1 % off unit length is something else."""
@@ -33,6 +33,33 @@ def read_tum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return table[:, 0], transforms(table[:, 4:], table[:, 1:4])
 
 
+def read_kitti(path: Path) -> NDArray[np.float64]:
+    """Read (F, 4, 4) poses of 12 numbers a line, row by row.
+
+    Raises
+    ------
+    PomonaError
+        When a line has other numbers, or a pose stretches.
+    """
+    poses = [np.eye(4)[:0]]
+    for number, line in _lines(path):
+        cells = _cells(path, number, line)
+        if len(cells) != 12:
+            raise PomonaError(f"{path}: line {number}: found {len(cells)} numbers, expected 12 finite ones")
+        poses.append(np.vstack([np.reshape(cells, (3, 4)), [0.0, 0.0, 0.0, 1.0]]))
+    matrices = np.concatenate(poses).reshape(-1, 4, 4)
+    rotations = matrices[:, :3, :3]
+    if len(matrices) and np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max() > UNIT_TOLERANCE:
+        raise PomonaError(f"{path}: found a pose that does not turn but stretch, expected 3x4 rotation and position")
+    return matrices
+
+
+def is_kitti(path: Path) -> bool:
+    """Whether the first line has the 12 numbers of a matrix."""
+    first = next((line for _, line in _lines(path)), "")
+    return len(first.split()) == 12
+
+
 def transforms(quaternions: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rigid transforms (F, 4, 4) of (F, 4) quaternions x, y, z, w and (F, 3) positions."""
     poses = np.tile(np.eye(4), (len(positions), 1, 1))
@@ -45,24 +72,31 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise PomonaError(f"{path}: not text, expected lines of time tx ty tz qx qy qz qw") from None
+        raise PomonaError(f"{path}: not text, expected lines of poses: TUM or KITTI") from None
+    except OSError as error:
+        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
     numbered = ((number, line.partition("#")[0].strip()) for number, line in enumerate(text.splitlines(), start=1))
     return [(number, line) for number, line in numbered if line]
 
 
 def _row(path: Path, number: int, line: str) -> list[float]:
-    try:
-        row = [float(cell) for cell in line.split()]
-    except ValueError as error:
-        raise PomonaError(f"{path}: line {number}: {error}") from None
+    row = _cells(path, number, line)
     if len(row) != 8:
         raise PomonaError(f"{path}: line {number}: found {len(row)} numbers, expected time tx ty tz qx qy qz qw")
-    if not np.isfinite(row).all():
-        raise PomonaError(f"{path}: line {number}: found NaN or infinity, expected finite numbers")
     length = float(np.linalg.norm(row[4:]))
     if abs(length - 1.0) > UNIT_TOLERANCE:
         raise PomonaError(f"{path}: line {number}: found a quaternion of length {length:.3g}, expected 1")
     return row
+
+
+def _cells(path: Path, number: int, line: str) -> list[float]:
+    try:
+        cells = [float(cell) for cell in line.split()]
+    except ValueError as error:
+        raise PomonaError(f"{path}: line {number}: {error}") from None
+    if not np.isfinite(cells).all():
+        raise PomonaError(f"{path}: line {number}: found NaN or infinity, expected finite numbers")
+    return cells
 
 
 def _rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

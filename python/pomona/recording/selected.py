@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
@@ -63,6 +64,12 @@ class SelectedRecording:
             return None
         rows = np.isin(whole.frames, self.numbers)
         return Trajectory(whole.frames[rows], whole.times_s[rows], whole.session_from_camera[rows])
+
+    @property
+    def times_s(self) -> NDArray[np.float64] | None:
+        """Times of the frames that are left."""
+        times_s = self.whole.times_s
+        return None if times_s is None else times_s[np.isin(self.whole.numbers, self.numbers)]
 
     def __len__(self) -> int:
         return len(self.numbers)

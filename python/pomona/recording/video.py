@@ -93,6 +93,11 @@ class VideoRecording:
         """Rows of the left pictures, from 0, in order of time."""
         return tuple(self.pairs[:, 0].tolist())
 
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Time of each frame's left picture."""
+        return self.left.times_s[self.pairs[:, 0]]
+
     def __len__(self) -> int:
         return len(self.pairs)
 
@@ -122,8 +127,7 @@ class VideoRecording:
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {"left": len(self), "right": len(self)}
-        times_s = self.left.times_s[self.pairs[:, 0]]
-        return describe(self, self.kind, times_s.tolist(), counts, detections=False)
+        return describe(self, self.kind, self.times_s.tolist(), counts, detections=False)
 
 
 def _columns(

@@ -1,0 +1,117 @@
+"""Poses of a file of their own: TUM by time, KITTI line by line, for any kind of recording."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from bag_maker import START_NS, stereo, write_bag
+from pomona import PomonaError, PomonaWarning
+from pomona.recording import open_recording, selected
+from recording_maker import make_recording
+from test_recording_video import write_calibration, write_video
+
+
+def pose(at_s):
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_rotvec([0, 0.1 * at_s, 0]).as_matrix()
+    matrix[:3, 3] = (at_s, 0.2 * at_s, 0)
+    return matrix
+
+
+def write_tum(path, times_s, start_s=0.0):
+    lines = []
+    for at_s in times_s:
+        numbers = [start_s + at_s, *pose(at_s)[:3, 3], *Rotation.from_matrix(pose(at_s)[:3, :3]).as_quat()]
+        lines.append(" ".join(f"{number:.9f}" for number in numbers))
+    path.write_text("# time tx ty tz qx qy qz qw\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def write_kitti(path, times_s):
+    lines = [" ".join(f"{number:.9e}" for number in pose(at_s)[:3].ravel()) for at_s in times_s]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def video(tmp_path):
+    """Twelve frames, ten a second from 0."""
+    write_calibration(tmp_path)
+    return write_video(tmp_path / "row.mkv")
+
+
+def assert_poses(recording, numbers):
+    assert recording.numbers == tuple(numbers)
+    frames = list(recording.frames())
+    assert [frame.number for frame in frames] == list(numbers)
+    for frame in frames:
+        np.testing.assert_allclose(frame.session_from_camera, pose(frame.number / 10), atol=1e-6)
+        assert frame.read_left().mean() == pytest.approx(10 * frame.number, abs=3)
+    assert recording.trajectory.frames.tolist() == list(numbers)
+    assert len(recording) == recording.description()["frames"] == recording.description()["pictures"]["left"]
+
+
+def test_tum_poses_are_interpolated_at_the_times_of_the_pictures(pomona, video, tmp_path):
+    poses = write_tum(tmp_path / "poses.txt", np.arange(-0.03, 1.3, 0.05))
+    recording = open_recording(video, poses=poses)
+    assert_poses(recording, range(12))
+    assert poses in list(recording.inputs())
+    code, printed, errors = pomona("info", video, "--poses", poses, "--check")
+    assert code == 0, errors
+    assert "poses          yes" in printed
+
+
+def test_frames_without_a_pose_are_left_out_and_told(video, tmp_path):
+    poses = write_tum(tmp_path / "poses.txt", np.arange(0.28, 0.85, 0.05))
+    with pytest.warns(PomonaWarning, match=r"poses\.txt: 6 of 12 frames have no pose within 0.1 s"):
+        recording = open_recording(video, poses=poses)
+    assert_poses(recording, range(3, 9))
+    assert [frame.number for frame in selected(recording, every=2).frames()] == [3, 5, 7]
+    assert [frame.number for frame in recording.frames([1, 4])] == [4]
+
+
+def test_kitti_poses_are_one_a_frame(video, tmp_path):
+    assert_poses(open_recording(video, poses=write_kitti(tmp_path / "poses.txt", np.arange(12) / 10)), range(12))
+    with pytest.raises(PomonaError, match="found 11 poses, expected one for each of the 12 frames"):
+        open_recording(video, poses=write_kitti(tmp_path / "poses.txt", np.arange(11) / 10))
+
+
+def test_another_clock_with_one_pose_a_frame_is_taken_in_order(video, tmp_path):
+    poses = write_tum(tmp_path / "poses.txt", np.arange(12) / 10, start_s=1e6)
+    with pytest.warns(PomonaWarning, match="no pose at the time of any picture: taken one for each frame, in order"):
+        recording = open_recording(video, poses=poses)
+    assert_poses(recording, range(12))
+    with pytest.raises(PomonaError, match="found no pose at the time of any picture, expected the same clock"):
+        open_recording(video, poses=write_tum(tmp_path / "poses.txt", np.arange(11) / 10, start_s=1e6))
+
+
+def test_a_bag_and_a_folder_take_poses(tmp_path):
+    bag = write_bag(tmp_path / "row", stereo(4), "mcap")
+    poses = write_tum(tmp_path / "poses.txt", np.arange(-0.05, 0.5, 0.02), start_s=START_NS / 1e9)
+    for frame in open_recording(bag, poses=poses).frames():
+        np.testing.assert_allclose(frame.session_from_camera, pose(frame.number / 10), atol=1e-6)
+    folder = make_recording(tmp_path / "folder", (0.0, 0.1), poses=False)
+    recording = open_recording(folder, poses=write_tum(tmp_path / "poses.txt", [5.0, 6.0]))
+    assert recording.times_s.tolist() == [5.0, 6.0]
+    assert recording.trajectory.session_from_camera[:, 0, 3].tolist() == [5.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("1 2 3\n", ["line 1: found 3 numbers, expected time tx ty tz qx qy qz qw"]),
+        ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0\n", ["line 2: found 3 numbers, expected 12"]),
+        ("2 0 0 0 0 1 0 0 0 0 1 0\n", ["a pose that does not turn but stretch"]),
+        ("", ["found no pose at the time of any picture"]),
+    ],
+)
+def test_what_holds_no_poses_is_refused(video, tmp_path, text, parts):
+    (tmp_path / "poses.txt").write_text(text)
+    with pytest.raises(PomonaError) as caught:
+        open_recording(video, poses=tmp_path / "poses.txt")
+    assert all(part in str(caught.value) for part in ["poses.txt", *parts])
+
+
+def test_poses_that_are_not_there(video, tmp_path):
+    with pytest.raises(PomonaError, match=r"none\.txt: cannot be read"):
+        open_recording(video, poses=tmp_path / "none.txt")
