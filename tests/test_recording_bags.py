@@ -208,6 +208,25 @@ def test_pairs_are_found_by_their_names(tmp_path, left, right):
     assert recording.roles.right == f"{right}/image_rect_color"
 
 
+def test_of_all_that_realsense_publishes_aligned_colour_is_taken(tmp_path):
+    """Somebody who switched the alignment on wants the colour; without it the infrared pair has its own depth."""
+    depth = picture(1, channels=1, dtype=np.uint16)
+    infrared = stereo(1, left="/camera/infra1", right="/camera/infra2")
+    plain = [
+        info("/camera/depth/camera_info", START_NS),
+        image("/camera/depth/image_rect_raw", START_NS, depth, "16UC1"),
+    ]
+    bag = write_bag(tmp_path / "aligned", infrared + plain + rgbd([depth]), "mcap")
+    assert open_recording(bag).roles.pictures == {
+        "left": "/camera/color/image_raw",
+        "depth": "/camera/aligned_depth_to_color/image_raw",
+    }
+    colour = [entry for entry in rgbd([depth]) if "aligned" not in entry[0]]
+    recording = open_recording(write_bag(tmp_path / "plain", infrared + plain + colour, "mcap"))
+    assert recording.roles.left == "/camera/infra1/image_rect_color"
+    assert recording.roles.depth == "/camera/depth/image_rect_raw"
+
+
 def test_rectified_colour_is_taken_before_raw(tmp_path):
     entries = stereo(2)
     for side in ("left", "right"):

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.recording.calibration import Calibration
 from pomona.recording.frame import Frame, Recording
+from pomona.recording.part import PartOfRecording
 from pomona.recording.poses import is_kitti, read_kitti, read_tum
 from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectification import Optics
@@ -31,42 +31,19 @@ class RectifiedRecording(Recording, Protocol):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class PosedRecording:
+class PosedRecording(PartOfRecording):
     """The frames of a recording that have a pose; see `Recording` for what it gives.
 
     Attributes
     ----------
-    whole : Recording
-        Of any kind.
     trajectory : Trajectory
         Of the frames that are left.
     source : Path
         The file of the poses.
     """
 
-    whole: Recording
     trajectory: Trajectory
     source: Path
-
-    @property
-    def path(self) -> Path:
-        """Where it came from."""
-        return self.whole.path
-
-    @property
-    def name(self) -> str:
-        """Name of the recording."""
-        return self.whole.name
-
-    @property
-    def date(self) -> str | None:
-        """Date of the recording."""
-        return self.whole.date
-
-    @property
-    def calibration(self) -> Calibration:
-        """The rectified left camera."""
-        return self.whole.calibration
 
     @property
     def numbers(self) -> tuple[int, ...]:

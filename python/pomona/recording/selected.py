@@ -11,50 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.recording.calibration import Calibration
 from pomona.recording.frame import Frame, Recording
+from pomona.recording.part import PartOfRecording
 from pomona.trajectory import Trajectory
 
 __all__ = ["SelectedRecording", "selected"]
 
 
 @dataclass(frozen=True, eq=False)
-class SelectedRecording:
+class SelectedRecording(PartOfRecording):
     """Some frames of a recording; see `Recording` for what it gives.
 
     Attributes
     ----------
-    whole : Recording
-        Of any kind.
     numbers : tuple of int
         Frame numbers that are left, those of the whole recording.
     every : int
         One of so many frames was taken.
     """
 
-    whole: Recording
     numbers: tuple[int, ...]
     every: int
-
-    @property
-    def path(self) -> Path:
-        """Where it came from."""
-        return self.whole.path
-
-    @property
-    def name(self) -> str:
-        """Name of the whole."""
-        return self.whole.name
-
-    @property
-    def date(self) -> str | None:
-        """Date of the whole."""
-        return self.whole.date
-
-    @property
-    def calibration(self) -> Calibration:
-        """The rectified left camera."""
-        return self.whole.calibration
 
     @property
     def trajectory(self) -> Trajectory | None:

@@ -109,8 +109,9 @@ def image_topics(topics: Mapping[str, Topic]) -> list[str]:
 
 def _found(path: Path, names: list[str]) -> dict[str, str]:
     depths = [name for name in names if DEPTH.search(name)]
-    colours = [name for name in names if COLOUR.search(name) and name not in depths]
     pairs = _pairs([name for name in names if name not in depths])
+    paired = {name for pair in pairs for name in pair[1:]}
+    colours = [name for name in names if COLOUR.search(name) and name not in paired and name not in depths]
     aligned = [name for name in depths if ALIGNED.search(name)]
     cameras = {pair[0]: pair for pair in pairs}
     if len(cameras) == 1 and not (any("infra" in name for name in pairs[0][1:]) and aligned and colours):

@@ -1,0 +1,44 @@
+"""What a part of a recording has from the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pomona.recording.calibration import Calibration
+from pomona.recording.frame import Recording
+
+__all__ = ["PartOfRecording"]
+
+
+@dataclass(frozen=True, eq=False)
+class PartOfRecording:
+    """Some frames of a recording; who derives from it says which.
+
+    Attributes
+    ----------
+    whole : Recording
+        Of any kind.
+    """
+
+    whole: Recording
+
+    @property
+    def path(self) -> Path:
+        """Where it came from."""
+        return self.whole.path
+
+    @property
+    def name(self) -> str:
+        """Name of the whole."""
+        return self.whole.name
+
+    @property
+    def date(self) -> str | None:
+        """Date of the whole."""
+        return self.whole.date
+
+    @property
+    def calibration(self) -> Calibration:
+        """The rectified left camera."""
+        return self.whole.calibration
