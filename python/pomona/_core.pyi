@@ -17,6 +17,7 @@ __all__ = [
     "lift",
     "locate",
     "one_fruit_each",
+    "read_pair",
     "search_rows",
 ]
 
@@ -148,6 +149,7 @@ def one_fruit_each(
     place_sigma_m: float,
     config: str,
 ) -> NDArray[np.int64]: ...
+
 class _Seen(TypedDict):
     poses: NDArray[np.int64]
     points: NDArray[np.int64]
@@ -174,9 +176,7 @@ def adjust(
     wanted: list[tuple[int, int]],
     max_steps: int | None,
     first_scale: float | None,
-) -> tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]: ...
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def locate(
     camera: _StereoCamera,
     known: NDArray[np.float64],
@@ -200,6 +200,15 @@ def fuse_diameters(
 def lift(
     depth_m: NDArray[np.float32],
     boxes_px: NDArray[np.float64],
-    depth_sigma_per_m2: NDArray[np.float64],
+    sources: NDArray[np.float64],
     camera: _Camera,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def read_pair(
+    left: NDArray[np.uint8],
+    right: NDArray[np.uint8],
+    boxes_px: NDArray[np.float64],
+    camera: _Camera,
+    *,
+    focal_baseline_px_m: float,
+    nearest_m: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...

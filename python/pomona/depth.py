@@ -17,7 +17,7 @@ from pomona import _core
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 
-__all__ = ["Lifted", "Refusal", "lift"]
+__all__ = ["FruitDepth", "Lifted", "Refusal", "lift"]
 
 Array = NDArray[np.float64]
 
@@ -27,11 +27,34 @@ class Refusal(StrEnum):
 
     CUT = "cut by the edge of the picture"
     NO_DEPTH = "no depth in the box"
+    UNMATCHED = "no sure match in the right picture"
 
 
 _LIFTED = 0
-_REFUSED = {1: Refusal.CUT, 2: Refusal.NO_DEPTH}
+_REFUSED = {1: Refusal.CUT, 2: Refusal.NO_DEPTH, 3: Refusal.UNMATCHED}
 """Outcomes as the core numbers them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FruitDepth:
+    """What a stereo pair says of the depth at boxes.
+
+    Attributes
+    ----------
+    depth_m : (H, W) float32
+        Depth along the optical axis of the left camera, 0 where nothing was measured.
+    disparity_sigma_px : (D,) float64
+        Standard deviation of the disparity of the fruit in each box, NaN where it was not matched.
+    disparity_px : (D,) float64 or None
+        Disparity of the fruit's centre, NaN where it was not matched; None where the pixels of `depth_m` vote for it.
+    support : (D,) float64 or None
+        Part of the fruit's outline that looks alike in both pictures; None where pixels vote.
+    """
+
+    depth_m: NDArray[np.float32]
+    disparity_sigma_px: Array
+    disparity_px: Array | None = None
+    support: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +93,7 @@ class Lifted:
 
 
 def lift(
-    depth_m: NDArray[np.float32],
+    depth: NDArray[np.float32] | FruitDepth,
     boxes_px: Array,
     calibration: Calibration,
     *,
@@ -80,30 +103,32 @@ def lift(
 
     Parameters
     ----------
-    depth_m : (H, W) float32
-        Depth along the optical axis, metres, 0 where nothing was measured.
+    depth : (H, W) float32, or FruitDepth
+        Depth along the optical axis, metres, 0 where nothing was measured; or what a stereo pair gave for these boxes.
     boxes_px : (D, 4) float64
         xmin, ymin, xmax, ymax; origin at the top left corner of the top left pixel. What is outside is cut.
     calibration : Calibration
         The camera of the depth picture.
     disparity_sigma_px : float or (D,) float64, optional
-        For depth that a stereo pair gave: standard deviation of a fruit's disparity, in pixels. It makes the centre
-        uncertain along its ray by Z^2 / (f B) of it. Needs the baseline of `calibration`.
+        For a depth picture of a stereo pair: standard deviation of a fruit's disparity, in pixels. It makes the centre
+        uncertain along its ray by Z^2 / (f B) of it. A `FruitDepth` brings its own.
 
     Raises
     ------
     PomonaError
-        When the picture has another size than the calibration, or `disparity_sigma_px` is given and the calibration
-        has no baseline.
+        When the picture has another size than the calibration, or depth is stereo and the calibration has no baseline.
     """
-    if depth_m.shape != (calibration.height, calibration.width):
-        found = " x ".join(str(side) for side in reversed(depth_m.shape))
-        raise PomonaError(f"depth: found {found} pixels, expected {calibration.width} x {calibration.height}")
-    boxes_px = np.asarray(boxes_px, np.float64).reshape(-1, 4)
+    found = depth
+    if not isinstance(found, FruitDepth):
+        sigma_px = 0.0 if disparity_sigma_px is None else disparity_sigma_px
+        found = FruitDepth(found, np.broadcast_to(np.asarray(sigma_px, np.float64), len(boxes_px)))
+    if found.depth_m.shape != (calibration.height, calibration.width):
+        size = " x ".join(str(side) for side in reversed(found.depth_m.shape))
+        raise PomonaError(f"depth: found {size} pixels, expected {calibration.width} x {calibration.height}")
     outcome, centres, covariances, numbers = _core.lift(
-        np.ascontiguousarray(depth_m, np.float32),
-        boxes_px,
-        _depth_sigma_per_m2(calibration, disparity_sigma_px, len(boxes_px)),
+        np.ascontiguousarray(found.depth_m, np.float32),
+        np.asarray(boxes_px, np.float64).reshape(-1, 4),
+        _sources(found, calibration),
         calibration,
     )
     diameters_m, diameter_sigmas_m, hidden, support = np.ascontiguousarray(numbers.T)
@@ -119,11 +144,16 @@ def lift(
     )
 
 
-def _depth_sigma_per_m2(calibration: Calibration, disparity_sigma_px: float | Array | None, count: int) -> Array:
-    """Give sigma_Z / Z^2 of each box, 0 where depth is no stereo depth."""
-    if disparity_sigma_px is None:
-        return np.zeros(count)
-    if calibration.baseline_m is None:
-        raise PomonaError("baseline_m: found none, expected one where depth has a disparity_sigma_px")
-    sigmas_px = np.broadcast_to(np.asarray(disparity_sigma_px, np.float64), count)
-    return np.ascontiguousarray(sigmas_px / (calibration.fx * calibration.baseline_m))
+def _sources(found: FruitDepth, calibration: Calibration) -> Array:
+    """Give sigma_Z / Z^2, depth of the centre and support of each box; a depth of NaN leaves it to votes."""
+    sigmas_px = found.disparity_sigma_px
+    if not np.any(sigmas_px) and found.disparity_px is None:
+        focal_baseline_px_m = 1.0
+    elif calibration.baseline_m is None:
+        raise PomonaError("baseline_m: found none, expected one where depth is of a stereo pair")
+    else:
+        focal_baseline_px_m = calibration.fx * calibration.baseline_m
+    absent = np.full(len(sigmas_px), np.nan)
+    depth_m = absent if found.disparity_px is None else focal_baseline_px_m / found.disparity_px
+    support = absent if found.support is None else found.support
+    return np.stack([sigmas_px / focal_baseline_px_m, depth_m, support], axis=1)

@@ -7,6 +7,7 @@ mod descriptor;
 mod lifting;
 mod matching;
 mod row_search;
+mod stereo;
 mod tracking;
 
 use pyo3::prelude::*;
@@ -26,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::locate, module)?)?;
     module.add_function(wrap_pyfunction!(row_search::search_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(stereo::read_pair, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     Ok(())
 }

@@ -8,7 +8,7 @@ use numpy::{
 };
 use pomona::camera::DepthPicture;
 use pomona::lifting::fusion::{self, MeasuredCentre, MeasuredDiameter};
-use pomona::lifting::{self, Refusal, Sighting};
+use pomona::lifting::{self, Refusal, Sighting, Source};
 use pomona::nalgebra::Matrix3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,15 +17,18 @@ use pyo3::prelude::*;
 type Lifted<'py> =
     (Bound<'py, PyArray1<u8>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// Lifts boxes. Gives the outcome of each box (0 lifted, 1 cut, 2 without depth), and of those lifted the centres (M, 3),
-/// covariances (M, 3, 3) and (M, 4) diameter, its sigma, hidden part, support.
+/// Lifts boxes. Gives the outcome of each box (0 lifted, 1 cut, 2 without depth, 3 unmatched), and of those lifted the
+/// centres (M, 3), covariances (M, 3, 3) and (M, 4) diameter, its sigma, hidden part, support.
+///
+/// `sources` (D, 3) are `sigma_d / (f B)`, depth of the centre and support of each box: without the depth, pixels vote;
+/// without any, the box is unmatched.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn lift<'py>(
     py: Python<'py>,
     depth_m: PyReadonlyArray2<'py, f32>,
     boxes_px: PyReadonlyArray2<'py, f64>,
-    depth_sigma_per_m2: PyReadonlyArray1<'py, f64>,
+    sources: PyReadonlyArray2<'py, f64>,
     camera: Fields,
 ) -> PyResult<Lifted<'py>> {
     let camera = camera.to_camera();
@@ -33,11 +36,12 @@ pub fn lift<'py>(
         return Err(PyValueError::new_err("depth_m: expected the size of the camera's pictures"));
     }
     let boxes = boxes(&boxes_px)?;
-    if depth_sigma_per_m2.len() != boxes.len() {
-        return Err(PyValueError::new_err("depth_sigma_per_m2: expected one per box"));
+    if sources.shape() != [boxes.len(), 3] {
+        return Err(PyValueError::new_err("sources: expected three numbers per box"));
     }
-    let (depth, sigmas) = (depth_m.as_slice()?, depth_sigma_per_m2.as_slice()?);
-    let lifted = py.detach(|| lifting::lift(DepthPicture::new(depth, camera.width), &boxes, sigmas, &camera));
+    let sources: Vec<Source> = sources.as_array().outer_iter().map(|one| source(one[0], one[1], one[2])).collect();
+    let depth = depth_m.as_slice()?;
+    let lifted = py.detach(|| lifting::lift(DepthPicture::new(depth, camera.width), &boxes, &sources, &camera));
     let outcomes = PyArray1::from_iter(py, lifted.iter().map(outcome));
     let found: Vec<&Sighting> = lifted.iter().flatten().collect();
     let centres = PyArray1::from_iter(py, found.iter().flat_map(|one| one.centre.coords.iter().copied()));
@@ -55,11 +59,22 @@ fn outcome(lifted: &Result<Sighting, Refusal>) -> u8 {
         Ok(_) => 0,
         Err(Refusal::Cut) => 1,
         Err(Refusal::NoDepth) => 2,
+        Err(Refusal::Unmatched) => 3,
+    }
+}
+
+fn source(sigma_per_m2: f64, depth_m: f64, support: f64) -> Source {
+    if sigma_per_m2.is_nan() {
+        Source::Unmatched
+    } else if depth_m.is_nan() {
+        Source::Votes { sigma_per_m2 }
+    } else {
+        Source::Match { depth_m, sigma_per_m2, support }
     }
 }
 
 /// Rows (D, 4) of boxes.
-fn boxes(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 4]>> {
+pub fn boxes(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 4]>> {
     let rows = rows.as_array();
     if rows.ncols() != 4 {
         let found = rows.ncols();

@@ -94,6 +94,11 @@ impl PixelBox {
         self.bottom - self.top
     }
 
+    /// Whether a pixel is one of them.
+    pub fn contains(&self, column: usize, row: usize) -> bool {
+        (self.left..self.right).contains(&column) && (self.top..self.bottom).contains(&row)
+    }
+
     /// Column and row of each pixel, row by row.
     pub fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
         (self.top..self.bottom).flat_map(move |row| (self.left..self.right).map(move |column| (column, row)))

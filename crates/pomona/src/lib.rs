@@ -26,6 +26,7 @@ pub mod matching;
 mod paper;
 pub mod ransac;
 pub mod row_search;
+pub mod stereo;
 pub mod tracking;
 pub mod verified;
 pub mod voting;

@@ -151,4 +151,4 @@ class _FromStereo:
         if frame.read_left is None or frame.read_right is None:
             raise PomonaError(f"frame {frame.number}: found one picture, expected left and right")
         found = self._stereo(frame.read_left(), frame.read_right(), boxes_px)
-        return lift(found.depth_m, boxes_px, self._calibration, disparity_sigma_px=found.disparity_sigma_px)
+        return lift(found, boxes_px, self._calibration)

@@ -26,7 +26,7 @@ mod edges;
 pub mod fusion;
 pub mod outline;
 mod shift;
-mod statistics;
+pub(crate) mod statistics;
 pub mod surface;
 
 use crate::camera::{Camera, DepthPicture, PixelBox};
@@ -61,6 +61,29 @@ pub enum Refusal {
     Cut,
     /// Too few pixels have a depth.
     NoDepth,
+    /// The other picture of a pair shows no sure match.
+    Unmatched,
+}
+
+/// Where the depth of a fruit's centre comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The depth picture: its pixels vote.
+    Votes {
+        /// `sigma_d / (f B)` where the picture is of a stereo pair, else 0.
+        sigma_per_m2: f64,
+    },
+    /// A pair in which the fruit was matched as one.
+    Match {
+        /// Depth of the centre.
+        depth_m: f64,
+        /// `sigma_d / (f B)`.
+        sigma_per_m2: f64,
+        /// Part of the outline that matches.
+        support: f64,
+    },
+    /// A pair in which it was not.
+    Unmatched,
 }
 
 /// A fruit seen in one picture, in the frame of the camera.
@@ -82,23 +105,18 @@ pub struct Sighting {
 
 /// Lifts boxes (xmin, ymin, xmax, ymax) to fruits; what is outside the picture is cut.
 ///
-/// `depth_sigma_per_m2` is `sigma_d / (f B)` of each box, 0 where depth is no stereo depth.
-///
 /// # Panics
-/// When the two differ in length, or the camera from the depth picture in size.
+/// When boxes and sources differ in number, or the camera from the depth picture in size.
 pub fn lift(
     depth: DepthPicture,
     boxes_px: &[[f64; 4]],
-    depth_sigma_per_m2: &[f64],
+    sources: &[Source],
     camera: &Camera,
 ) -> Vec<Result<Sighting, Refusal>> {
-    assert_eq!(boxes_px.len(), depth_sigma_per_m2.len(), "one sigma per box");
+    assert_eq!(boxes_px.len(), sources.len(), "one source per box");
     assert_eq!((depth.width(), depth.height()), (camera.width, camera.height), "the camera of the depth picture");
-    boxes_px
-        .iter()
-        .zip(depth_sigma_per_m2)
-        .map(|(&box_px, &sigma)| lift_box(depth, clipped(box_px, camera), sigma, camera))
-        .collect()
+    let lift = |(&box_px, &source)| lift_box(depth, clipped(box_px, camera), source, camera);
+    boxes_px.iter().zip(sources).map(lift).collect()
 }
 
 fn clipped(box_px: [f64; 4], camera: &Camera) -> [f64; 4] {
@@ -107,25 +125,30 @@ fn clipped(box_px: [f64; 4], camera: &Camera) -> [f64; 4] {
     [xmin.clamp(0.0, width), ymin.clamp(0.0, height), xmax.clamp(0.0, width), ymax.clamp(0.0, height)]
 }
 
-fn lift_box(
-    depth: DepthPicture,
-    box_px: [f64; 4],
-    depth_sigma_per_m2: f64,
-    camera: &Camera,
-) -> Result<Sighting, Refusal> {
+fn lift_box(depth: DepthPicture, box_px: [f64; 4], source: Source, camera: &Camera) -> Result<Sighting, Refusal> {
     let mut outline = Outline::of_box(box_px, camera, [false; 4]).ok_or(Refusal::Cut)?;
+    let (sigma_per_m2, matched) = match source {
+        Source::Votes { sigma_per_m2 } => (sigma_per_m2, None),
+        // The pixels of a match err together: nothing of its scatter averages out.
+        Source::Match { depth_m, sigma_per_m2, support } => {
+            (sigma_per_m2, Some(Vote { depth_m, sigma_m: 0.0, support }))
+        }
+        Source::Unmatched => return Err(Refusal::Unmatched),
+    };
     let pixels = pixels(depth, box_px, camera);
-    let mut vote = vote_for_depth(&pixels, outline.centre, outline.radius).ok_or(Refusal::NoDepth)?;
+    let vote_under = |outline: &Outline| matched.or_else(|| vote_for_depth(&pixels, outline.centre, outline.radius));
+    let mut vote = vote_under(&outline).ok_or(Refusal::NoDepth)?;
     let covered = covered_edges(depth, box_px, vote.depth_m, outline.radius);
     if covered.contains(&true) {
         outline = Outline::of_box(box_px, camera, covered).unwrap_or(outline);
-        vote = vote_for_depth(&pixels, outline.centre, outline.radius).unwrap_or(vote);
+        vote = vote_under(&outline).unwrap_or(vote);
     }
     if let Some(axis) = outline.hidden_axis {
-        (outline.centre, outline.centre_sigma) = shifted(&pixels, &outline, axis, &vote);
-        vote = vote_for_depth(&pixels, outline.centre, outline.radius).unwrap_or(vote);
+        let noise_m = sigma_per_m2 * vote.depth_m * vote.depth_m;
+        (outline.centre, outline.centre_sigma) = shifted(&pixels, &outline, axis, &vote, noise_m);
+        vote = vote_under(&outline).unwrap_or(vote);
     }
-    Ok(sighting(&outline, &vote, depth_sigma_per_m2))
+    Ok(sighting(&outline, &vote, sigma_per_m2))
 }
 
 fn pixels(depth: DepthPicture, box_px: [f64; 4], camera: &Camera) -> Vec<Pixel> {

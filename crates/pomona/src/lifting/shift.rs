@@ -12,14 +12,20 @@ const SHIFTS: usize = 17;
 /// depth.
 const SHAPE_SIGMA: f64 = 0.1;
 
-/// Centre (X/Z, Y/Z) and its sigma, of an outline hidden along `axis`.
-pub(crate) fn shifted(pixels: &[Pixel], outline: &Outline, axis: usize, vote: &Vote) -> ([f64; 2], [f64; 2]) {
+/// Centre (X/Z, Y/Z) and its sigma, of an outline hidden along `axis`, in a picture with `noise_m` of its own.
+pub(crate) fn shifted(
+    pixels: &[Pixel],
+    outline: &Outline,
+    axis: usize,
+    vote: &Vote,
+    noise_m: f64,
+) -> ([f64; 2], [f64; 2]) {
     let near: Vec<Pixel> = pixels
         .iter()
         .filter(|pixel| pixel.depth_m > 0.0 && (pixel.depth_m / vote.depth_m - 1.0).abs() < 1.5 * outline.radius)
         .copied()
         .collect();
-    let sigma_m = (MIN_SURFACE_SIGMA_M / 2.0).max(SHAPE_SIGMA * outline.radius * vote.depth_m);
+    let sigma_m = (MIN_SURFACE_SIGMA_M / 2.0).max(SHAPE_SIGMA * outline.radius * vote.depth_m).hypot(noise_m);
     let shift = |k: usize| outline.slack * (2.0 * k as f64 / (SHIFTS - 1) as f64 - 1.0);
     let mut log_likelihoods = [0.0; SHIFTS];
     for (k, one) in log_likelihoods.iter_mut().enumerate() {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["SIZES_INPUT", "Network", "Outputs"]
+__all__ = ["SIZES_INPUT", "Network", "Outputs", "open_session", "reason_of"]
 
 Outputs = dict[str, NDArray[Any]]
 """The outputs for one picture by name, their axis of the batch taken off."""
@@ -57,7 +57,7 @@ class Network:
         PomonaError
             When ONNX Runtime is not installed, the file is no model that it can run, or it wants another input.
         """
-        session = _session(path, threads)
+        session = open_session(path, threads)
         inputs = {tensor.name: tensor for tensor in session.get_inputs()}
         takes_sizes = inputs.pop(SIZES_INPUT, None) is not None
         picture = next(iter(inputs.values()), None)
@@ -89,12 +89,19 @@ class Network:
         try:
             outputs = self._session.run(None, fed)
         except Exception as error:  # ONNX Runtime's errors have no base of their own
-            raise PomonaError(f"{self.path}: cannot be run: {_reason(error)}") from None
+            raise PomonaError(f"{self.path}: cannot be run: {reason_of(error)}") from None
         names = (tensor.name for tensor in self._session.get_outputs())
         return {name: _of_one_picture(output) for name, output in zip(names, outputs, strict=True)}
 
 
-def _session(path: Path, threads: int | None) -> Any:
+def open_session(path: Path, threads: int | None = None) -> Any:
+    """Give a session of ONNX Runtime.
+
+    Raises
+    ------
+    PomonaError
+        When ONNX Runtime is not installed or the file is no model that it can load.
+    """
     try:
         import onnxruntime
     except ImportError:
@@ -112,7 +119,7 @@ def _session(path: Path, threads: int | None) -> Any:
     try:
         return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime's errors have no base of their own
-        raise PomonaError(f"{path}: not a model that ONNX Runtime can load: {_reason(error)}") from None
+        raise PomonaError(f"{path}: not a model that ONNX Runtime can load: {reason_of(error)}") from None
 
 
 def _cores() -> int:
@@ -132,6 +139,6 @@ def _of_one_picture(output: Any) -> NDArray[Any]:
     return array[0] if array.ndim > 1 and array.shape[0] == 1 else array
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """Give what ONNX Runtime says, without its code and the path that it repeats."""
     return str(error).strip().split("\n")[0].split(" : ")[-1].split("failed:")[-1][:200]

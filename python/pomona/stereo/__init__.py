@@ -1,0 +1,8 @@
+"""Depth out of a rectified pair: at fruits (`StereoDepth`), everywhere (`DenseStereo`), by a network (`OnnxStereo`)."""
+
+from pomona.depth import FruitDepth
+from pomona.stereo.dense import DenseStereo
+from pomona.stereo.fruits import StereoDepth
+from pomona.stereo.onnx import OnnxStereo
+
+__all__ = ["DenseStereo", "FruitDepth", "OnnxStereo", "StereoDepth"]

@@ -1,0 +1,67 @@
+"""Depth of the fruits, measured only around their boxes: the face of the core's `stereo`.
+
+Each fruit is matched as one disc, whose outline leaves only its disparity open. Equations, assumptions and figures:
+docs/depth.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import _core
+from pomona.depth import FruitDepth
+from pomona.recording.calibration import Calibration
+from pomona.stereo.pair import Picture, focal_baseline_px_m, in_colour
+
+__all__ = ["StereoDepth"]
+
+NEAREST_M = 0.3
+"""Nothing nearer than this is looked for: nearer fruits fill the picture."""
+
+
+class StereoDepth:
+    """Measures depth at boxes.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The rectified left camera, with a baseline.
+    nearest_m : float
+        Nothing nearer is looked for.
+
+    Raises
+    ------
+    PomonaError
+        Without a baseline.
+    """
+
+    def __init__(self, calibration: Calibration, *, nearest_m: float = NEAREST_M) -> None:
+        self._calibration, self._nearest_m = calibration, nearest_m
+        self._focal_baseline_px_m = focal_baseline_px_m(calibration)
+
+    def __call__(self, left: Picture, right: Picture, boxes_px: NDArray[np.float64]) -> FruitDepth:
+        """Measure depth at boxes.
+
+        Parameters
+        ----------
+        left, right : (H, W, 3) or (H, W) uint8
+            Rectified pictures, BGR or grey, of the calibration's size.
+        boxes_px : (D, 4) float64
+            xmin, ymin, xmax, ymax in the left picture; origin at the top left corner of the top left pixel.
+
+        Raises
+        ------
+        PomonaError
+            When a picture has another size.
+        """
+        depth_m, numbers = _core.read_pair(
+            in_colour(left, self._calibration),
+            in_colour(right, self._calibration),
+            np.asarray(boxes_px, np.float64).reshape(-1, 4),
+            self._calibration,
+            focal_baseline_px_m=self._focal_baseline_px_m,
+            nearest_m=self._nearest_m,
+        )
+        disparity_px, disparity_sigma_px, support = np.ascontiguousarray(numbers.T)
+        return FruitDepth(depth_m, disparity_sigma_px, disparity_px, support)
