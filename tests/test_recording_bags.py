@@ -565,6 +565,13 @@ def test_a_split_bag_is_one_recording(tmp_path):
     assert all(np.array_equal(frame.read_left(), picture(frame.number)) for frame in recording.frames([0, 9, 10, 11]))
 
 
+def test_several_bags_are_not_joined(tmp_path):
+    (tmp_path / "day").mkdir()
+    for name in ("morning", "evening"):
+        write_bag(tmp_path / "day" / name, stereo(1), "mcap")
+    refused(tmp_path / "day", "found evening.mcap, morning.mcap, expected one bag, or the parts of one")
+
+
 def test_without_the_libraries_the_extra_is_named(tmp_path, monkeypatch):
     for form, module in (("ros1", "rosbags"), ("mcap", "mcap")):
         bag = write_bag(tmp_path / "row", stereo(1), form)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import MessageFile
 
 __all__ = ["BAG_SUFFIXES", "open_messages", "recognises", "rest_of"]
@@ -36,6 +37,9 @@ def open_messages(path: Path) -> MessageFile:
     own = all(part.suffix == ".db3" and not is_cut_off(part) for part in parts)
     if described and (own or _is_compressed(path / "metadata.yaml")):
         return _ros_bag(path, tuple(sorted(path.iterdir())))
+    if not described and len({re.sub(r"_\d+$", "", part.stem) for part in parts}) > 1:
+        found = ", ".join(part.name for part in parts)
+        raise PomonaError(f"{path}: found {found}, expected one bag, or the parts of one: row_0.mcap, row_1.mcap ...")
     opened = tuple(map(_open_part, parts))
     return opened[0] if path.is_file() else JoinedBags(path, opened)
 
