@@ -132,7 +132,7 @@ fn along_axis(axis: usize, appearance: &Appearance, side: &Side, camera: &Camera
     let edge2 = config.edge_sigma_px.powi(2);
     match side.cut {
         [false, false] => {
-            let value = camera.middle_and_ratio(axis, side.edges).0 - appearance.seen[axis];
+            let value = side.middle - appearance.seen[axis];
             // The middle of what shows lies anywhere within half of what lacks: variance of a uniform distribution.
             let lack = (predicted.half() - side.edges.half()).max(0.0);
             Along { value, variance: edge2 / 2.0, lack2: lack * lack / 3.0 }

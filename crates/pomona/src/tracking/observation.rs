@@ -57,6 +57,9 @@ pub(crate) struct Observation {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Side {
     pub edges: Interval,
+    /// Where the centre of a sphere with these edges projects to, and its R / Z.
+    pub middle: f64,
+    pub ratio: f64,
     pub cut: [bool; 2],
 }
 
@@ -119,11 +122,13 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
 }
 
 fn sides(camera: &Camera, [xmin, ymin, xmax, ymax]: [f64; 4]) -> [Side; 2] {
-    let side = |low: f64, high: f64, size: f64| Side {
-        edges: Interval { low: low.max(0.0), high: high.min(size) },
-        cut: [low <= PICTURE_EDGE_PX, high >= size - PICTURE_EDGE_PX],
+    let side = |axis: usize, low: f64, high: f64| {
+        let size = camera.size_px[axis];
+        let edges = Interval { low: low.max(0.0), high: high.min(size) };
+        let (middle, ratio) = camera.middle_and_ratio(axis, edges);
+        Side { edges, middle, ratio, cut: [low <= PICTURE_EDGE_PX, high >= size - PICTURE_EDGE_PX] }
     };
-    [side(xmin, xmax, camera.size_px[0]), side(ymin, ymax, camera.size_px[1])]
+    [side(0, xmin, xmax), side(1, ymin, ymax)]
 }
 
 /// None where the numbers are not those of a fruit in front of the camera: then the box counts alone.

@@ -41,7 +41,7 @@ pub struct Tracks {
     pub sightings: Vec<Sighting>,
 }
 
-/// Joins duplicates, drops what is no fruit or was seen too rarely.
+/// Joins duplicates, drops what was seen too rarely.
 pub(crate) fn tracks(known: &Known, sightings: &[Sighting], min_views: usize, config: &TrackingConfig) -> Tracks {
     let landmarks = &known.landmarks;
     let roots: Vec<usize> = (0..landmarks.len()).filter(|&index| landmarks[index].merged_into.is_none()).collect();
@@ -85,8 +85,7 @@ fn report(roots: &[usize], landmarks: &[Landmark], sightings: &[Sighting], min_v
     for sighting in sightings {
         views[sighting.fruit] += 1;
     }
-    let kept: Vec<usize> =
-        (0..landmarks.len()).filter(|&row| views[row] >= min_views.max(1) && landmarks[row].evidence > 0.0).collect();
+    let kept: Vec<usize> = (0..landmarks.len()).filter(|&row| views[row] >= min_views.max(1)).collect();
     let row_of: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(row, &old)| (old, row)).collect();
     let mut found = Tracks::default();
     for &row in &kept {

@@ -71,7 +71,7 @@ fn by_size(
     config: &TrackingConfig,
 ) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let sides = &observation.sides;
-    let whole = |axis: usize| sides[axis].whole().then(|| camera.middle_and_ratio(axis, sides[axis].edges).1);
+    let whole = |axis: usize| sides[axis].whole().then_some(sides[axis].ratio);
     let ratio = [whole(0), whole(1)].into_iter().flatten().max_by(f64::total_cmp)?;
     let z = size.ln_radius.exp() / ratio;
     let edges = config.edge_sigma_px / (camera.focal_px[0] * ratio);
@@ -94,7 +94,7 @@ fn middle(axis: usize, observation: &Observation, ratio: f64, camera: &Camera, c
     let edge2 = config.edge_sigma_px.powi(2);
     if side.whole() {
         let lack = (half - side.edges.half()).max(0.0);
-        return (camera.middle_and_ratio(axis, side.edges).0, edge2 / 2.0 + lack * lack / 3.0);
+        return (side.middle, edge2 / 2.0 + lack * lack / 3.0);
     }
     let middle = if side.cut[0] { side.edges.high - half } else { side.edges.low + half };
     (middle, edge2 + (config.hidden_mean * half).powi(2))

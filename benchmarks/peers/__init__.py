@@ -1,0 +1,1 @@
+"""Other people's methods, run on what ours are run on."""
