@@ -97,5 +97,15 @@ def test_a_wrong_depth_leaves_its_ray(wrong):
     covariances = np.array([long_along(ray, 0.03, 0.002) for ray in rays])
     centre, fused = fuse_centres(centres, covariances, rays)
     assert np.linalg.norm(centre) < 0.005
-    # Where most sightings contradict it, the centre is not called sure.
-    assert (np.sqrt(np.trace(fused)) < 0.02) == (len(wrong) < 5)
+    # Directions that cross at right angles make it sure; depths that contradict each other add nothing.
+    assert 0.001 < np.sqrt(np.trace(fused)) < 0.01
+
+
+def test_directions_that_contradict_each_other_widen_the_covariance():
+    rays = np.array([[x, 0.0, 1.5] for x in np.linspace(-0.8, 0.8, 9)])
+    covariances = np.array([long_along(ray, 0.03, 0.002) for ray in rays])
+    beside = np.zeros((9, 3))
+    beside[:, 1] = 0.01 * np.random.default_rng(3).normal(size=9)
+    _, sure = fuse_centres(np.zeros((9, 3)), covariances, rays)
+    _, unsure = fuse_centres(beside, covariances, rays)
+    assert np.sqrt(unsure[1, 1]) > 3 * np.sqrt(sure[1, 1])

@@ -35,9 +35,6 @@ const SHARED: f64 = 0.1;
 /// Equation (1) needs a hidden part; this one is as good as none.
 const MIN_HIDDEN: f64 = 1e-3;
 
-/// Median of chi^2 with three degrees of freedom.
-const MEDIAN_CHI2: f64 = 2.366;
-
 /// One fruit seen once, in a frame of reference that all sightings share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredCentre {
@@ -72,14 +69,23 @@ pub fn fuse_centres(measured: &[MeasuredCentre]) -> Option<(Point3<f64>, Matrix3
         }
     }
     let centre = best.1;
-    let (total, _) = weighted(&sightings, &centre);
-    let mut squares: Vec<f64> = sightings.iter().map(|one| one.squares(&centre).iter().sum()).collect();
-    let count = measured.len() as f64;
-    // Half of them may be wrong, but where the median sighting is off, all say too much.
-    let disagreement = median(&mut squares) / MEDIAN_CHI2 * count / (count - 1.0);
-    let mean = measured.iter().map(|one| one.covariance).sum::<Matrix3<f64>>() / count;
-    let covariance = total.cholesky()?.inverse() * disagreement.max(1.0) + mean * SHARED;
+    let spread = disagreement(&sightings, &centre);
+    let total: Matrix3<f64> = sightings.iter().map(|one| one.weighted(&centre, spread)).sum();
+    let covariance = total.cholesky()?.inverse() * (1.0 + SHARED * rest.len() as f64);
     Some((centre, (covariance + covariance.transpose()) / 2.0))
+}
+
+/// By how much more than they say the directions and the depths disagree, at least 1.
+///
+/// Half of either may be wrong, but where the median one is off, all of its kind say too much. So depths that contradict
+/// each other leave the place to the directions, and the other way round.
+fn disagreement(sightings: &[Split], centre: &Point3<f64>) -> [f64; 2] {
+    let squares: Vec<[f64; 2]> = sightings.iter().map(|one| one.squares(centre)).collect();
+    let count = sightings.len() as f64;
+    std::array::from_fn(|kind| {
+        let typical = median(&mut squares.iter().map(|of| of[kind]).collect::<Vec<_>>());
+        (typical / MEDIAN_CHI2[kind] * count / (count - 1.0)).max(1.0)
+    })
 }
 
 /// A sighting with its information split in what it says across its ray and along it.
@@ -90,6 +96,12 @@ struct Split {
 
 /// Degrees of freedom of a sighting across its ray and along it.
 const DEGREES: [f64; 2] = [2.0, 1.0];
+
+/// Medians of chi^2 with so many degrees of freedom.
+const MEDIAN_CHI2: [f64; 2] = [1.386, 0.455];
+
+/// Information counts as it says.
+const AS_IT_SAYS: [f64; 2] = [1.0, 1.0];
 
 impl Split {
     fn new(measured: &MeasuredCentre) -> Option<Self> {
@@ -109,17 +121,18 @@ impl Split {
         self.squares(centre).iter().zip(DEGREES).map(|(square, degrees)| degrees * (square / degrees).ln_1p()).sum()
     }
 
-    /// Information under the weights that the loss gives it at `centre`.
-    fn weighted(&self, centre: &Point3<f64>) -> Matrix3<f64> {
+    /// Information under the weights that the loss gives it at `centre`, its parts divided by `spread`.
+    fn weighted(&self, centre: &Point3<f64>, spread: [f64; 2]) -> Matrix3<f64> {
         let [across, along] = self.squares(centre);
-        self.informations[0] / (1.0 + across / DEGREES[0]) + self.informations[1] / (1.0 + along / DEGREES[1])
+        self.informations[0] / (spread[0] * (1.0 + across / DEGREES[0]))
+            + self.informations[1] / (spread[1] * (1.0 + along / DEGREES[1]))
     }
 }
 
 /// Sum of the weighted informations, and of what they pull towards.
 fn weighted(sightings: &[Split], centre: &Point3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     sightings.iter().fold((Matrix3::zeros(), Vector3::zeros()), |(total, pull), one| {
-        let information = one.weighted(centre);
+        let information = one.weighted(centre, AS_IT_SAYS);
         (total + information, pull + information * one.centre.coords)
     })
 }
