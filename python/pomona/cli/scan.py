@@ -85,7 +85,10 @@ def scan(
     kept = None if keep is None else _kept(keep, opened, detector.path, looks)
     check_sides(opened)
     choices = {"stereo": stereo, "odometry": odometry, "retrack": retrack}
-    with scan_output.scanning(opened, detector.description) as progress, first_interrupt() as stop:
+    with (
+        scan_output.scanning(opened, detector.description, told=model is not None) as progress,
+        first_interrupt() as stop,
+    ):
         survey = scan_recording(opened, detector, **choices, config=overrides, keep=kept, progress=progress, stop=stop)
     configuration = {"scan": {**looks, **choices, "every": every}, **overrides}
     written = _write(output, survey, opened, name, date, configuration, detector.path)

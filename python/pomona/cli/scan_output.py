@@ -15,16 +15,17 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def scanning(recording: Recording, boxes: str) -> Iterator[Progress | None]:
+def scanning(recording: Recording, boxes: str, *, told: bool) -> Iterator[Progress | None]:
     """Show where the boxes come from, frames, rate, fruits and time left on the standard error of a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = Console(stderr=True, soft_wrap=True)
+    if told or console.is_terminal:
+        console.print(boxes, style="dim", highlight=False)
     if not console.is_terminal:
         yield None
         return
-    console.print(boxes, style="dim", highlight=False)
     columns = (
         "scanning",
         BarColumn(),

@@ -12,6 +12,8 @@ from pomona.depth import Lifted, lift
 from pomona.detect import Detections, Detector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Frame, Recording
+from pomona.recording.check import is_blank
+from pomona.recording.pictures import UnreadablePictureError
 from pomona.stereo import StereoDepth
 from pomona.survey.prefetch import Kind
 
@@ -90,8 +92,10 @@ class Seeing:
         Raises
         ------
         UnreadablePictureError
-            When one of its pictures cannot be read.
+            When one of its pictures cannot be read, or is black.
         """
+        if self._colour and frame.read_left is not None and is_blank(frame.read_left()):
+            raise UnreadablePictureError(f"frame {frame.number}: the left picture shows nothing")
         detections = self._detector(frame)
         lifted = self._depth(frame, detections.boxes_px)
         return Look(frame.number, detections, lifted, self._colours(frame, detections.boxes_px))

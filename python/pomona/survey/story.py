@@ -157,7 +157,7 @@ class _Findings:
 
     def __init__(self, open_part: Callable[[int, str | None], OpenPart]) -> None:
         self._open_part = open_part
-        self._parts: list[OpenPart] = []
+        self._parts: dict[int, OpenPart] = {}
         self._detections = 0
         self._refused = Counter[Refusal]()
         self.skipped: dict[int, str] = {}
@@ -165,7 +165,7 @@ class _Findings:
 
     @property
     def n_fruits(self) -> int:
-        return sum(part.n_fruits for part in self._parts)
+        return sum(part.n_fruits for part in self._parts.values())
 
     def add(self, frame: Frame, place: Place, coming: Future[Look]) -> None:
         """Take a frame, or note why it cannot be used."""
@@ -177,8 +177,8 @@ class _Findings:
         if place.session_from_camera is None:
             self.skipped[frame.number] = f"frame {frame.number}: {place.broken}"
             return
-        if place.part >= len(self._parts):
-            self._parts.append(self._open_part(place.part, place.broken))
+        if place.part not in self._parts:
+            self._parts[place.part] = self._open_part(place.part, place.broken)
         # Where nobody noted the time, frames are numbered: order is all that is known.
         time_s = float(frame.number if frame.time_s is None else frame.time_s)
         self._parts[place.part].add(look, time_s, place.session_from_camera)
@@ -186,7 +186,9 @@ class _Findings:
         self._refused += look.lifted.refused
 
     def survey(self, camera: Camera) -> Survey:
-        parts = tuple(part.closed(camera) for part in self._parts)
+        if not self._parts:
+            raise PomonaError("stopped before a frame could be used")
+        parts = tuple(part.closed(camera) for part in self._parts.values())
         return Survey(parts, self._detections, self._refused, self.skipped, self.stopped)
 
 
