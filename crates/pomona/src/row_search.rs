@@ -15,7 +15,7 @@ pub struct Grey<'a> {
 /// What counts as a match.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowSearch {
-    /// The patch reaches this far from its centre, pixels. 11 x 11 pixels are a quarter of a leaf at 1.5 m with f = 417 px.
+    /// The patch reaches this far from its centre, 7 pixels at most. 11 x 11 pixels are a quarter of a leaf at 1.5 m with f = 417 px.
     pub radius_px: usize,
     /// Least similarity. On foliage 3 of 4 matches above it are right to a pixel.
     pub min_similarity: f64,
@@ -37,7 +37,7 @@ const PEAK_PX: usize = 2;
 /// Whole-pixel disparity of a point (column, row), `None` where nothing is similar enough, two places are nearly alike,
 /// or the patch reaches over the edge.
 pub fn disparity(left: Grey<'_>, right: Grey<'_>, (column, row): (usize, usize), search: &RowSearch) -> Option<usize> {
-    let r = search.radius_px;
+    let r = search.radius_px.min(7);
     let height = left.pixels.len() / left.width.max(1);
     if column < r || row < r || column + r >= left.width || row + r >= height || right.pixels.len() != left.pixels.len()
     {
@@ -55,6 +55,8 @@ pub fn disparity(left: Grey<'_>, right: Grey<'_>, (column, row): (usize, usize),
 
 /// Similarity of the patch of the left picture at `corner` with those of the right one in the same rows that begin at the
 /// columns from `first` on. `None` for a patch without contrast.
+///
+/// Sums of up to 255^2 * 15^2 are whole numbers below 2^24, which f32 holds exactly and multiplies four at a time.
 fn similarities(
     left: Grey<'_>,
     right: Grey<'_>,
@@ -63,33 +65,38 @@ fn similarities(
     places: usize,
     side: usize,
 ) -> Option<Vec<f64>> {
-    let (mut products, mut sums, mut squares) = (vec![0_i32; places], vec![0_i32; places], vec![0_i32; places]);
-    let (mut sum, mut square) = (0_i32, 0_i32);
+    let width = places + side - 1;
+    let (mut products, mut sums, mut squares) = (vec![0_f32; places], vec![0_f32; width], vec![0_f32; width]);
+    let mut strip = vec![0_f32; width];
+    let (mut sum, mut square) = (0.0, 0.0);
     for row in corner.1..corner.1 + side {
         let patch = &left.pixels[row * left.width + corner.0..][..side];
-        let strip = &right.pixels[row * right.width + first..][..places + side - 1];
+        for (value, &pixel) in strip.iter_mut().zip(&right.pixels[row * right.width + first..][..width]) {
+            *value = f32::from(pixel);
+        }
+        for ((sum, square), value) in sums.iter_mut().zip(&mut squares).zip(&strip) {
+            *sum += value;
+            *square += value * value;
+        }
         for (offset, &value) in patch.iter().enumerate() {
-            let value = i32::from(value);
-            sum += value;
-            square += value * value;
-            let windows = products.iter_mut().zip(&mut sums).zip(&mut squares);
-            for (((product, sum), square), &other) in windows.zip(&strip[offset..]) {
-                let other = i32::from(other);
+            let value = f32::from(value);
+            sum += f64::from(value);
+            square += f64::from(value * value);
+            for (product, other) in products.iter_mut().zip(&strip[offset..]) {
                 *product += value * other;
-                *sum += other;
-                *square += other * other;
             }
         }
     }
     let n = (side * side) as f64;
-    let spread = |sum: i32, square: i32| f64::from(square) - f64::from(sum).powi(2) / n;
-    let own = spread(sum, square);
-    let similarity = |((product, other_sum), other_square): ((&i32, &i32), &i32)| {
-        let other = spread(*other_sum, *other_square);
-        let common = f64::from(*product) - f64::from(sum) * f64::from(*other_sum) / n;
+    let own = square - sum * sum / n;
+    let similarity = |place: usize| {
+        let over = |columns: &[f32]| columns[place..place + side].iter().map(|&one| f64::from(one)).sum::<f64>();
+        let (other_sum, other_square) = (over(&sums), over(&squares));
+        let other = other_square - other_sum * other_sum / n;
+        let common = f64::from(products[place]) - sum * other_sum / n;
         if other < 1.0 { -1.0 } else { common / (own * other).sqrt() }
     };
-    (own >= 1.0).then(|| products.iter().zip(&sums).zip(&squares).map(similarity).collect())
+    (own >= 1.0).then(|| (0..places).map(similarity).collect())
 }
 
 #[cfg(test)]
