@@ -167,10 +167,10 @@ def test_a_wrong_depth_unit_is_said(pomona, tmp_path):
     assert "depth_unit_m" in done.stderr
 
 
-def test_frames_without_poses_are_refused(pomona, tmp_path):
+def test_frames_without_poses_and_colour_are_refused(pomona, tmp_path):
     folder = make_recording(tmp_path / "row", (0.0, 0.1), poses=False)
     output = tmp_path / "session.gpkg"
-    assert_refused(pomona("scan", folder, "-o", output), output, "2 frames without poses", "poses_tum.txt")
+    assert_refused(pomona("scan", folder, "-o", output), output, "found depth pictures and no poses")
 
 
 @pytest.mark.parametrize("frames", [2, 8])

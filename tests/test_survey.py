@@ -6,11 +6,13 @@ import os
 import signal
 import sys
 import threading
+from collections import Counter
 
 import cv2
 import numpy as np
 import pytest
-from benchmarks.recordings import detector
+from benchmarks.lifting import rigid_residuals, rows_named
+from benchmarks.recordings import detector, rendered_truth, true_boxes
 
 from pomona.cli import main
 from pomona.cloud import FruitCloud
@@ -227,3 +229,55 @@ def test_a_preview_needs_pictures_and_a_name_that_says_video(pomona, row, tmp_pa
         assert words in told
         assert not list(tmp_path.glob("*.mp4"))
         assert not (tmp_path / "fruits.csv").exists()
+
+
+def stereo_row(shared_data, folder, frames):
+    """Left and right pictures of the rendered row with true boxes, no names, no poses; the true fruits of the boxes."""
+    source = shared_data / "rendered_row" / "2024-08-09"
+    for kind in ("left", "right"):
+        (folder / kind).mkdir(parents=True)
+        pictures = sorted((source / kind).iterdir())
+        for number, frame in enumerate(frames):
+            (folder / kind / f"{number:04d}{pictures[frame].suffix}").symlink_to(pictures[frame].resolve())
+    (folder / "calibration.json").write_bytes((source / "calibration.json").read_bytes())
+    number_of = {frame: number for number, frame in enumerate(frames)}
+    boxes = [box for box in true_boxes(source) if box.frame in number_of]
+    lines = [",".join(map(str, (number_of[box.frame], *box.box_px))) for box in boxes]
+    (folder / "detections.csv").write_text("\n".join(["frame,xmin,ymin,xmax,ymax", *lines]) + "\n")
+    return {(number_of[box.frame], tuple(map(float, box.box_px))): box.fruit for box in boxes}
+
+
+def test_stereo_pictures_and_boxes_are_enough(shared_data, tmp_path):
+    true_of = stereo_row(shared_data, tmp_path / "row", range(18))
+    recording = open_recording(tmp_path / "row")
+    survey = scan(recording, detector(tmp_path / "row", recording))
+    (part,) = survey.parts
+    boxes, votes = part.boxes, [Counter() for _ in range(len(part.cloud))]
+    for frame, box_px, fruit in zip(boxes.frames.tolist(), boxes.boxes_px, boxes.fruits.tolist(), strict=True):
+        if fruit >= 0:
+            votes[fruit][true_of[frame, tuple(box_px)]] += 1
+    names = [vote.most_common(1)[0][0] for vote in votes]
+    often = {fruit for fruit, n in Counter(true_of.values()).items() if n >= 5}
+    assert len(often) > 40
+    assert abs(len(names) - len(often)) <= 3
+    assert len(set(names)) == len(names)  # none in two
+    truth = rows_named(rendered_truth(shared_data / "rendered_row" / "2024-08-09"), names)
+    distances_m = rigid_residuals(part.cloud.positions, truth.positions)
+    assert np.median(distances_m) < 0.02
+    assert np.percentile(distances_m, 95) < 0.05
+    sizes_m = part.cloud.diameters_m - truth.diameters_m
+    assert np.sqrt((sizes_m**2).mean()) < 0.004
+    assert all(len(colour) == 7 for colour in part.cloud.extras["colour"])
+
+
+def test_where_the_track_breaks_a_new_session_begins(pomona, shared_data, tmp_path):
+    stereo_row(shared_data, tmp_path / "2024-08-09", [*range(8), *range(28, 36)])
+    code, printed, _ = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "row.gpkg")
+    assert code == 0
+    first, second = (load_session(tmp_path / name) for name in ("row.gpkg", "row-part2.gpkg"))
+    assert (first.name, second.name) == ("2024-08-09", "2024-08-09 part 2")
+    assert max(first.trajectory.frames) <= 7 < min(second.trajectory.frames)
+    for session in (first, second):
+        assert len(session.cloud) > 10
+        np.testing.assert_allclose(session.trajectory.session_from_camera[0], np.eye(4), atol=1e-9)
+    assert "row-part2.gpkg: frames" in printed

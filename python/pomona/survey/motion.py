@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona import refinement
 from pomona.errors import PomonaError
+from pomona.odometry import Motion, OdometryTrajectory, StereoOdometry
 from pomona.recording import Frame, Recording
+from pomona.recording.pictures import UnreadablePictureError
+from pomona.refinement import refine
 from pomona.survey.prefetch import Kind
 from pomona.survey.sightings import Sightings
 
 __all__ = ["Camera", "Place", "camera_of"]
-
-
-POSE_FILES = "poses_tum.txt, in a TUM RGB-D folder groundtruth.txt"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ def camera_of(recording: Recording, *, odometry: bool = False) -> Camera:
         return _Recorded(recording)
     if len(recording) == 1 and not odometry:
         return _Recorded(recording)
-    raise PomonaError(f"{recording.path}: found {len(recording)} frames without poses, expected {POSE_FILES}")
+    return _Followed(recording)
 
 
 class _Recorded:
@@ -107,3 +109,92 @@ class _Recorded:
     ) -> NDArray[np.float64]:
         del part, sightings, fruits  # recorded poses are trusted
         return np.array([self._pose_of[frame] for frame in frames]).reshape(-1, 4, 4)
+
+
+class _Followed:
+    """Poses found in the pictures by odometry, refined with the fruits at the end.
+
+    Raises
+    ------
+    PomonaError
+        When the recording has no left pictures, or neither right pictures with a baseline nor depth.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        pictures = recording.description()["pictures"]
+        stereo = "right" in pictures and recording.calibration.baseline_m is not None
+        if "left" not in pictures or not (stereo or "depth" in pictures):
+            found = " and ".join(pictures)
+            raise PomonaError(
+                f"{recording.path}: found {found} pictures and no poses, expected poses, or left and right pictures"
+            )
+        self.needs: tuple[Kind, ...] = ("left", "right") if stereo else ("left", "depth")
+        self._stereo = stereo
+        self._odometry = StereoOdometry(recording.calibration)
+        self._count_of: dict[int, int] = {}
+
+    def __call__(self, frame: Frame) -> Place:
+        """Follow the camera to the next frame."""
+        self._count_of[frame.number] = len(self._count_of)
+        motion = self._moved(frame)
+        return Place(motion.session_from_camera, motion.part, motion.broken or motion.lost)
+
+    def _moved(self, frame: Frame) -> Motion:
+        try:
+            left = _grey(_read(frame, "left", frame.read_left))
+            if self._stereo:
+                return self._odometry(left, _grey(_read(frame, "right", frame.read_right)))
+            return self._odometry.with_depth(left, _read(frame, "depth", frame.read_depth))
+        except UnreadablePictureError as error:
+            return self._odometry.skip(str(error))
+
+    def refined(
+        self, part: int, frames: Sequence[int], sightings: Sightings, fruits: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Adjust all poses of the part together, by what was measured between them and by the fruits they saw."""
+        way = self._way
+        rows = np.flatnonzero(way.parts == part)
+        of_part = {int(count): row for row, count in enumerate(way.frames[rows])}
+        ours = np.array([of_part[self._count_of[frame]] for frame in frames], np.int64)
+        found = refine(
+            way.session_from_camera[rows], _seen(sightings, fruits, ours), _between(way, rows)
+        ).session_from_camera[ours]
+        return np.asarray(found)
+
+    @cached_property
+    def _way(self) -> OdometryTrajectory:
+        return self._odometry.trajectory()
+
+
+def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int64]) -> refinement.Sightings:
+    """Sightings of fruits for the refinement; fruits seen once hold nothing together."""
+    views = np.bincount(fruits[fruits >= 0], minlength=1)
+    kept = np.flatnonzero((fruits >= 0) & (views[np.maximum(fruits, 0)] > 1))
+    return refinement.Sightings(
+        frames=rows[sightings.rows[kept]],
+        fruits=np.unique(fruits[kept], return_inverse=True)[1],
+        centres_in_camera=sightings.centres_in_camera[kept],
+        covariances=sightings.covariances[kept],
+    )
+
+
+def _between(way: OdometryTrajectory, rows: NDArray[np.int64]) -> refinement.Motions:
+    """Motions between the frames of one part, by their rows in it."""
+    row_of = np.full(len(way), -1, np.int64)
+    row_of[rows] = np.arange(len(rows))
+    ours = np.flatnonzero(row_of[way.first] >= 0)
+    return refinement.Motions(
+        row_of[way.first[ours]], row_of[way.second[ours]], way.first_from_second[ours], way.information[ours]
+    )
+
+
+def _read(frame: Frame, name: str, read: Callable[[], NDArray[Any]] | None) -> NDArray[Any]:
+    if read is None:
+        raise PomonaError(f"frame {frame.number}: found no {name} picture, expected one in every frame")
+    return read()
+
+
+def _grey(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    import cv2
+
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
