@@ -103,6 +103,12 @@ pub struct Pose {
 }
 
 impl Pose {
+    /// Nothing moves.
+    pub(crate) const IDENTITY: Self = Self {
+        rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        translation: Vector3::new(0.0, 0.0, 0.0),
+    };
+
     /// From a 4 x 4 matrix.
     ///
     /// # Errors
@@ -113,9 +119,22 @@ impl Pose {
         let stray = (rotation * rotation.transpose() - Matrix3::identity()).abs().max();
         // Poses written with six digits are orthogonal to 1e-5; a scale of 1 % is no rounding.
         if stray < 1e-3 && rotation.determinant() > 0.0 && translation.iter().all(|x| x.is_finite()) {
-            return Ok(Self { rotation, translation });
+            return Ok(Self { rotation: orthogonal(rotation), translation });
         }
         Err(Error::Pose)
+    }
+
+    /// This transform after another one: `a_from_b.after(b_from_c)` is `a_from_c`.
+    pub(crate) fn after(self, first: &Self) -> Self {
+        Self {
+            rotation: self.rotation * first.rotation,
+            translation: self.rotation * first.translation + self.translation,
+        }
+    }
+
+    pub(crate) fn inverse(self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self { rotation, translation: -(rotation * self.translation) }
     }
 
     pub(crate) fn to_camera(self, in_session: &Vector3<f64>) -> Vector3<f64> {
@@ -133,6 +152,14 @@ impl Pose {
     pub(crate) fn covariance_to_session(self, in_camera: &Matrix3<f64>) -> Matrix3<f64> {
         self.rotation * in_camera * self.rotation.transpose()
     }
+}
+
+/// The nearest rotation to one that is nearly a rotation (Newton's steps of the polar decomposition).
+fn orthogonal(mut rotation: Matrix3<f64>) -> Matrix3<f64> {
+    for _ in 0..3 {
+        rotation = rotation * (Matrix3::identity() * 3.0 - rotation.transpose() * rotation) / 2.0;
+    }
+    rotation
 }
 
 #[cfg(test)]

@@ -3,6 +3,9 @@
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
+/// Part of the noise of a pose that is left when some fifteen fruits have corrected it: one over the square root.
+const LEFT_BY_ALIGNMENT: f64 = 0.25;
+
 /// How fruits are tracked through one visit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -23,9 +26,9 @@ pub struct TrackingConfig {
     pub depth_outliers: f64,
     /// Mean part of its size that a partly hidden fruit lacks.
     pub hidden_mean: f64,
-    /// Noise of the camera's place between neighbouring frames, metres.
+    /// Noise of the given poses between neighbouring frames: place, metres.
     pub pose_sigma_m: f64,
-    /// Noise of the camera's direction between neighbouring frames, radians.
+    /// Noise of the given poses between neighbouring frames: direction, radians.
     pub pose_sigma_rad: f64,
     /// Drift of the camera's place over the way since a fruit was last seen.
     pub drift_per_metre: f64,
@@ -56,9 +59,9 @@ impl Default for TrackingConfig {
             depth_outliers: 0.2,
             // Boxes around what is seen of fruits that show 30 to 90 % of their face lack a fifth of the width.
             hidden_mean: 0.2,
-            // Visual odometry over 0.2 m is 1 % wrong, half a pixel at 1.5 m.
-            pose_sigma_m: 0.002,
-            pose_sigma_rad: 0.001,
+            // Poor visual odometry over a step of 0.2 m: 4 % and 0.2 degrees, 2 px each at 1.5 m. Fruits correct it.
+            pose_sigma_m: 0.008,
+            pose_sigma_rad: 0.0035,
             // What the odometry of this package reaches on a row, and public ones on roads.
             drift_per_metre: 0.01,
             // Half of a small fruit: with more, a place says no longer which fruit of a cluster is meant.
@@ -72,6 +75,15 @@ impl Default for TrackingConfig {
 }
 
 impl TrackingConfig {
+    /// The same where fruits have said where the camera is.
+    pub(crate) fn with_aligned_poses(self) -> Self {
+        Self {
+            pose_sigma_m: LEFT_BY_ALIGNMENT * self.pose_sigma_m,
+            pose_sigma_rad: LEFT_BY_ALIGNMENT * self.pose_sigma_rad,
+            ..self
+        }
+    }
+
     /// Standard deviation of the camera's place after a way, metres.
     pub(crate) fn drift_m(&self, way_m: f64) -> f64 {
         (self.drift_per_metre * way_m).min(self.max_drift_m)

@@ -16,6 +16,7 @@
 //!
 //! Equations, assumptions and limits: `docs/tracking.md`.
 
+mod alignment;
 mod association;
 mod birth;
 mod camera;

@@ -1,5 +1,6 @@
 //! One frame after the other: the story of the tracker.
 
+use super::alignment::aligned;
 use super::association::{Association, associate};
 use super::birth::birth;
 use super::camera::{Camera, Pose};
@@ -13,18 +14,24 @@ use super::settling::PastFrame;
 use super::sharing::{Role, roles};
 use super::tracks::{Sighting, Tracks, tracks};
 use super::trust::Reliability;
-use super::unknown::{Conditions, unknown};
+use super::unknown::{Conditions, Unknown, unknown};
 use crate::error::{Error, Result};
+use nalgebra::Vector3;
 use std::collections::VecDeque;
 
 /// Largest evidence of one frame, nats: boxes of one fruit err alike.
 const EVIDENCE_OF_A_FRAME: f64 = 3.0;
+
+/// Times that a pose is corrected: the second time boxes are assigned that the first one brought into the gates.
+const ALIGNMENTS: usize = 3;
 
 /// Follows the fruits of one visit. What is kept grows with the fruits and their sightings; a frame costs what it shows.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     camera: Camera,
     config: TrackingConfig,
+    /// With the noise that poses have before fruits correct them.
+    unaligned: TrackingConfig,
     known: Known,
     population: Population,
     reliability: Reliability,
@@ -33,6 +40,17 @@ pub struct Tracker {
     /// Of settled frames.
     sightings: Vec<Sighting>,
     now: Instant,
+    /// Number of the last frame, and the place that was given for it.
+    last: Option<(i64, Vector3<f64>)>,
+    /// What known fruits say that poses are wrong by: corrected pose = `correction` after the given one.
+    correction: Pose,
+}
+
+/// A frame against the known fruits.
+struct View {
+    pose: Pose,
+    predictions: Vec<Prediction>,
+    association: Association,
 }
 
 impl Tracker {
@@ -44,13 +62,16 @@ impl Tracker {
         config.validate()?;
         Ok(Self {
             camera,
-            config,
+            config: config.with_aligned_poses(),
+            unaligned: config,
             known: Known::default(),
             population: Population::default(),
             reliability: Reliability::new(&config),
             past: VecDeque::new(),
             sightings: Vec::new(),
             now: Instant::default(),
+            last: None,
+            correction: Pose::IDENTITY,
         })
     }
 
@@ -69,28 +90,13 @@ impl Tracker {
         self.arrive(number, session_from_camera)?;
         observations.iter().filter_map(|one| one.lift.as_ref()).for_each(|lift| self.population.add(lift));
         let unknown: Vec<_> = observations.iter().map(|one| unknown(one, &self.conditions())).collect();
-        let predictions = self.known.predictions(&self.camera, session_from_camera, self.now.way_m, &self.config);
-        let association = associate(&predictions, &observations, &unknown, &self.conditions());
-        let roles = roles(&predictions, &observations, &association, &self.config);
-        let mut told = Vec::new();
-        for (o, observation) in observations.iter().enumerate() {
-            told.push(match roles[o] {
-                Role::Known(p) => {
-                    let weighed = &association.weighed[&(p, o)];
-                    Some((self.see(&predictions[p], observation, weighed, session_from_camera), false))
-                }
-                Role::Shared([p, _]) => Some((self.see_shared(&predictions[p]), true)),
-                Role::Piece => None,
-                Role::New => {
-                    let born = birth(observation, &unknown[o], session_from_camera, &self.conditions());
-                    born.map(|born| (self.known.add(born, session_from_camera, self.now), false))
-                }
-            });
-        }
-        self.miss(&predictions, &association, &roles);
-        self.known.merge_in_view(&predictions, self.now, &self.config);
+        let view = self.look(session_from_camera, &observations, &unknown);
+        let roles = roles(&view.predictions, &observations, &view.association, &self.config);
+        let told = self.tell(&view, &roles, &observations, &unknown);
+        self.miss(&view, &roles);
+        self.known.merge_in_view(&view.predictions, self.now, &self.config);
         let numbers = told.iter().map(|told| told.map(|(fruit, _)| self.known.root(fruit))).collect();
-        self.past.push_back(PastFrame { number, at: self.now, pose: *session_from_camera, observations, told });
+        self.past.push_back(PastFrame { number, at: self.now, pose: view.pose, observations, told });
         if self.past.len() > self.config.lag {
             self.settle_oldest();
         }
@@ -107,14 +113,62 @@ impl Tracker {
     }
 
     fn arrive(&mut self, number: i64, pose: &Pose) -> Result<()> {
-        if let Some(last) = self.past.back() {
-            if number <= last.number {
-                return Err(Error::FrameOrder { found: number, last: last.number });
+        if let Some((last, place)) = self.last {
+            if number <= last {
+                return Err(Error::FrameOrder { found: number, last });
             }
             self.now.frame += 1;
-            self.now.way_m += (pose.translation - last.pose.translation).norm();
+            self.now.way_m += (pose.translation - place).norm();
         }
+        self.last = Some((number, pose.translation));
         Ok(())
+    }
+
+    /// Assigns boxes to known fruits, from where these say that the camera is.
+    fn look(&mut self, given: &Pose, observations: &[Observation], unknown: &[Unknown]) -> View {
+        let mut pose = self.correction.after(given);
+        for _ in 0..ALIGNMENTS {
+            let View { predictions, association, .. } = &self.view(pose, &self.unaligned, observations, unknown);
+            let fruits = (predictions.as_slice(), association, &self.known);
+            let Some(better) = aligned(&pose, fruits, &self.camera, &self.unaligned) else {
+                return self.view(pose, &self.unaligned, observations, unknown);
+            };
+            if better == pose {
+                break;
+            }
+            pose = better;
+            self.correction = pose.after(&given.inverse());
+        }
+        self.view(pose, &self.config, observations, unknown)
+    }
+
+    fn view(&self, pose: Pose, config: &TrackingConfig, observations: &[Observation], unknown: &[Unknown]) -> View {
+        let predictions = self.known.predictions(&self.camera, &pose, self.now.way_m, config);
+        let association = associate(&predictions, observations, unknown, &self.conditions());
+        View { pose, predictions, association }
+    }
+
+    /// Takes up each box as what it is. The fruit of each box, and whether it has the box with another one.
+    fn tell(
+        &mut self,
+        view: &View,
+        roles: &[Role],
+        observations: &[Observation],
+        unknown: &[Unknown],
+    ) -> Vec<Option<(usize, bool)>> {
+        let tell = |(o, observation): (usize, &Observation)| match roles[o] {
+            Role::Known(p) => {
+                let weighed = &view.association.weighed[&(p, o)];
+                Some((self.see(&view.predictions[p], observation, weighed, &view.pose), false))
+            }
+            Role::Shared([p, _]) => Some((self.see_shared(&view.predictions[p]), true)),
+            Role::Piece => None,
+            Role::New => {
+                let born = birth(observation, &unknown[o], &view.pose, &self.conditions())?;
+                Some((self.known.add(born, &view.pose, self.now), false))
+            }
+        };
+        observations.iter().enumerate().map(tell).collect()
     }
 
     fn conditions(&self) -> Conditions<'_> {
@@ -151,7 +205,8 @@ impl Tracker {
     }
 
     /// Fruits that should have shown but did not; not those in a shared box or behind another fruit.
-    fn miss(&mut self, predictions: &[Prediction], association: &Association, roles: &[Role]) {
+    fn miss(&mut self, view: &View, roles: &[Role]) {
+        let View { predictions, association, .. } = view;
         let in_shared_box = |p: usize| roles.iter().any(|role| matches!(role, Role::Shared(both) if both.contains(&p)));
         for (p, prediction) in predictions.iter().enumerate() {
             let is_missed = association.box_of[p].is_none()
