@@ -33,7 +33,8 @@ class Tracks:
     numbers : (N,) int64
         Track number of each fruit, as `Tracker.update` gave it; of merged tracks the oldest.
     centres : (N, 3) float64
-        Centres in the session's frame as tracked, metres. The session's own come from the fusion of its sightings.
+        Centres in the session's frame as tracked, metres: as the fruits correct the poses. The session's own come from
+        the fusion of its sightings.
     covariances : (N, 3, 3) float64
         Their covariances, square metres.
     radii_m, radius_sigmas_m : (N,) float64
@@ -188,7 +189,8 @@ class Tracker:
         frame_number : int
             Larger than the one before.
         session_from_camera : (4, 4)
-            Pose of the camera; one frame of reference for all frames of a tracker.
+            Pose of the camera; one frame of reference for all frames of a tracker. It may drift: fruits in view correct
+            it.
         detections : Detections
             D boxes.
         lifted : Lifted

@@ -1,115 +1,11 @@
 //! Tracking on made-up rows: every fruit once, whatever hides, divides or joins its boxes.
 
-use pomona::nalgebra::{Matrix3, Matrix4, Vector3};
-use pomona::tracking::{Boxes, Camera, LiftedBoxes, Pose, Tracker, TrackingConfig, Tracks};
+mod filmed_row;
+
+use filmed_row::{Dice, RADIUS_M, Seen, outline, pose, row, seen, tracker};
+use pomona::nalgebra::{Matrix4, Rotation3, Vector3};
+use pomona::tracking::{Boxes, LiftedBoxes, Pose, TrackingConfig, Tracks};
 use pomona::{Config, Error};
-
-const CAMERA: Camera = Camera { focal_px: [417.0, 417.0], principal_px: [320.0, 180.0], size_px: [640.0, 360.0] };
-const RADIUS_M: f64 = 0.035;
-const STEP_M: f64 = 0.15;
-
-/// A small generator of numbers (xorshift), so that the tests need no crate for it.
-struct Dice(u64);
-
-impl Dice {
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
-
-/// One frame: boxes, and which of them have a depth.
-#[derive(Default)]
-struct Seen {
-    edges_px: Vec<[f64; 4]>,
-    rows: Vec<usize>,
-    centres: Vec<Vector3<f64>>,
-    covariances: Vec<Matrix3<f64>>,
-    diameters_m: Vec<f64>,
-    diameter_sigmas_m: Vec<f64>,
-}
-
-impl Seen {
-    fn lifted_box(&mut self, edges_px: [f64; 4], centre: Vector3<f64>, sigma_z_m: f64, radius_m: f64) {
-        let ray = centre / centre.z;
-        let across = (centre.z / CAMERA.focal_px[0]).powi(2) / 2.0;
-        self.rows.push(self.edges_px.len());
-        self.edges_px.push(edges_px);
-        self.centres.push(centre);
-        self.covariances.push(
-            ray * ray.transpose() * sigma_z_m.powi(2) + Matrix3::from_diagonal(&Vector3::new(across, across, 0.0)),
-        );
-        self.diameters_m.push(2.0 * radius_m);
-        self.diameter_sigmas_m.push(0.2 * radius_m);
-    }
-
-    fn take(&self, tracker: &mut Tracker, frame: i64, pose: &Pose) -> Vec<Option<usize>> {
-        let scores = vec![1.0; self.edges_px.len()];
-        let lifted = LiftedBoxes {
-            rows: &self.rows,
-            centres_in_camera: &self.centres,
-            covariances: &self.covariances,
-            diameters_m: &self.diameters_m,
-            diameter_sigmas_m: &self.diameter_sigmas_m,
-            support: &vec![0.7; self.rows.len()],
-        };
-        tracker.update(frame, pose, &Boxes { edges_px: &self.edges_px, scores: &scores }, &lifted).expect("fits")
-    }
-}
-
-fn pose(place: f64) -> Pose {
-    let matrix = Matrix4::new_translation(&Vector3::new(place * STEP_M, 0.0, 0.0));
-    Pose::from_matrix(&matrix).expect("rigid")
-}
-
-fn tracker() -> Tracker {
-    Tracker::new(CAMERA, TrackingConfig::default()).expect("defaults are valid")
-}
-
-/// Edges of a sphere's box, None where the picture does not hold it whole.
-fn outline(in_camera: &Vector3<f64>) -> Option<[f64; 4]> {
-    let edges = |axis: usize| {
-        let theta = in_camera[axis].atan2(in_camera.z);
-        let alpha = (RADIUS_M / in_camera[axis].hypot(in_camera.z)).asin();
-        let edge = |angle: f64| 417.0 * angle.tan() + CAMERA.principal_px[axis];
-        (edge(theta - alpha), edge(theta + alpha))
-    };
-    let ((xmin, xmax), (ymin, ymax)) = (edges(0), edges(1));
-    let inside = xmin > 2.0 && ymin > 2.0 && xmax < 638.0 && ymax < 358.0;
-    inside.then_some([xmin, ymin, xmax, ymax])
-}
-
-/// Pairs of touching fruits along a row.
-fn row(dice: &mut Dice, pairs: usize) -> Vec<Vector3<f64>> {
-    let mut fruits = Vec::new();
-    for pair in 0..pairs {
-        let first =
-            Vector3::new(-0.5 + 0.1 * pair as f64, 0.35 * (2.0 * dice.uniform() - 1.0), 1.3 + 0.5 * dice.uniform());
-        fruits.extend([first, first + Vector3::new(0.05, 0.05, 0.0)]);
-    }
-    fruits
-}
-
-/// What a frame at `place` shows of `fruits`: each with probability `shown`, its depth with a noise of `sigma_z_m`.
-fn seen(dice: &mut Dice, fruits: &[Vector3<f64>], place: f64, shown: f64, sigma_z_m: f64) -> (Seen, Vec<usize>) {
-    let (mut seen, mut names) = (Seen::default(), Vec::new());
-    for (name, fruit) in fruits.iter().enumerate() {
-        let in_camera = fruit - pose(place).translation;
-        let Some(edges_px) = outline(&in_camera) else { continue };
-        if dice.uniform() < shown {
-            let noisy = in_camera * (1.0 + sigma_z_m * dice.normal() / in_camera.z);
-            seen.lifted_box(edges_px.map(|edge| (edge + 0.5 * dice.normal()).round()), noisy, sigma_z_m, RADIUS_M);
-            names.push(name);
-        }
-    }
-    (seen, names)
-}
 
 /// Tracks of a row, and the name of the fruit behind each sighting.
 fn tracked(seed: u64, places: &[f64], shown: f64, sigma_z_m: f64) -> (Tracks, Vec<Vec<usize>>, Vec<Vector3<f64>>) {
@@ -158,6 +54,42 @@ fn fruits_are_known_again_after_a_gap() {
     once.dedup();
     assert!(n > 40);
     assert_eq!(once.len(), n, "a fruit came back as another");
+}
+
+/// Poses that are wrong by a few millimetres and a tenth of a degree more with every step.
+struct Drift {
+    dice: Dice,
+    wrong: Matrix4<f64>,
+}
+
+impl Drift {
+    fn next(&mut self, place: f64) -> Pose {
+        let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * self.dice.normal());
+        let step = Matrix4::new_translation(&three(0.004)) * Rotation3::new(three(0.002)).to_homogeneous();
+        self.wrong *= step;
+        Pose::from_matrix(&(Matrix4::new_translation(&(pose(place).translation)) * self.wrong)).expect("rigid")
+    }
+}
+
+#[test]
+fn fruits_hold_against_poses_that_drift() {
+    let mut dice = Dice(17);
+    let fruits = row(&mut dice, 40);
+    let mut drift = Drift { dice: Dice(23), wrong: Matrix4::identity() };
+    let (mut tracker, mut names) = (tracker(), Vec::new());
+    for (frame, place) in (0..16).chain((0..16).rev()).map(f64::from).enumerate() {
+        let (seen, shown) = seen(&mut dice, &fruits, place, 0.9, 0.02);
+        seen.take(&mut tracker, frame as i64, &drift.next(place));
+        names.push(shown);
+    }
+    let off_m: Vector3<f64> = drift.wrong.fixed_view::<3, 1>(0, 3).into();
+    assert!(off_m.norm() > 0.01, "the poses did not drift");
+    let found = names_of(&tracker.finish(5), &names);
+    let mut once: Vec<_> = found.iter().map(|of| of[0]).collect();
+    once.sort_unstable();
+    once.dedup();
+    assert_eq!(once.len(), found.len(), "a fruit came back as another");
+    assert!(found.iter().all(|of| of.iter().all(|&name| name == of[0])), "a track holds two fruits");
 }
 
 #[test]
