@@ -63,7 +63,7 @@ def test_a_leaf_in_front_does_not_win():
     assert found.disparity_px[1] == pytest.approx(true_disparities(APPLES)[1], abs=0.4)
 
 
-def test_a_fruit_that_only_the_left_camera_sees_is_refused():
+def test_a_fruit_that_only_the_left_camera_sees_is_placed_by_its_size_and_says_so():
     # A leaf right in front of the right camera's view of the second apple, beside the left camera's.
     x, y, z = APPLES[1].centre
     near_m = 0.7
@@ -75,9 +75,16 @@ def test_a_fruit_that_only_the_left_camera_sees_is_refused():
     boxes = boxes_of(APPLES)
     xmin, ymin, xmax, ymax = boxes[1].astype(int)
     assert depth_m[ymin + 2 : ymax - 2, xmin + 5 : xmax - 5].min() > 1.4
-    lifted = lift(StereoDepth(PAIR)(left, right, boxes), boxes, PAIR)
-    assert 1 not in lifted.rows
-    assert lifted.refused == {Refusal.UNMATCHED: 1}
+    # Three sure matches do not know a size: then nothing is known of it.
+    alone = lift(StereoDepth(PAIR)(left, right, boxes), boxes, PAIR)
+    assert alone.rows.tolist() == [0, 2, 3]
+    assert alone.refused == {Refusal.UNMATCHED: 1}
+    more = [*APPLES, apple(-0.25, 0.2, 1.1, 0.085)]
+    left, right, _ = pair(more, [leaf])
+    lifted = lift(StereoDepth(PAIR)(left, right, boxes_of(more)), boxes_of(more), PAIR)
+    assert lifted.measured.tolist() == [True, False, True, True, True]
+    assert lifted.centres_in_camera[1, 2] == pytest.approx(z, rel=0.15)
+    assert 0.12 < np.sqrt(lifted.covariances[1, 2, 2]) / z < 0.3
 
 
 def test_pictures_without_any_contrast_match_nothing():
@@ -144,7 +151,7 @@ def test_rendered_fruits_come_out_with_errors_as_large_as_they_say(shared_data):
     recording, truth = open_recording(source), rendered_truth(source)
     place_of = dict(zip(truth.ids, truth.positions, strict=True))
     named = [box for box in true_boxes(source) if box.frame < 4]
-    stereo, off_px, sigmas = StereoDepth(recording.calibration), [], []
+    stereo, off_px, sigmas, support = StereoDepth(recording.calibration), [], [], []
     for frame in list(recording.frames())[:4]:
         boxes = [box for box in named if box.frame == frame.number]
         found = stereo(frame.read_left(), frame.read_right(), np.array([box.box_px for box in boxes], float))
@@ -152,7 +159,8 @@ def test_rendered_fruits_come_out_with_errors_as_large_as_they_say(shared_data):
         focal_baseline = recording.calibration.fx * recording.calibration.baseline_m
         off_px.extend(found.disparity_px - focal_baseline / z)
         sigmas.extend(found.disparity_sigma_px)
-    matched = np.isfinite(off_px)
+        support.extend(found.support)
+    matched = np.array(support) > 0
     off_px, sigmas = np.array(off_px)[matched], np.array(sigmas)[matched]
     assert matched.mean() > 0.5
     assert abs(np.median(off_px)) < 0.15

@@ -44,11 +44,12 @@ class FruitDepth:
     depth_m : (H, W) float32
         Depth along the optical axis of the left camera, 0 where nothing was measured.
     disparity_sigma_px : (D,) float64
-        Standard deviation of the disparity of the fruit in each box, NaN where it was not matched.
+        Standard deviation of the disparity of the fruit in each box, NaN where nothing is known of it.
     disparity_px : (D,) float64 or None
-        Disparity of the fruit's centre, NaN where it was not matched; None where the pixels of `depth_m` vote for it.
+        Disparity of the fruit's centre, NaN where nothing is known of it; None where the pixels of `depth_m` vote.
     support : (D,) float64 or None
-        Part of the fruit's outline that looks alike in both pictures; None where pixels vote.
+        Part of the fruit's outline that looks alike in both pictures; 0 where it does not match, so that its disparity
+        is what the usual size of the picture's fruits gives it; None where pixels vote.
     """
 
     depth_m: NDArray[np.float32]
@@ -74,7 +75,8 @@ class Lifted:
     hidden : (M,) float64
         Mean part of the diameter that leaves are expected to hide; its square is in `diameter_sigmas_m`.
     support : (M,) float64
-        Part of the outline's pixels whose depth is on the fruit, 0 to 1.
+        Part of the outline's pixels whose depth is on the fruit, 0 to 1; 0 where the depth is not measured but what
+        the usual size of the picture's fruits says, with a sigma of 15 % or more.
     refused : Counter of Refusal
         Boxes that could not be lifted, by reason.
     """
@@ -90,6 +92,11 @@ class Lifted:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which depths were measured, (M,); the others are guesses from the size of the outline."""
+        return np.asarray(self.support > 0)
 
 
 def lift(

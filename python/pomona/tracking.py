@@ -210,13 +210,15 @@ class Tracker:
         pose = np.asarray(session_from_camera, np.float64)
         if pose.shape != (4, 4):
             raise PomonaError(f"session_from_camera: found an array of shape {pose.shape}, expected (4, 4)")
+        # A depth guessed from the size tells the tracker nothing that it does not know of sizes itself.
+        measured = lifted.measured
         arrays: _core._Lifted = {
-            "rows": np.ascontiguousarray(lifted.rows, np.int64),
-            "centres_in_camera": np.ascontiguousarray(lifted.centres_in_camera, np.float64),
-            "covariances": np.ascontiguousarray(lifted.covariances, np.float64),
-            "diameters_m": np.ascontiguousarray(lifted.diameters_m, np.float64),
-            "diameter_sigmas_m": np.ascontiguousarray(lifted.diameter_sigmas_m, np.float64),
-            "support": np.ascontiguousarray(lifted.support, np.float64),
+            "rows": np.ascontiguousarray(lifted.rows[measured], np.int64),
+            "centres_in_camera": np.ascontiguousarray(lifted.centres_in_camera[measured], np.float64),
+            "covariances": np.ascontiguousarray(lifted.covariances[measured], np.float64),
+            "diameters_m": np.ascontiguousarray(lifted.diameters_m[measured], np.float64),
+            "diameter_sigmas_m": np.ascontiguousarray(lifted.diameter_sigmas_m[measured], np.float64),
+            "support": np.ascontiguousarray(lifted.support[measured], np.float64),
         }
         try:
             return self._core.update(frame_number, pose.tolist(), detections.boxes_px, detections.scores, arrays)

@@ -50,6 +50,9 @@ const HIDDEN: [f64; 3] = [0.09, 0.04, 0.02];
 /// What is added to it for a fruit of which nearly nothing agrees with the outline.
 const HIDDEN_UNSUPPORTED: f64 = 0.04;
 
+/// The same of a fruit that does not match in a pair: leaves hide it from one camera, so from the other in part.
+const HIDDEN_UNMATCHED: f64 = 0.09;
+
 /// Independent patches on the face of a whole fruit: shape and filters err alike over a third of the diameter. With it
 /// the same apples scatter between captures by no more than the covariances say.
 const SURFACE_PATCHES: f64 = 8.0;
@@ -61,7 +64,7 @@ pub enum Refusal {
     Cut,
     /// Too few pixels have a depth.
     NoDepth,
-    /// The other picture of a pair shows no sure match.
+    /// The other picture of a pair shows no sure match, and no size of fruits is known.
     Unmatched,
 }
 
@@ -79,7 +82,7 @@ pub enum Source {
         depth_m: f64,
         /// `sigma_d / (f B)`.
         sigma_per_m2: f64,
-        /// Part of the outline that matches.
+        /// Part of the outline that matches; 0 where the depth is only what the fruit's size says.
         support: f64,
     },
     /// A pair in which it was not.
@@ -99,7 +102,7 @@ pub struct Sighting {
     pub diameter_sigma_m: f64,
     /// Mean part of the diameter that leaves are expected to hide.
     pub hidden: f64,
-    /// Part of the outline's pixels whose depth is on the fruit.
+    /// Part of the outline's pixels whose depth is on the fruit; 0 where the depth is only what its size says.
     pub support: f64,
 }
 
@@ -138,7 +141,9 @@ fn lift_box(depth: DepthPicture, box_px: [f64; 4], source: Source, camera: &Came
     let pixels = pixels(depth, box_px, camera);
     let vote_under = |outline: &Outline| matched.or_else(|| vote_for_depth(&pixels, outline.centre, outline.radius));
     let mut vote = vote_under(&outline).ok_or(Refusal::NoDepth)?;
-    let covered = covered_edges(depth, box_px, vote.depth_m, outline.radius);
+    // Around a fruit whose depth is only guessed nothing can be nearer or farther than it.
+    let covered =
+        if vote.support > 0.0 { covered_edges(depth, box_px, vote.depth_m, outline.radius) } else { [false; 4] };
     if covered.contains(&true) {
         outline = Outline::of_box(box_px, camera, covered).unwrap_or(outline);
         vote = vote_under(&outline).unwrap_or(vote);
@@ -171,7 +176,11 @@ fn sighting(outline: &Outline, vote: &Vote, depth_sigma_per_m2: f64) -> Sighting
     let ray = Vector3::new(outline.centre[0], outline.centre[1], 1.0);
     let [sigma_x, sigma_y] = outline.centre_sigma.map(|sigma| z * sigma);
     let across = Matrix3::from_diagonal(&Vector3::new(sigma_x * sigma_x, sigma_y * sigma_y, 0.0));
-    let hidden = HIDDEN[outline.whole_axes] + HIDDEN_UNSUPPORTED * (1.0 - vote.support);
+    let hidden = if vote.support > 0.0 {
+        HIDDEN[outline.whole_axes] + HIDDEN_UNSUPPORTED * (1.0 - vote.support)
+    } else {
+        HIDDEN_UNMATCHED
+    };
     let diameter_variance = (2.0 * z * outline.radius_sigma).powi(2)
         + 4.0 * s * s * along2
         + (ROUNDNESS_SIGMA.powi(2) + hidden * hidden) * diameter_m * diameter_m;

@@ -3,7 +3,8 @@
 //! Each fruit is matched as one disc ([`disc`]): the outline of its box leaves only the disparity open. Colours that the
 //! boxes share weigh the pixels ([`colour`]), so that a leaf in the box says little; sizes of surely matched fruits help the
 //! unsure ([`sizes`]). The best disparity is then fixed to a part of a pixel, and kept where the way back from the right
-//! picture agrees and no other disparity is nearly as good. How nearly, the margin, is also what says how sure it is.
+//! picture agrees and no other disparity is nearly as good. How nearly, the margin, is also what says how sure it is. Of a
+//! fruit that does not match, hidden from the right camera or from both, the size still says roughly how far it is.
 
 mod colour;
 mod disc;
@@ -28,7 +29,7 @@ const FARTHEST_M: f64 = 20.0;
 const VALLEY_PX: usize = 2;
 
 /// The margin by which a match is sure enough to speak for the sizes of others.
-const SURE_MARGIN: f64 = 0.15;
+const SURE_MARGIN: f64 = 0.1;
 
 /// A match by less than this is a guess: on the rendered row a fifth of those above and a half of those below are wrong.
 const MIN_MARGIN: f64 = 0.05;
@@ -70,14 +71,22 @@ pub struct FruitDisparity {
     pub centre_px: f64,
     /// Standard deviation.
     pub sigma_px: f64,
-    /// Part of the outline, weighted by colour, that looks alike in both pictures.
+    /// Part of the outline, weighted by colour, that looks alike in both pictures; 0 where the fruit does not match and
+    /// its disparity is what its size would have.
     pub support: f64,
+}
+
+impl FruitDisparity {
+    /// Whether the pair shows it.
+    pub fn is_matched(&self) -> bool {
+        self.support > 0.0
+    }
 }
 
 /// What a pair says of the fruits in boxes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// Per box; none where the picture cuts it or no disparity is sure.
+    /// Per box; none where the picture cuts it, or it does not match and too few others do to know a size.
     pub fruits: Vec<Option<FruitDisparity>>,
     /// Depth along the optical axis of the left camera, metres, 0 but around matched fruits.
     pub depth_m: Vec<f32>,
@@ -108,12 +117,20 @@ pub fn read(left: Picture, right: Picture, boxes_px: &[[f64; 4]], rig: &Rig) -> 
         })
         .collect();
     let sizes = Sizes::of(candidates.iter().flatten().filter_map(Candidate::sure_diameter_m));
-    let fruits: Vec<Option<FruitDisparity>> =
-        candidates.iter().map(|one| one.as_ref()?.decided(sizes.as_ref(), &lefts, right, end)).collect();
+    let fruits: Vec<Option<FruitDisparity>> = candidates
+        .iter()
+        .map(|one| {
+            let one = one.as_ref()?;
+            one.decided(sizes.as_ref(), &lefts, right, end).or_else(|| Some(one.sized(sizes.as_ref()?)))
+        })
+        .collect();
     let windows: Vec<Option<Surroundings>> = fruits
         .iter()
         .zip(&beside)
-        .map(|(fruit, &pixels)| Some(Surroundings::new(left, &rights, pixels, first, fruit.as_ref()?.centre_px)))
+        .map(|(fruit, &pixels)| {
+            let fruit = fruit.as_ref().filter(|fruit| fruit.is_matched())?;
+            Some(Surroundings::new(left, &rights, pixels, first, fruit.centre_px))
+        })
         .collect();
     Reading { fruits, depth_m: picture_of(&windows, &inside, rig) }
 }
@@ -152,6 +169,14 @@ impl Candidate {
         (margin > SURE_MARGIN).then(|| self.diameter_m(best))
     }
 
+    /// The disparity that it would have, were it of the usual size.
+    fn sized(&self, sizes: &Sizes) -> FruitDisparity {
+        let (diameter_m, spread) = sizes.usual();
+        let centre_px = 2.0 * self.disc.radius * self.focal_baseline_px_m / diameter_m;
+        FruitDisparity { centre_px, sigma_px: spread * centre_px, support: 0.0 }
+    }
+
+    /// None where no disparity is sure.
     fn decided(&self, sizes: Option<&Sizes>, lefts: &Bounds, right: Picture, end: usize) -> Option<FruitDisparity> {
         let size_cost = |k| sizes.map_or(0.0, |sizes| sizes.cost(self.diameter_m(k)));
         let costs: Vec<f64> = self.costs.iter().enumerate().map(|(k, cost)| cost + size_cost(k)).collect();

@@ -13,6 +13,10 @@ const MIN_SURE: usize = 4;
 /// Least spread of log diameters: fruits of one tree, and outlines that leaves make smaller.
 const MIN_SPREAD: f64 = 0.1;
 
+/// What leaves take from the outlines of fruits that cannot be matched, over the diameter: with it the spread is the
+/// 15 % that those of the rendered row have.
+const HIDDEN_SPREAD: f64 = 0.1;
+
 /// What one more e-fold of improbability costs, over the median cost of a disc.
 const WEIGHT: f64 = 0.2;
 
@@ -33,6 +37,11 @@ impl Sizes {
         let centre = median(&mut logs);
         let mut off: Vec<f64> = logs.iter().map(|one| (one - centre).abs()).collect();
         Some(Self { centre, spread: (1.4826 * median(&mut off)).hypot(MIN_SPREAD) })
+    }
+
+    /// The usual diameter, and by what part of itself the diameter that an outline shows differs from it.
+    pub(crate) fn usual(&self) -> (f64, f64) {
+        (self.centre.exp(), self.spread.hypot(HIDDEN_SPREAD))
     }
 
     /// What a diameter costs.
