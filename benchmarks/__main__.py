@@ -6,7 +6,19 @@ Options after the name of a single benchmark go to it: `python -m benchmarks cel
 import importlib
 import sys
 
-NAMES = ("robustness", "cells", "lifting", "diameters", "kinect", "season", "clouds", "tracking", "speed", "readme")
+NAMES = (
+    "robustness",
+    "cells",
+    "lifting",
+    "diameters",
+    "kinect",
+    "season",
+    "clouds",
+    "odometry",
+    "tracking",
+    "speed",
+    "readme",
+)
 """In the order in which all of them run."""
 
 

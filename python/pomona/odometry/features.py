@@ -20,12 +20,9 @@ Picture = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 CELL_PX = 40
-"""Side of the cells over which corners are spread: 144 of them at 640 x 360."""
+"""Side of the cells over which corners are spread: 144 at 640 x 360."""
 
-CORNERS_PER_CELL = 6
-"""A few hundred corners over the picture; of foliage seen from 20 cm further every fourth survives all checks."""
-
-MIN_DISTANCE_PX = 6
+MIN_DISTANCE_PX = 4
 """Between corners: nearer ones see the same window."""
 
 MIN_CORNER = 2e-4
@@ -57,8 +54,8 @@ def is_flat(picture: Picture) -> bool:
     return float(picture[::4, ::4].std()) < FLAT_CONTRAST
 
 
-def corners(picture: Picture, taken: Array, *, per_cell: int = CORNERS_PER_CELL) -> Array:
-    """Find corners (N, 2), the strongest of each cell, none near those already `taken`."""
+def corners(picture: Picture, taken: Array, per_cell: int) -> Array:
+    """Find corners (N, 2), the strongest of each cell, none near those already `taken`; the latter count, too."""
     strength = cv2.cornerMinEigenVal(picture, 5)
     span = 2 * MIN_DISTANCE_PX + 1
     peak = (strength >= cv2.dilate(strength, np.ones((span, span), np.uint8))) & (strength > MIN_CORNER)

@@ -121,10 +121,10 @@ class Reference:
     def find_again(self, picture: Picture, expected: Array) -> Array | None:
         """Find the pose of a picture that may show the points anywhere, by patches; slow."""
         none = np.zeros((0, 2))
-        places = corners(self.picture, none, per_cell=DENSE_PER_CELL)
+        places = corners(self.picture, none, DENSE_PER_CELL)
         disparity = self.measure(places, np.full(len(places), np.nan))
         known = np.isfinite(disparity)
-        candidates = corners(picture, none, per_cell=DENSE_PER_CELL)
+        candidates = corners(picture, none, DENSE_PER_CELL)
         there, matched = rematch(self.picture, picture, places[known], candidates)
         in_camera, covariances = triangulated(self.camera, np.column_stack([places[known], disparity[known]])[matched])
         here = np.linalg.inv(self.pose) @ expected

@@ -23,7 +23,7 @@ SIGMA_DISPARITY_PX = 0.5
 """Standard deviations of a followed corner and of a disparity: on foliage the residuals of the adjustment scatter by
 that much; on walls and bark by half of it."""
 
-FREE = 7
+FREE = 5
 """Keyframes that an adjustment may move. A point is seen by fewer than that."""
 
 HELD = 3
