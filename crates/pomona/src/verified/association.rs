@@ -1,13 +1,27 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::growth::{Overlap, Prediction};
-use super::hypothesis::gaussian;
 use super::landscape::Landscape;
+use super::overlap::Prediction;
+use super::pose::Pose;
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
 
-/// Edges reach to `P(chi^2_3 > 14.8)` = 0.2 %.
+/// Edges reach to `P(chi^2_3 > 14.8)` = 0.2 % of the noise, or as far as a branch may have moved for itself.
 const GATE: f64 = 3.85;
+const FAR_GATE: f64 = 7.0;
+
+/// The same in spacings at the most: 13 cm in an orchard.
+const FAR: f64 = 0.5;
+
+/// Share of the fruits that moved otherwise than their neighbours, and how much wider they scatter.
+///
+/// Real residuals have tails that no normal distribution has: a branch broke loose, a depth was measured on a leaf. A
+/// pair far off is believed only where nothing else is near.
+const LOOSE: f64 = 0.01;
+const LOOSE_WIDTH: f64 = 3.0;
+
+/// Pairs less likely than this against "hidden there, new here" are left out.
+const LEAST_RATIO: f64 = 1e-3;
 
 /// One fruit of the query found again, rows of the centred clouds.
 #[derive(Debug, Clone, Copy)]
@@ -20,13 +34,6 @@ pub(crate) struct Association {
     pub(crate) gain: f64,
 }
 
-/// Rounds in which the share of fruits seen again and the noise follow from the marginals: nearest partners, which growth
-/// goes by, lie closer than true ones where fruits crowd.
-const ROUNDS: usize = 4;
-
-/// Pairs whose noise is as growth found it, against those that say otherwise.
-const EXPECTED_PAIRS: f64 = 12.0;
-
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     query: u32,
@@ -34,87 +41,103 @@ struct Edge {
     /// Likelihood ratio of "the same fruit" against "hidden there, new here".
     ratio: f64,
     distance: f64,
-    /// Squared distance over the variance along its direction.
-    mahalanobis2: f64,
 }
 
-/// Pairs of an overlap.
-///
-/// Joint likelihood of a set of pairs: a fruit of the map is seen again with probability p, an unmatched fruit of
-/// the query is new with the density of new fruits at its place. Every pair thus weighs
-/// `p / (1 - p) N(d) / new density` against leaving both alone. Marginals by belief propagation (Williams and Lau
-/// 2014), pairs by the assignment that gains most expected right answers.
-pub(crate) fn associate(
-    query: &Landscape,
-    map: &Landscape,
-    overlap: &Overlap,
-    size: &impl Fn(u32, u32) -> f64,
-    min_probability: f64,
-) -> Vec<Association> {
-    let (mut share, mut stretch) = (0.6, 1.0);
-    let mut edges = Vec::new();
-    let mut marginals = Vec::new();
-    for _ in 0..ROUNDS {
-        edges = edges_of(query, map, overlap, share, stretch, size);
-        marginals = belief_propagation(&edges, query.len(), map.len());
-        let expected: f64 =
-            overlap.predictions.iter().flatten().map(|prediction| map.support(&prediction.place)).sum::<f64>().max(1.0);
-        let weight: f64 = marginals.iter().sum();
-        let squares: f64 = edges.iter().zip(&marginals).map(|(edge, p)| p * edge.mahalanobis2).sum();
-        stretch *= (squares / 3.0 + EXPECTED_PAIRS) / (weight + EXPECTED_PAIRS);
-        stretch = stretch.clamp(1.0, 4.0);
-        share = ((marginals.iter().sum::<f64>() + 1.0) / (expected + 2.0)).clamp(0.2, 0.97);
+/// Probabilities of all edges of an overlap.
+#[derive(Debug, Clone)]
+pub(crate) struct Marginals {
+    edges: Vec<Edge>,
+    probabilities: Vec<f64>,
+}
+
+/// What an edge says to the fit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Link {
+    pub(crate) query: u32,
+    pub(crate) map: u32,
+    pub(crate) probability: f64,
+}
+
+impl Marginals {
+    /// Joint likelihood of a set of pairs: a fruit of the map is seen again with probability p, an unmatched fruit of
+    /// the query is new with the density of new fruits at its place. Every pair thus weighs
+    /// `p / (1 - p) N(d) / new density` against leaving both alone. Marginals by belief propagation (Williams and Lau
+    /// 2014).
+    pub(crate) fn new(
+        query: &Landscape,
+        map: &Landscape,
+        predictions: &[Option<Prediction>],
+        pose: &Pose,
+        share: f64,
+        size: &impl Fn(u32, u32) -> f64,
+    ) -> Self {
+        let edges = edges_of(query, map, predictions, pose, share, size);
+        let probabilities = belief_propagation(&edges, query.len(), map.len());
+        Self { edges, probabilities }
     }
-    let gains: Vec<(usize, usize, f64)> = edges
-        .iter()
-        .zip(&marginals)
-        .map(|(edge, &p)| (edge.query as usize, edge.map as usize, p - min_probability))
-        .collect();
-    let partners = assign(query.len(), map.len(), &gains);
-    let mut pairs: Vec<Association> = edges
-        .iter()
-        .zip(&marginals)
-        .filter(|(edge, _)| partners[edge.query as usize] == Some(edge.map as usize))
-        .map(|(edge, &probability)| Association {
+
+    pub(crate) fn links(&self) -> impl Iterator<Item = Link> {
+        self.edges.iter().zip(&self.probabilities).map(|(edge, &probability)| Link {
             query: edge.query,
             map: edge.map,
             probability,
-            distance: edge.distance,
-            gain: edge.ratio.ln(),
         })
-        .collect();
-    pairs.sort_unstable_by_key(|pair| (pair.query, pair.map));
-    pairs.dedup_by_key(|pair| (pair.query, pair.map));
-    pairs
+    }
+
+    /// The one-to-one pairs that gain most expected right answers.
+    pub(crate) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Association> {
+        let both = || self.edges.iter().zip(&self.probabilities);
+        let gains: Vec<(usize, usize, f64)> =
+            both().map(|(edge, &p)| (edge.query as usize, edge.map as usize, p - min_probability)).collect();
+        let partners = assign(n_query, n_map, &gains);
+        let mut pairs: Vec<Association> = both()
+            .filter(|(edge, _)| partners[edge.query as usize] == Some(edge.map as usize))
+            .map(|(edge, &probability)| Association {
+                query: edge.query,
+                map: edge.map,
+                probability,
+                distance: edge.distance,
+                gain: edge.ratio.ln(),
+            })
+            .collect();
+        pairs.sort_unstable_by_key(|pair| (pair.query, pair.map));
+        pairs.dedup_by_key(|pair| (pair.query, pair.map));
+        pairs
+    }
 }
 
 fn edges_of(
     query: &Landscape,
     map: &Landscape,
-    overlap: &Overlap,
+    predictions: &[Option<Prediction>],
+    pose: &Pose,
     share: f64,
-    stretch: f64,
     size: &impl Fn(u32, u32) -> f64,
 ) -> Vec<Edge> {
-    let scale = overlap.pose.scale;
+    let scale = pose.scale;
     let volume_scale = scale.powi(3);
     let mut edges = Vec::new();
-    for (row, prediction) in overlap.predictions.iter().enumerate() {
+    for (row, prediction) in predictions.iter().enumerate() {
         let Some(Prediction { place, variance }) = *prediction else { continue };
-        let variance = stretch * variance;
+        let seen = (share * map.support(&place)).max(LEAST_SEEN);
         let first = edges.len();
-        let own = query.covariances.as_ref().map(|all| overlap.pose.turned(&all[row]));
-        map.near(&place, GATE * (WIDEST * variance).sqrt(), |partner| {
+        let own = query.covariances.as_ref().map(|all| pose.turned(&all[row]));
+        let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
+        let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
+        map.near(&place, gate * (widest * variance).sqrt(), |partner| {
             let offset = map.points[partner as usize] - place;
             let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
             let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
-            if mahalanobis2 <= GATE * GATE {
+            if mahalanobis2 <= gate * gate {
                 let distance = offset.norm();
                 // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
                 let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
-                let new = (1.0 - share) * companions.max(map.floor);
-                let ratio = share / (1.0 - share) * density / new * size(row as u32, partner);
-                edges.push(Edge { query: row as u32, map: partner, ratio, distance, mahalanobis2 });
+                let crowding = 0.5 * (query.crowding[row] + map.crowding[partner as usize]);
+                let new = (1.0 - seen) * (companions * crowding).max(map.floor);
+                let ratio = seen / (1.0 - seen) * density / new * size(row as u32, partner);
+                if ratio > LEAST_RATIO {
+                    edges.push(Edge { query: row as u32, map: partner, ratio, distance });
+                }
             }
         });
         // Two cells of the grid may share a bucket, which then is visited twice.
@@ -139,9 +162,14 @@ fn edges_of(
 /// centroids are long along the viewing ray. `uncertain` is the sum of the two covariances; a tenth of the variance stays
 /// isotropic, for what the recording does not know of (sag, growth).
 fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
+    // Density by the squared Mahalanobis distance, times the product of the three standard deviations.
+    let tailed = |d2: f64| {
+        let loose = (-0.5 * d2 / (LOOSE_WIDTH * LOOSE_WIDTH)).exp() / LOOSE_WIDTH.powi(3);
+        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - LOOSE) * (-0.5 * d2).exp() + LOOSE * loose)
+    };
     let isotropic = || {
-        let d2 = offset.norm_squared();
-        (d2 / variance, gaussian(d2, variance))
+        let d2 = offset.norm_squared() / variance;
+        (d2, tailed(d2) / (variance * variance.sqrt()))
     };
     let Some(shape) = uncertain else { return isotropic() };
     let mean = shape.trace() / 3.0;
@@ -152,9 +180,11 @@ fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f6
     let covariance = shape * (share * variance / mean) + Matrix3::identity() * ((1.0 - share) * variance);
     let Some(factor) = covariance.cholesky() else { return isotropic() };
     let mahalanobis2 = offset.dot(&factor.solve(offset));
-    let norm = (2.0 * std::f64::consts::PI).powf(-1.5) / factor.l().diagonal().product();
-    (mahalanobis2, norm * (-0.5 * mahalanobis2).exp())
+    (mahalanobis2, tailed(mahalanobis2) / factor.l().diagonal().product())
 }
+
+/// Probability at the least that a fruit is seen again, wherever it is.
+const LEAST_SEEN: f64 = 0.02;
 
 /// Variance along the longest axis over the mean variance, at the most.
 const WIDEST: f64 = 3.0;
@@ -182,7 +212,7 @@ fn belief_propagation(edges: &[Edge], n_query: usize, n_map: usize) -> Vec<f64> 
             change = change.max((next - *back).abs());
             *back = next;
         }
-        if change < 1e-6 {
+        if change < 1e-5 {
             break;
         }
     }
@@ -220,7 +250,7 @@ mod tests {
 
     #[test]
     fn marginals_are_exact_on_a_tree_and_close_on_a_loop() {
-        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0, mahalanobis2: 0.0 };
+        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
         let tree = [edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)];
         for (found, truth) in belief_propagation(&tree, 2, 2).iter().zip(exact(&tree)) {
             assert!((found - truth).abs() < 1e-6, "{found} {truth}");

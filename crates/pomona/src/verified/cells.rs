@@ -1,20 +1,19 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
-use super::landscape::{CellHasher, Landscape};
+use super::grid::CellHasher;
 use super::pose::{Moments, Pose};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
+use std::sync::Arc;
 
 /// Fruits that share one pose.
 #[derive(Debug, Clone)]
-pub(super) struct Cell {
-    /// Place in the grid of cells.
-    pub(super) key: [i64; 3],
+pub(crate) struct Cell {
     pub(super) centre: Vector3<f64>,
-    pub(super) rows: Vec<u32>,
+    pub(super) rows: Arc<[u32]>,
     /// Cells up to two steps away, itself included, with their weights.
-    pub(super) around: Vec<(u32, f64)>,
+    pub(super) around: Arc<[(u32, f64)]>,
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
     pub(super) pose: Pose,
@@ -44,45 +43,71 @@ pub(super) fn key_of(p: &Vector3<f64>, edge: f64) -> [i64; 3] {
     [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
 }
 
-/// Cuts the query into cells of `edge` metres that have fruits; all start with `pose`.
-pub(super) fn cells_of(query: &Landscape, edge: f64, pose: &Pose) -> (Vec<Cell>, CellIndex) {
-    let mut index = CellIndex::default();
-    let mut cells: Vec<Cell> = Vec::new();
-    for (row, p) in query.points.iter().enumerate() {
-        let key = key_of(p, edge);
-        let at = *index.entry(key).or_insert_with(|| {
-            cells.push(Cell {
-                key,
-                centre: Vector3::zeros(),
-                rows: Vec::new(),
-                around: Vec::new(),
+/// The cells of a cloud, as every growth starts with them.
+#[derive(Debug, Clone)]
+pub(crate) struct Cut {
+    pub(super) edge: f64,
+    pub(super) cells: Vec<Cell>,
+    /// Cell of each fruit.
+    pub(super) cell_of: Vec<u32>,
+    pub(super) index: CellIndex,
+}
+
+impl Cut {
+    /// Cuts the cloud into cells of `edge` metres that have fruits.
+    pub(super) fn new(points: &[Vector3<f64>], edge: f64) -> Self {
+        let mut index = CellIndex::default();
+        let mut keys = Vec::new();
+        let mut rows: Vec<Vec<u32>> = Vec::new();
+        let mut cell_of = Vec::with_capacity(points.len());
+        for (row, p) in points.iter().enumerate() {
+            let key = key_of(p, edge);
+            let at = *index.entry(key).or_insert_with(|| {
+                keys.push(key);
+                rows.push(Vec::new());
+                rows.len() - 1
+            });
+            rows[at].push(row as u32);
+            cell_of.push(at as u32);
+        }
+        let middle = |rows: &Vec<u32>| {
+            rows.iter().fold(Vector3::zeros(), |sum, &row| sum + points[row as usize]) / rows.len() as f64
+        };
+        let centres: Vec<Vector3<f64>> = rows.iter().map(middle).collect();
+        let cells = rows
+            .into_iter()
+            .enumerate()
+            .map(|(i, rows)| Cell {
+                centre: centres[i],
+                rows: rows.into(),
+                around: around(&index, &keys[i], &centres, &centres[i], edge),
                 moments: Moments::default(),
-                pose: *pose,
+                pose: Pose::identity(),
                 reached: false,
                 log_odds: 0.0,
-            });
-            cells.len() - 1
-        });
-        cells[at].rows.push(row as u32);
-        cells[at].centre += p;
+            })
+            .collect();
+        Self { edge, cells, cell_of, index }
     }
-    for cell in &mut cells {
-        cell.centre /= cell.rows.len() as f64;
-    }
-    for i in 0..cells.len() {
-        let key = cells[i].key;
-        let mut around = Vec::new();
-        for dx in -2..=2i64 {
-            for dy in -2..=2i64 {
-                for dz in -2..=2i64 {
-                    if let Some(&other) = index.get(&[key[0] + dx, key[1] + dy, key[2] + dz]) {
-                        let d2 = (cells[other].centre - cells[i].centre).norm_squared() / (edge * edge);
-                        around.push((other as u32, (-0.5 * d2).exp()));
-                    }
+}
+
+fn around(
+    index: &CellIndex,
+    key: &[i64; 3],
+    centres: &[Vector3<f64>],
+    centre: &Vector3<f64>,
+    edge: f64,
+) -> Arc<[(u32, f64)]> {
+    let mut around = Vec::new();
+    for dx in -2..=2i64 {
+        for dy in -2..=2i64 {
+            for dz in -2..=2i64 {
+                if let Some(&other) = index.get(&[key[0] + dx, key[1] + dy, key[2] + dz]) {
+                    let d2 = (centres[other] - centre).norm_squared() / (edge * edge);
+                    around.push((other as u32, (-0.5 * d2).exp()));
                 }
             }
         }
-        cells[i].around = around;
     }
-    (cells, index)
+    around.into()
 }

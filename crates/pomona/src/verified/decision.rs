@@ -1,19 +1,20 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
 use super::acceptance::{VerifiedConfig, poses};
-use super::association::associate;
-use super::growth::{Overlap, grow, grow_everywhere, settle};
-use super::hypothesis::{Hypothesis, Model, Scratch, refine};
+use super::doubts::RIVAL_CANDIDATES;
+use super::growth::{Growth, grow, hold};
+use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::outline;
-use super::pose::{Moments, Pose};
-use super::search::{Candidate, Effort, refined, round};
+use super::overlap::Overlap;
+use super::pose::Pose;
+use super::search::{Candidate, Effort, round};
 use super::seeds::SeedIndex;
-use super::size::Sizes;
 use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
-use crate::matching::{Match, Pair, Registration, Request, Verdict};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use crate::matching::{Match, Request, Verdict};
+use nalgebra::Vector3;
+use std::ops::Range;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 const MIN_FRUITS: usize = 5;
@@ -36,20 +37,17 @@ const ROUNDS: [(u64, usize); 4] = [(1, 32), (1, 32), (4, 48), (u64::MAX, 64)];
 /// Fruits whose seeds make the first round: where the visits overlap well, few are enough in a cloud of any size.
 const FIRST_FRUITS: usize = 256;
 
+/// A pose found with fewer seeds than that has this many more of every fruit tried in search of a rival.
+const RIVAL_TURNS: u64 = 3;
+
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
 
-/// A rival with this share of the best evidence makes the answer ambiguous.
-const RIVAL: f64 = 0.55;
-
-/// Candidates that are refined in search of a rival once a pose is accepted.
-const RIVAL_CANDIDATES: usize = 24;
-
-/// Two hypotheses that put a fruit within this many spacings of one place are the same.
-const SAME: f64 = 0.4;
+/// A pose with this many times the evidence needed is no local optimum.
+const SURE: f64 = 6.0;
 
 /// Times more seeds where the vertical is known.
 const UPRIGHT_SEEDS: u64 = 4;
@@ -74,11 +72,16 @@ impl Prepared {
 }
 
 /// An overlap with the region it was found from.
-struct Finding {
-    overlap: Overlap,
-    seed: Hypothesis,
-    /// What growth assumed.
-    model: Model,
+pub(super) struct Finding<'a> {
+    pub(super) growth: Growth<'a>,
+    pub(super) overlap: Overlap,
+    pub(super) seed: Hypothesis,
+}
+
+impl<'a> Finding<'a> {
+    pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
+        Self { overlap: growth.overlap(), growth, seed }
+    }
 }
 
 /// Finds the query in the map.
@@ -92,47 +95,17 @@ pub(crate) fn search(
     if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS {
         return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
     }
-    let search = Search::new(prepared, query, request, config);
+    let landscape = Landscape::new(query);
+    let search = Search::new(prepared, &landscape, request, config);
     let (mut findings, mut stages) = search.run();
     if findings.first().is_some_and(|best| search.fits_better_mirrored(best)) {
         stages.push(("mirrored", 1.0));
         findings.clear();
     }
-    if let Some(best) = findings.first_mut() {
-        search.reach_all(best);
+    if let Some(best) = findings.first_mut().filter(|best| !best.growth.whole) {
+        best.growth.reach_all();
     }
     search.answer(findings, map, query, stages)
-}
-
-/// Fruits within this many standard deviations of one line fix no turn about it.
-const FLAT: f64 = 3.0;
-
-/// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
-const MIRRORED: f64 = 1.3;
-
-/// A pose that explains this share of the query is no accident of a flat crown.
-const WHOLE: f64 = 0.7;
-
-/// A pose with this many times the evidence needed is no local optimum.
-const SURE: f64 = 6.0;
-
-/// Times that turned starts are tried.
-const POLISHES: usize = 3;
-
-/// Radius in spacings of the region that decides between turned starts.
-const POLISH_REACH: f64 = 5.0;
-
-/// The pose, and the pose turned about `middle` by 5 and 10 degrees either way about each axis of the map.
-fn turned(pose: &Pose, middle: &Vector3<f64>) -> impl Iterator<Item = Pose> {
-    let (pose, middle) = (*pose, *middle);
-    let fixed = pose.apply(&middle);
-    let turns = [-0.175, -0.087, 0.087, 0.175].into_iter().flat_map(|angle| {
-        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| Rotation3::new(axis * angle).into_inner())
-    });
-    std::iter::once(Matrix3::identity()).chain(turns).map(move |turn| {
-        let rotation = turn * pose.rotation;
-        Pose { rotation, translation: fixed - rotation * middle * pose.scale, scale: pose.scale }
-    })
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
@@ -144,33 +117,50 @@ pub(crate) fn pairs_under(
     request: &Request,
     config: &VerifiedConfig,
 ) -> Match {
-    let search = Search::new(prepared, query, request, config);
+    let landscape = Landscape::new(query);
+    let search = Search::new(prepared, &landscape, request, config);
     let pose = Pose::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let place = search.query.points.first().copied().unwrap_or_default();
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
     let model = Model { sigma, ..search.model };
-    let overlap = settle(&search.query, search.map, &seed, &model);
-    search.answer(vec![Finding { overlap, seed, model }], map, query, Vec::new())
+    let growth = hold(search.query, search.map, &seed, &model);
+    search.answer(vec![Finding::new(growth, seed)], map, query, Vec::new())
 }
 
-struct Search<'a> {
-    query: Landscape,
-    map: &'a Landscape,
+pub(super) struct Search<'a> {
+    pub(super) query: &'a Landscape,
+    pub(super) map: &'a Landscape,
     seeds: &'a SeedIndex,
-    model: Model,
-    config: VerifiedConfig,
+    pub(super) model: Model,
+    pub(super) config: VerifiedConfig,
     up: Option<[Vector3<f64>; 2]>,
+    pub(super) noise_m: Option<f64>,
 }
 
-type Stages = Vec<(&'static str, f64)>;
+pub(super) type Stages = Vec<(&'static str, f64)>;
+
+/// What the search did.
+struct Log {
+    effort: Effort,
+    refined: usize,
+    grown: u32,
+    /// Most evidence of a grown pose, accepted or not, nats.
+    best: f64,
+}
+
+impl Default for Log {
+    fn default() -> Self {
+        Self { effort: Effort::default(), refined: 0, grown: 0, best: f64::NEG_INFINITY }
+    }
+}
 
 impl<'a> Search<'a> {
-    fn new(prepared: &'a Prepared, query: &FruitCloud, request: &Request, config: &VerifiedConfig) -> Self {
+    fn new(prepared: &'a Prepared, query: &'a Landscape, request: &Request, config: &VerifiedConfig) -> Self {
         let map = &prepared.landscape;
         let sigma = request.noise_m.unwrap_or(SEED_SIGMA * map.spacing).max(0.2 * SEED_SIGMA * map.spacing);
         Self {
-            query: Landscape::new(query),
+            query,
             map,
             seeds: &prepared.seeds,
             model: Model {
@@ -180,6 +170,7 @@ impl<'a> Search<'a> {
             },
             config: *config,
             up: request.up.map(|pair| pair.map(|up| up.normalize())),
+            noise_m: request.noise_m,
         }
     }
 
@@ -194,66 +185,76 @@ impl<'a> Search<'a> {
     }
 
     /// Rounds of seeds until a pose is accepted, then the outline.
-    fn run(&self) -> (Vec<Finding>, Stages) {
-        let mut effort = Effort::default();
+    fn run(&self) -> (Vec<Finding<'a>>, Stages) {
         // A known vertical rules most candidates out at once, so that more seeds cost no more.
         let seeds = self.config.seeds_per_fruit * if self.up.is_some() { UPRIGHT_SEEDS } else { 1 };
         let last = seeds.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
-        let threshold = self.threshold();
+        let mut log = Log::default();
         let mut turn = 0;
-        let mut best: Option<f64> = None;
         let mut findings = Vec::new();
-        let (mut tried, mut grown) = (0, 0);
         for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
             let end = turns.min(last);
-            let admits = |pose: &Pose| self.admits(pose);
             let stride = if index == 0 { self.query.len().div_ceil(FIRST_FRUITS) as u64 } else { 1 };
-            let which = (stride, turn..end);
-            let (hypotheses, rest, spent) = round(&self.query, self.map, self.seeds, &self.model, &admits, which, keep);
+            let (hypotheses, rest) = self.round((stride, turn..end), keep, &mut log);
             turn = if stride == 1 { end } else { 0 };
-            effort = effort + spent;
-            tried += hypotheses.len();
-            grown += self.grow_distinct(&hypotheses, &mut findings);
-            for finding in &findings {
-                best = Some(best.map_or(finding.overlap.log_odds, |b| b.max(finding.overlap.log_odds)));
-            }
-            findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
+            log.grown += self.grow_distinct(&hypotheses, &mut findings);
+            log.best = findings.iter().map(|finding| finding.overlap.log_odds).fold(log.best, f64::max);
+            self.keep_accepted(&mut findings);
             if !findings.is_empty() {
-                grown += self.look_for_rivals(&rest, &mut findings);
-                findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
-                for finding in &mut findings {
-                    if finding.overlap.log_odds < SURE * threshold {
-                        self.polish(finding);
-                    }
+                log.grown += self.look_for_rivals(&rest, &mut findings);
+                if stride == 1 && (self.query.len() as u64 * turn) < FIRST_FRUITS as u64 {
+                    let (more, _) = self.round((1, turn..turn + RIVAL_TURNS), RIVAL_CANDIDATES, &mut log);
+                    log.grown += self.grow_distinct(&more, &mut findings);
                 }
+                self.keep_accepted(&mut findings);
+                let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * self.threshold();
+                findings.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
                 break;
             }
             // After the first round, before the long ones: what shows the same trees is found here at any noise.
             let outline = (index == 1).then(|| self.by_outline()).flatten();
-            if let Some(found) = outline.filter(|found| self.turns_are_fixed(found)) {
-                findings.push(found);
+            findings.extend(outline.filter(|found| self.turns_are_fixed(found)));
+            if !findings.is_empty() {
                 break;
             }
         }
         findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
-        let stages = vec![
-            ("query_fruits", self.query.len() as f64),
-            ("map_fruits", self.map.len() as f64),
-            ("map_seeds", self.seeds.quads.len() as f64),
-            ("query_codes", effort.codes as f64),
-            ("candidates", effort.candidates as f64),
-            ("fitted", effort.fitted as f64),
-            ("refined", tried as f64),
-            ("grown", f64::from(grown)),
-            ("threshold_nats", threshold),
-            ("best_nats", best.unwrap_or(f64::NAN)),
-            ("verified", findings.len() as f64),
-        ];
+        let stages = self.stages(&log, findings.len());
         (findings, stages)
     }
 
+    /// Hypotheses of one round, and the candidates that were not refined.
+    fn round(&self, which: (u64, Range<u64>), keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Candidate>) {
+        let admits = |pose: &Pose| self.admits(pose);
+        let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, &admits, which, keep);
+        log.effort = log.effort + spent;
+        log.refined += hypotheses.len();
+        (hypotheses, rest)
+    }
+
+    fn keep_accepted(&self, findings: &mut Vec<Finding>) {
+        let threshold = self.threshold();
+        findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
+    }
+
+    fn stages(&self, log: &Log, verified: usize) -> Stages {
+        vec![
+            ("query_fruits", self.query.len() as f64),
+            ("map_fruits", self.map.len() as f64),
+            ("map_seeds", self.seeds.quads.len() as f64),
+            ("query_codes", log.effort.codes as f64),
+            ("candidates", log.effort.candidates as f64),
+            ("fitted", log.effort.fitted as f64),
+            ("refined", log.refined as f64),
+            ("grown", f64::from(log.grown)),
+            ("threshold_nats", self.threshold()),
+            ("best_nats", if log.grown > 0 { log.best } else { f64::NAN }),
+            ("verified", verified as f64),
+        ]
+    }
+
     /// Grows the best hypotheses that no finding explains yet; returns how many.
-    fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding>) -> u32 {
+    pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
         let mut grown = 0;
         for seed in hypotheses {
             if grown as usize == GROWN {
@@ -262,199 +263,22 @@ impl<'a> Search<'a> {
             if findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
                 continue;
             }
-            let overlap = grow(&self.query, self.map, seed, &self.model);
             grown += 1;
-            findings.push(Finding { overlap, seed: *seed, model: self.model });
+            findings.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
         }
         grown
     }
 
-    /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
-    /// the true one may have more of the best.
-    fn look_for_rivals(&self, rest: &[Candidate], findings: &mut Vec<Finding>) -> u32 {
-        let others: Vec<Candidate> = rest
-            .iter()
-            .filter(|candidate| {
-                !findings.iter().any(|finding| self.explains(finding, &candidate.place, &candidate.pose))
-            })
-            .take(RIVAL_CANDIDATES)
-            .copied()
-            .collect();
-        self.grow_distinct(&refined(&self.query, self.map, &others, &self.model), findings)
-    }
-
-    /// Whether a finding puts the fruits around the seed where the seed puts them.
-    fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Pose) -> bool {
-        let reach = SAME * self.query.spacing;
-        let mut near = Vec::new();
-        self.query.tree.nearest(&super::landscape::single(place), 8, &mut near);
-        let same = near
-            .iter()
-            .filter(|(row, _)| {
-                let p = self.query.points[*row as usize];
-                let found = match finding.overlap.predictions[*row as usize] {
-                    Some(prediction) => prediction.place,
-                    None => finding.seed.pose.apply(&p),
-                };
-                (found - pose.apply(&p)).norm() < reach * pose.scale
-            })
-            .count();
-        2 * same > near.len()
-    }
-
-    /// Sums over the fruits of the overlap and their predictions.
-    fn overlap_moments(&self, finding: &Finding) -> Moments {
-        let mut moments = Moments::default();
-        for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
-            if let Some(at) = prediction {
-                moments.add(p, &at.place, 1.0);
-            }
-        }
-        moments
-    }
-
-    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
-    fn turns_are_fixed(&self, finding: &Finding) -> bool {
-        let moments = self.overlap_moments(finding);
-        if moments.weight <= 0.0 {
-            return false;
-        }
-        let mut spread = moments.spread().symmetric_eigenvalues();
-        spread.as_mut_slice().sort_by(f64::total_cmp);
-        let noise = finding.overlap.sigma / finding.overlap.pose.scale;
-        spread[1] > FLAT * FLAT * noise * noise
-    }
-
-    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does.
-    ///
-    /// Where a crown is flat, a mirrored row matches by a half-turn; the rest of the row tells.
-    fn fits_better_mirrored(&self, finding: &Finding) -> bool {
-        let explained = finding.overlap.predictions.iter().flatten().count();
-        if explained as f64 > WHOLE * self.query.len() as f64 {
-            return false;
-        }
-        let moments = self.overlap_moments(finding);
-        let eigen = moments.spread().symmetric_eigen();
-        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
-        let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
-        let translation = pose.apply(&middle) - rotation * middle * pose.scale;
-        let seed =
-            Hypothesis { pose: Pose { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
-        let model = finding.model;
-        let mut mirrored = Finding { overlap: grow(&self.query, self.map, &seed, &model), seed, model };
-        self.polish(&mut mirrored);
-        mirrored.overlap.log_odds > MIRRORED * log_odds
-    }
-
-    /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.
-    ///
-    /// A seed half a metre wide is turned by a few degrees by its noise. In a crown where fruits hang 8 cm apart the
-    /// fruits a metre away then meet their neighbours, and the refinement can settle there.
-    fn polish(&self, finding: &mut Finding) {
-        let mut scratch = Scratch::default();
-        for _ in 0..POLISHES {
-            let Overlap { pose, middle, sigma, .. } = finding.overlap;
-            let model = Model { sigma, ..self.model };
-            let best = turned(&pose, &middle)
-                .filter_map(|start| {
-                    refine(
-                        &self.query,
-                        self.map,
-                        &start,
-                        &middle,
-                        POLISH_REACH * self.query.spacing,
-                        &model,
-                        &mut scratch,
-                    )
-                })
-                .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
-            let Some(seed) = best else { return };
-            let overlap = grow(&self.query, self.map, &seed, &finding.model);
-            if overlap.log_odds < finding.overlap.log_odds + 0.5 {
-                return;
-            }
-            *finding = Finding { overlap, seed, model: finding.model };
-        }
-    }
-
-    /// Adds the crowns that growth did not reach; only the finding that is reported needs them.
-    fn reach_all(&self, finding: &mut Finding) {
-        if finding.seed.sigma >= SHARP * self.map.spacing {
-            return; // settled on the whole query already
-        }
-        let log_odds = finding.overlap.log_odds;
-        finding.overlap = grow_everywhere(&self.query, self.map, &finding.seed, &finding.model);
-        finding.overlap.log_odds = log_odds;
-    }
-
-    fn by_outline(&self) -> Option<Finding> {
-        let seed = outline::hypothesis(&self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
+    fn by_outline(&self) -> Option<Finding<'a>> {
+        let seed = outline::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
         let model = Model { sigma: seed.sigma, ..self.model };
-        let mut overlap = if seed.sigma < SHARP * self.map.spacing {
-            grow(&self.query, self.map, &seed, &model)
+        let growth = if seed.sigma < SHARP * self.map.spacing {
+            grow(self.query, self.map, &seed, &model)
         } else {
-            settle(&self.query, self.map, &seed, &model)
+            hold(self.query, self.map, &seed, &model)
         };
-        overlap.log_odds = overlap.log_odds.max(seed.log_odds);
-        Some(Finding { overlap, seed, model })
-    }
-
-    fn answer(&self, mut findings: Vec<Finding>, map: &FruitCloud, query: &FruitCloud, mut stages: Stages) -> Match {
-        if findings.is_empty() {
-            return Match::without_answer(Verdict::NoMatch, stages);
-        }
-        let best = findings.remove(0);
-        let rivals: Vec<Registration> = findings
-            .iter()
-            .filter(|f| f.overlap.log_odds > RIVAL * best.overlap.log_odds && self.contradict(&best, f))
-            .map(|f| self.registration(f))
-            .collect();
-        let sizes = Sizes::new(query, map, &self.query, self.map);
-        let mut pairs = associate(&self.query, self.map, &best.overlap, &|_, _| 1.0, self.config.min_probability);
-        if let Some(cue) = sizes.and_then(|sizes| sizes.cue(&pairs)) {
-            let size = |q: u32, m: u32| cue.ratio(q, m);
-            pairs = associate(&self.query, self.map, &best.overlap, &size, self.config.min_probability);
-        }
-        let mut pairs: Vec<Pair> = pairs
-            .iter()
-            .map(|pair| Pair {
-                query: self.query.rows[pair.query as usize] as usize,
-                map: self.map.rows[pair.map as usize] as usize,
-                probability: pair.probability,
-                distance_m: pair.distance,
-                support: pair.gain,
-            })
-            .collect();
-        pairs.sort_unstable_by_key(|pair| pair.query);
-        stages.push(("pairs", pairs.len() as f64));
-        Match {
-            verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
-            registration: Some(self.registration(&best)),
-            alternatives: rivals,
-            pairs,
-            noise_m: best.overlap.sigma,
-            stages,
-        }
-    }
-
-    fn registration(&self, finding: &Finding) -> Registration {
-        Registration {
-            map_from_query: finding.overlap.pose.to_similarity(&self.query.centre, &self.map.centre),
-            log_odds: finding.overlap.log_odds,
-        }
-    }
-
-    /// Whether two findings explain the same fruits of the query by different fruits of the map.
-    fn contradict(&self, a: &Finding, b: &Finding) -> bool {
-        let both = a.overlap.predictions.iter().zip(&b.overlap.predictions);
-        let shared: Vec<bool> = both
-            .filter_map(|pair| match pair {
-                (Some(x), Some(y)) => Some((x.place - y.place).norm() > 0.5 * self.map.spacing),
-                _ => None,
-            })
-            .collect();
-        let claimed = b.overlap.predictions.iter().flatten().count().max(1);
-        2 * shared.iter().filter(|&&apart| apart).count() > claimed.min(shared.len().max(claimed / 2))
+        let mut finding = Finding::new(growth, seed);
+        finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
+        Some(finding)
     }
 }

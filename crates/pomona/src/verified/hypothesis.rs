@@ -94,7 +94,7 @@ pub(crate) fn first_look(query: &Landscape, map: &Landscape, q: &Quad, pose: &Po
     };
     let anchor = q[0];
     let mut around = 0.0;
-    for &row in query.neighbours[anchor as usize].iter().filter(|&row| !q.contains(row)) {
+    for &row in query.neighbours(anchor as usize).iter().filter(|&row| !q.contains(row)) {
         around += weigh(row);
         // A sequential test: a true pose falls this low only when its first four fruits or so are all hidden.
         if around < HOPELESS {

@@ -7,19 +7,29 @@
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement ([`growth`]).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach ([`acceptance`]).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell ([`outline`]).
-//! 6. One-to-one pairs with probabilities ([`association`]).
+//! 6. What is reported is settled: noise and share from distances alone ([`scatter`]), one-to-one pairs with probabilities
+//!    ([`association`]) and patches fitted to them, in turns ([`settlement`]).
 
 mod acceptance;
+mod answer;
 mod association;
 mod cells;
+mod chance;
 mod decision;
+mod doubts;
+mod grid;
 mod growth;
 mod hypothesis;
 mod landscape;
 mod outline;
+mod overlap;
+mod patches;
 mod pose;
+mod scatter;
 mod search;
 mod seeds;
+mod settlement;
+mod sharing;
 mod size;
 mod space;
 

@@ -12,6 +12,10 @@ pub(crate) struct Pose {
 }
 
 impl Pose {
+    pub(crate) fn identity() -> Self {
+        Self { rotation: Matrix3::identity(), translation: Vector3::zeros(), scale: 1.0 }
+    }
+
     #[inline]
     pub(crate) fn apply(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * p * self.scale + self.translation

@@ -39,7 +39,7 @@ impl std::ops::Add for Effort {
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
 fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<(Quad, Code)> {
-    let near = &query.neighbours[row as usize];
+    let near = query.neighbours(row as usize);
     let n = near.len().min(super::seeds::COMPANIONS) as u64;
     let count = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
     if turn >= count {

@@ -1,6 +1,6 @@
 //! Diameters as a soft cue, once the growth that all fruits share is removed.
 
-use super::association::Association;
+use super::association::Link;
 use super::landscape::{Landscape, median};
 use crate::cloud::FruitCloud;
 
@@ -17,8 +17,8 @@ pub(crate) struct Sizes {
 }
 
 /// The cue fitted to a first set of pairs.
-pub(crate) struct Cue {
-    sizes: Sizes,
+pub(crate) struct Cue<'a> {
+    sizes: &'a Sizes,
     /// Median and spread of ln(map / query) over fruits that are the same.
     same: (f64, f64),
     /// The same over fruits that are not.
@@ -36,11 +36,10 @@ impl Sizes {
     }
 
     /// Learns growth and spread from probable pairs; `None` where too few have diameters or they tell nothing.
-    pub(crate) fn cue(self, pairs: &[Association]) -> Option<Cue> {
-        let mut differences: Vec<f64> = pairs
-            .iter()
-            .filter(|pair| pair.probability > 0.5)
-            .map(|pair| self.map[pair.map as usize] - self.query[pair.query as usize])
+    pub(crate) fn cue(&self, links: impl Iterator<Item = Link>) -> Option<Cue<'_>> {
+        let mut differences: Vec<f64> = links
+            .filter(|link| link.probability > 0.5)
+            .map(|link| self.map[link.map as usize] - self.query[link.query as usize])
             .filter(|difference| difference.is_finite())
             .collect();
         if differences.len() < MIN_PAIRS {
@@ -55,7 +54,7 @@ impl Sizes {
     }
 }
 
-impl Cue {
+impl Cue<'_> {
     /// How much likelier the two diameters are for one fruit than for two.
     pub(crate) fn ratio(&self, query: u32, map: u32) -> f64 {
         let difference = self.sizes.map[map as usize] - self.sizes.query[query as usize];

@@ -29,8 +29,7 @@ impl<const D: usize> Tree<D> {
         let mut rows: Vec<u32> = (0..points.len() as u32).collect();
         let mut nodes = Vec::with_capacity(4 * points.len() / LEAF + 1);
         if !points.is_empty() {
-            let end = rows.len();
-            build(points, &mut rows, 0, end, &mut nodes);
+            build(points, &mut rows, 0, &mut nodes);
         }
         Self { points: rows.iter().map(|&row| points[row as usize]).collect(), rows, nodes }
     }
@@ -119,15 +118,16 @@ fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-/// Splits at the median of the widest axis; leaves take their range as it is.
-fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, end: usize, nodes: &mut Vec<Node>) {
+/// Appends the subtree over `rows`, the first of which is at `start` of the whole. Splits at the median of the widest axis;
+/// leaves take their range as it is.
+fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
     let at = nodes.len();
-    nodes.push(Node { split: 0.0, axis: 0, right: 0, start: start as u32, end: end as u32 });
-    if end - start <= LEAF {
+    nodes.push(Node { split: 0.0, axis: 0, right: 0, start: start as u32, end: (start + rows.len()) as u32 });
+    if rows.len() <= LEAF {
         return;
     }
     let (mut low, mut high) = ([f32::INFINITY; D], [f32::NEG_INFINITY; D]);
-    for &row in &rows[start..end] {
+    for &row in rows.iter() {
         for d in 0..D {
             low[d] = low[d].min(points[row as usize][d]);
             high[d] = high[d].max(points[row as usize][d]);
@@ -137,16 +137,40 @@ fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, en
     if high[axis] <= low[axis] {
         return; // all in one place: a leaf of any size is still exact
     }
-    let middle = usize::midpoint(start, end);
+    let middle = rows.len() / 2;
     let key = |row: u32| (points[row as usize][axis], row);
-    rows[start..end]
-        .select_nth_unstable_by(middle - start, |&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
+    rows.select_nth_unstable_by(middle, |&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
     let split = points[rows[middle] as usize][axis];
-    build(points, rows, start, middle, nodes);
-    let right = nodes.len() as u32;
-    build(points, rows, middle, end, nodes);
-    nodes[at] = Node { split, axis: axis as u8, right, ..nodes[at] };
+    let (below, above) = rows.split_at_mut(middle);
+    let right = if middle < SHARE_OF_POINTS {
+        build(points, below, start, nodes);
+        let right = nodes.len();
+        build(points, above, start + middle, nodes);
+        right
+    } else {
+        let alone = |rows: &mut [u32], start: usize| {
+            let mut nodes = Vec::new();
+            build(points, rows, start, &mut nodes);
+            nodes
+        };
+        let (left, right) = rayon::join(|| alone(below, start), || alone(above, start + middle));
+        append(nodes, left);
+        let place = nodes.len();
+        append(nodes, right);
+        place
+    };
+    nodes[at] = Node { split, axis: axis as u8, right: right as u32, ..nodes[at] };
 }
+
+/// Appends a subtree that was built alone: its children move by what stands before it.
+fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) {
+    let moved = nodes.len() as u32;
+    let node = |node: Node| Node { right: if node.right == 0 { 0 } else { node.right + moved }, ..node };
+    nodes.extend(subtree.into_iter().map(node));
+}
+
+/// Points of a subtree that are worth a thread of their own.
+const SHARE_OF_POINTS: usize = 8192;
 
 #[cfg(test)]
 mod tests {

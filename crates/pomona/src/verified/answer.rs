@@ -1,0 +1,66 @@
+//! The answer to a query: the best finding settled, its pairs, its rivals.
+
+use super::association::Association;
+use super::decision::{Finding, Search, Stages};
+use super::overlap::Overlap;
+use super::settlement::{Settled, settle};
+use super::size::Sizes;
+use crate::cloud::FruitCloud;
+use crate::matching::{Match, Pair, Registration, Verdict};
+
+impl Search<'_> {
+    pub(super) fn answer(
+        &self,
+        mut findings: Vec<Finding>,
+        map: &FruitCloud,
+        query: &FruitCloud,
+        mut stages: Stages,
+    ) -> Match {
+        if findings.is_empty() {
+            return Match::without_answer(Verdict::NoMatch, stages);
+        }
+        let best = findings.remove(0);
+        let sizes = Sizes::new(query, map, self.query, self.map);
+        let Settled { overlap, marginals } = settle(&best.growth, self.noise_m, sizes.as_ref());
+        let overlap = Overlap { log_odds: best.overlap.log_odds, ..overlap };
+        let rivals: Vec<Registration> = findings
+            .iter()
+            .map(|finding| &finding.overlap)
+            .filter(|other| self.rivals(&overlap, other))
+            .map(|other| self.registration(other))
+            .collect();
+        let pairs = marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        stages.push(("pairs", pairs.len() as f64));
+        Match {
+            verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
+            registration: Some(self.registration(&overlap)),
+            alternatives: rivals,
+            pairs: self.in_rows(&pairs),
+            noise_m: overlap.sigma,
+            stages,
+        }
+    }
+
+    /// Pairs in the rows of the clouds, in the order of the query.
+    fn in_rows(&self, pairs: &[Association]) -> Vec<Pair> {
+        let mut pairs: Vec<Pair> = pairs
+            .iter()
+            .map(|pair| Pair {
+                query: self.query.rows[pair.query as usize] as usize,
+                map: self.map.rows[pair.map as usize] as usize,
+                probability: pair.probability,
+                distance_m: pair.distance,
+                support: pair.gain,
+            })
+            .collect();
+        pairs.sort_unstable_by_key(|pair| pair.query);
+        pairs
+    }
+
+    fn registration(&self, overlap: &Overlap) -> Registration {
+        Registration {
+            map_from_query: overlap.pose.to_similarity(&self.query.centre, &self.map.centre),
+            log_odds: overlap.log_odds,
+        }
+    }
+}

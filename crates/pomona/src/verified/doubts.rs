@@ -1,0 +1,173 @@
+//! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
+
+use super::decision::{Finding, Search};
+use super::growth::grow;
+use super::hypothesis::{Hypothesis, Model, Scratch, refine};
+use super::landscape::single;
+use super::overlap::Overlap;
+use super::pose::{Moments, Pose};
+use super::search::{Candidate, refined};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// Candidates that are refined in search of a rival once a pose is accepted.
+pub(super) const RIVAL_CANDIDATES: usize = 24;
+
+/// Two hypotheses that put a fruit within this many spacings of one place are the same.
+const SAME: f64 = 0.4;
+
+/// A rival with this share of the best evidence makes the answer ambiguous.
+const RIVAL: f64 = 0.55;
+
+/// Fruits within this many standard deviations of one line fix no turn about it.
+const FLAT: f64 = 3.0;
+
+/// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
+const MIRRORED: f64 = 1.3;
+
+/// A pose that explains this share of the query is no accident of a flat crown.
+const WHOLE: f64 = 0.7;
+
+/// Times that turned starts are tried.
+const POLISHES: usize = 3;
+
+/// Radius in spacings of the region that decides between turned starts.
+const POLISH_REACH: f64 = 5.0;
+
+/// The pose, and the pose turned about `middle` by 5 and 10 degrees either way about each axis of the map.
+fn turned(pose: &Pose, middle: &Vector3<f64>) -> impl Iterator<Item = Pose> {
+    let (pose, middle) = (*pose, *middle);
+    let fixed = pose.apply(&middle);
+    let turns = [-0.175, -0.087, 0.087, 0.175].into_iter().flat_map(|angle| {
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| Rotation3::new(axis * angle).into_inner())
+    });
+    std::iter::once(Matrix3::identity()).chain(turns).map(move |turn| {
+        let rotation = turn * pose.rotation;
+        Pose { rotation, translation: fixed - rotation * middle * pose.scale, scale: pose.scale }
+    })
+}
+
+impl<'a> Search<'a> {
+    /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
+    /// the true one may have more of the best.
+    pub(super) fn look_for_rivals(&self, rest: &[Candidate], findings: &mut Vec<Finding<'a>>) -> u32 {
+        let others: Vec<Candidate> = rest
+            .iter()
+            .filter(|candidate| {
+                !findings.iter().any(|finding| self.explains(finding, &candidate.place, &candidate.pose))
+            })
+            .take(RIVAL_CANDIDATES)
+            .copied()
+            .collect();
+        self.grow_distinct(&refined(self.query, self.map, &others, &self.model), findings)
+    }
+
+    /// Whether a finding puts the fruits around the seed where the seed puts them.
+    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Pose) -> bool {
+        let reach = SAME * self.query.spacing;
+        let mut near = Vec::new();
+        self.query.tree.nearest(&single(place), 8, &mut near);
+        let same = near
+            .iter()
+            .filter(|(row, _)| {
+                let p = self.query.points[*row as usize];
+                let found = match finding.overlap.predictions[*row as usize] {
+                    Some(prediction) => prediction.place,
+                    None => finding.seed.pose.apply(&p),
+                };
+                (found - pose.apply(&p)).norm() < reach * pose.scale
+            })
+            .count();
+        2 * same > near.len()
+    }
+
+    /// Sums over the fruits of the overlap and their predictions.
+    pub(super) fn overlap_moments(&self, finding: &Finding) -> Moments {
+        let mut moments = Moments::default();
+        for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
+            if let Some(at) = prediction {
+                moments.add(p, &at.place, 1.0);
+            }
+        }
+        moments
+    }
+
+    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
+    pub(super) fn turns_are_fixed(&self, finding: &Finding) -> bool {
+        let moments = self.overlap_moments(finding);
+        if moments.weight <= 0.0 {
+            return false;
+        }
+        let mut spread = moments.spread().symmetric_eigenvalues();
+        spread.as_mut_slice().sort_by(f64::total_cmp);
+        let noise = finding.overlap.sigma / finding.overlap.pose.scale;
+        spread[1] > FLAT * FLAT * noise * noise
+    }
+
+    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does.
+    ///
+    /// Where a crown is flat, a mirrored row matches by a half-turn; the rest of the row tells.
+    pub(super) fn fits_better_mirrored(&self, finding: &Finding) -> bool {
+        let explained = finding.overlap.predictions.iter().flatten().count();
+        if explained as f64 > WHOLE * self.query.len() as f64 {
+            return false;
+        }
+        let moments = self.overlap_moments(finding);
+        let eigen = moments.spread().symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
+        let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
+        let translation = pose.apply(&middle) - rotation * middle * pose.scale;
+        let seed =
+            Hypothesis { pose: Pose { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
+        let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
+        self.polish(&mut mirrored);
+        mirrored.overlap.log_odds > MIRRORED * log_odds
+    }
+
+    /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.
+    ///
+    /// A seed half a metre wide is turned by a few degrees by its noise. In a crown where fruits hang 8 cm apart the
+    /// fruits a metre away then meet their neighbours, and the refinement can settle there.
+    pub(super) fn polish(&self, finding: &mut Finding<'a>) {
+        let mut scratch = Scratch::default();
+        for _ in 0..POLISHES {
+            let Overlap { pose, middle, sigma, .. } = finding.overlap;
+            let model = Model { sigma, ..self.model };
+            let best = turned(&pose, &middle)
+                .filter_map(|start| {
+                    refine(
+                        self.query,
+                        self.map,
+                        &start,
+                        &middle,
+                        POLISH_REACH * self.query.spacing,
+                        &model,
+                        &mut scratch,
+                    )
+                })
+                .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
+            let Some(seed) = best else { return };
+            let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
+            if better.overlap.log_odds < finding.overlap.log_odds + 0.5 {
+                return;
+            }
+            *finding = better;
+        }
+    }
+
+    /// Whether another overlap has nearly as much evidence, and explains the same fruits of the query by different
+    /// fruits of the map.
+    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
+        if other.log_odds <= RIVAL * best.log_odds {
+            return false;
+        }
+        let apart: Vec<bool> = best
+            .predictions
+            .iter()
+            .zip(&other.predictions)
+            .filter_map(|(x, y)| Some((x.as_ref()?.place - y.as_ref()?.place).norm() > 0.5 * self.map.spacing))
+            .collect();
+        let claimed = other.predictions.iter().flatten().count().max(1);
+        2 * apart.iter().filter(|&&apart| apart).count() > claimed.min(apart.len().max(claimed / 2))
+    }
+}

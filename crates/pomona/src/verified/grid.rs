@@ -1,0 +1,131 @@
+//! Cells over a cloud: which fruits are near a place, and whether the recording looked there at all.
+
+use nalgebra::Vector3;
+
+/// A hashed grid: cells hold the rows of their points; any extent, memory in proportion to the points.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    inverse_cell: f64,
+    mask: u64,
+    /// Start of each bucket in `rows`, one more than there are buckets.
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl Grid {
+    pub(super) fn new(points: &[Vector3<f64>], cell: f64) -> Self {
+        let buckets = (4 * points.len().max(4)).next_power_of_two();
+        let mask = buckets as u64 - 1;
+        let inverse_cell = 1.0 / cell;
+        let bucket = |p: &Vector3<f64>| hash(cell_of(p, inverse_cell), mask);
+        let mut starts = vec![0u32; buckets + 1];
+        for p in points {
+            starts[bucket(p) + 1] += 1;
+        }
+        for i in 0..buckets {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut rows = vec![0u32; points.len()];
+        for (row, p) in points.iter().enumerate() {
+            let slot = &mut next[bucket(p)];
+            rows[*slot as usize] = row as u32;
+            *slot += 1;
+        }
+        Self { inverse_cell, mask, starts, rows }
+    }
+
+    #[inline]
+    pub(super) fn near(&self, place: &Vector3<f64>, gate: f64, mut visit: impl FnMut(u32)) {
+        let reach = Vector3::repeat(gate);
+        let low = cell_of(&(place - reach), self.inverse_cell);
+        let high = cell_of(&(place + reach), self.inverse_cell);
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let bucket = hash([x, y, z], self.mask);
+                    for &row in &self.rows[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
+                        visit(row);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[inline]
+fn cell_of(p: &Vector3<f64>, inverse_cell: f64) -> [i64; 3] {
+    [p.x, p.y, p.z].map(|x| (x * inverse_cell).floor() as i64)
+}
+
+#[inline]
+fn hash(cell: [i64; 3], mask: u64) -> usize {
+    let mixed = (cell[0] as u64)
+        .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        .wrapping_add((cell[1] as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F))
+        .wrapping_add((cell[2] as u64).wrapping_mul(0x1656_67B1_9E37_79F9));
+    ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 32 & mask) as usize
+}
+
+/// Where the cloud has fruits at all, at the resolution of its spacing.
+#[derive(Debug, Clone)]
+pub(super) struct Support {
+    inverse_cell: f64,
+    cells: std::collections::HashMap<[i64; 3], f32, Mixing>,
+}
+
+type Mixing = std::hash::BuildHasherDefault<CellHasher>;
+
+/// Hashes a cell by the mixing of the grid: cells are no attack surface, and the answer must not change from run to run.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CellHasher(u64);
+
+impl std::hash::Hasher for CellHasher {
+    fn finish(&self) -> u64 {
+        (self.0 ^ (self.0 >> 32)).wrapping_mul(0xBF58_476D_1CE4_E5B9)
+    }
+    fn write(&mut self, bytes: &[u8]) {
+        for word in bytes.chunks(8) {
+            let mut whole = [0; 8];
+            whole[..word.len()].copy_from_slice(word);
+            self.write_u64(u64::from_le_bytes(whole));
+        }
+    }
+    fn write_i64(&mut self, value: i64) {
+        self.write_u64(value as u64);
+    }
+    fn write_u64(&mut self, value: u64) {
+        self.0 = (self.0.rotate_left(21) ^ value).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+    fn write_usize(&mut self, value: usize) {
+        self.write_u64(value as u64);
+    }
+}
+
+impl Support {
+    /// A cell is supported in the measure of the fruits in it and around it: 1 - exp(-count / 2).
+    pub(super) fn new(points: &[Vector3<f64>], spacing: f64) -> Self {
+        let inverse_cell = 1.0 / spacing;
+        let mut cells: std::collections::HashMap<[i64; 3], f32, Mixing> = std::collections::HashMap::default();
+        for p in points {
+            let [x, y, z] = cell_of(p, inverse_cell);
+            for dx in -1..=1i64 {
+                for dy in -1..=1i64 {
+                    for dz in -1..=1i64 {
+                        let steps = (dx.abs() + dy.abs() + dz.abs()) as i32;
+                        *cells.entry([x + dx, y + dy, z + dz]).or_default() += 0.5f32.powi(steps);
+                    }
+                }
+            }
+        }
+        for value in cells.values_mut() {
+            *value = 1.0 - (-*value / 2.0).exp();
+        }
+        Self { inverse_cell, cells }
+    }
+
+    #[inline]
+    pub(super) fn at(&self, place: &Vector3<f64>) -> f64 {
+        self.cells.get(&cell_of(place, self.inverse_cell)).map_or(0.0, |&value| f64::from(value))
+    }
+}

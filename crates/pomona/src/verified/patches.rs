@@ -1,0 +1,226 @@
+//! The patches of a growth: where each puts its fruits, whom they meet there, and what follows for the patches.
+//!
+//! A patch is fitted to the pairs in and around its cell and held by the pose of a wider neighbourhood where pairs are
+//! few. What the patches leave over is smoothed between neighbouring fruits, in the measure in which neighbours'
+//! residuals agree.
+
+use super::cells::{Cell, surroundings, total};
+use super::growth::{Growth, Partner};
+use super::hypothesis::GATE;
+use super::landscape::SHARE_OF_ROWS;
+use super::overlap::Prediction;
+use super::pose::{Moments, Pose};
+use super::sharing::{displacement, shared_by_neighbours};
+use crate::geometry::Scale;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// A patch may differ from its surroundings as if this many pairs held it to them.
+pub(super) const HOLD: f64 = 2.0;
+
+/// Share of the distance by which a crown may have bent between visits (METHOD: alpha = 1-3 %).
+pub(super) const DRIFT: f64 = 0.02;
+
+/// Cells of a patch's own fit, by their weight (see [`super::cells`]): those next to it.
+const NEXT: f64 = 0.3;
+
+/// Cells at the least that are worth a thread of their own.
+pub(super) const SHARE_OF_CELLS: usize = 32;
+
+/// How firmly pairs hold a pose: at `p` its variance is that of one pair times [`Footing::looseness`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Footing {
+    middle: Vector3<f64>,
+    weight: f64,
+    inertia: f64,
+}
+
+impl Footing {
+    /// Of a fit to `moments`, held by as many pairs as `hold` about `centre`, an `edge` away.
+    pub(super) fn new(moments: &Moments, hold: f64, edge: f64, centre: Vector3<f64>) -> Self {
+        let known = moments.weight > 3.5;
+        let (middle, inertia) = if known {
+            (moments.centroid(), moments.weight * moments.spread().trace() * 2.0 / 3.0)
+        } else {
+            (centre, 0.1 * edge * edge)
+        };
+        Self { middle, weight: moments.weight + hold, inertia: inertia + hold * edge * edge }
+    }
+
+    #[inline]
+    pub(super) fn looseness(&self, p: &Vector3<f64>) -> f64 {
+        1.0 / self.weight + self.away2(p) / self.inertia
+    }
+
+    /// How much a pose that is held by `hold` pairs follows what holds it.
+    #[inline]
+    pub(super) fn share_held(&self, hold: f64) -> f64 {
+        hold / self.weight
+    }
+
+    /// Squared distance from the middle of the pairs.
+    #[inline]
+    pub(super) fn away2(&self, p: &Vector3<f64>) -> f64 {
+        (p - self.middle).norm_squared()
+    }
+}
+
+/// Sums over the cells next to a cell, itself included.
+pub(super) fn next_to(cells: &[Cell], cell: &Cell) -> Moments {
+    total(cell.around.iter().filter(|a| a.1 > NEXT).map(|a| (&cells[a.0 as usize].moments, a.1)))
+}
+
+/// The nearest fruit of the map with its log-odds, and the log-odds of having none.
+struct Met {
+    partner: Option<(u32, f64)>,
+    alone: f64,
+}
+
+impl Growth<'_> {
+    /// Where each fruit of the reached cells should lie, and how surely.
+    pub(super) fn predict(&mut self) {
+        let sigma2 = (self.widening * self.sigma).powi(2);
+        let footing = |(cell, wide): (&Cell, &Option<Moments>)| {
+            cell.reached.then(|| {
+                let wide = wide.unwrap_or_else(|| surroundings(&self.cells, cell));
+                Footing::new(&wide, HOLD, self.edge, cell.centre)
+            })
+        };
+        let footings: Vec<Option<Footing>> = self.cells.iter().zip(&self.wide).map(footing).collect();
+        let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
+        let at = |row: u32| {
+            let row = row as usize;
+            let cell = self.cut.cell_of[row] as usize;
+            let footing = footings[cell]?;
+            let p = self.query.points[row];
+            let away2 = footing.away2(&p);
+            let bent = if away2 > self.edge * self.edge { DRIFT * DRIFT * away2 } else { 0.0 };
+            let place = self.cells[cell].pose.apply(&p);
+            let (shift, unexplained) = displacement(self.query, row, (self.shared, self.sigma * self.sigma), residual);
+            let variance = sigma2 * (1.0 + footing.looseness(&p)) + bent + unexplained;
+            Some((place, Prediction { place: place + shift, variance }))
+        };
+        let active = self.active();
+        let found: Vec<_> = active.par_iter().with_min_len(SHARE_OF_ROWS).map(|&row| at(row)).collect();
+        for (row, found) in active.into_iter().zip(found) {
+            self.predictions[row as usize] = found.map(|(_, prediction)| prediction);
+            if let Some((place, _)) = found {
+                self.patch_places[row as usize] = place;
+            }
+        }
+    }
+
+    /// Nearest partners of the predictions; of several claims on one fruit the likelier wins.
+    pub(super) fn pair_up(&mut self) {
+        let active = self.active();
+        let meet = |&row: &u32| self.predictions[row as usize].map(|at| self.meet(&at));
+        let met: Vec<Option<Met>> = active.par_iter().with_min_len(SHARE_OF_ROWS).map(meet).collect();
+        for &row in &active {
+            if let Some(partner) = self.partners[row as usize].take() {
+                self.owner[partner.row as usize] = None;
+            }
+        }
+        let mut gains = vec![0.0; self.query.len()];
+        let mut alone = vec![0.0; self.query.len()];
+        for (row, met) in active.into_iter().map(|row| row as usize).zip(met) {
+            let Some(met) = met else { continue };
+            (gains[row], alone[row]) = (met.alone, met.alone);
+            let Some((partner, gain)) = met.partner else { continue };
+            let owner = &mut self.owner[partner as usize];
+            if let Some(rival) = owner.map(|rival| rival as usize) {
+                if gains[rival] >= gain {
+                    continue;
+                }
+                self.partners[rival] = None;
+                gains[rival] = alone[rival];
+            }
+            *owner = Some(row as u32);
+            gains[row] = gain;
+            let weight = (1.0 - (1.0 - self.model.detection) * (-gain).exp()).max(0.0);
+            let residual = self.map.points[partner as usize] - self.patch_places[row];
+            self.partners[row] = Some(Partner { row: partner, residual, weight });
+        }
+        self.sum_up(&gains);
+    }
+
+    /// What a prediction meets in the map.
+    fn meet(&self, Prediction { place, variance }: &Prediction) -> Met {
+        let found = self.map.nearest(place, GATE * variance.sqrt(), |_| true);
+        let partner = found.map(|(row, d2)| (row, self.model.gain(d2, *variance, self.map.density[row as usize])));
+        Met { partner, alone: self.model.miss(self.map.support(place)) }
+    }
+
+    /// Evidence and sums of every reached cell.
+    fn sum_up(&mut self, gains: &[f64]) {
+        let (query, map, partners) = (self.query, self.map, &self.partners);
+        self.cells.par_iter_mut().with_min_len(SHARE_OF_CELLS).filter(|cell| cell.reached).for_each(|cell| {
+            cell.moments = Moments::default();
+            cell.log_odds = 0.0;
+            for &row in cell.rows.iter() {
+                cell.log_odds += gains[row as usize];
+                if let Some(Partner { row: partner, weight, .. }) = partners[row as usize] {
+                    cell.moments.add(&query.points[row as usize], &map.points[partner as usize], weight);
+                }
+            }
+        });
+        let around = |cell: &Cell| cell.reached.then(|| surroundings(&self.cells, cell));
+        self.wide = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(around).collect();
+    }
+
+    /// New patch poses, global pose, noise and shared displacement from the current pairs.
+    pub(super) fn refit(&mut self) {
+        let all = total(self.cells.iter().filter(|c| c.reached).map(|c| (&c.moments, 1.0)));
+        if all.weight < 3.5 {
+            return;
+        }
+        if let Some(pose) = all.step(&self.pose, self.model.scale, 0.0) {
+            self.pose = pose;
+        }
+        let refitted = |(cell, wide): (&Cell, &Option<Moments>)| match wide {
+            Some(_) if self.rigid => self.pose,
+            Some(wide) => self.patch(cell, wide),
+            None => cell.pose,
+        };
+        let both = self.cells.par_iter().zip(&self.wide).with_min_len(SHARE_OF_CELLS);
+        let poses: Vec<Pose> = both.map(refitted).collect();
+        self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
+        if !self.whole {
+            self.estimate_noise();
+        }
+    }
+
+    /// The pose of one patch from the pairs next to it, held by that of its surroundings.
+    fn patch(&self, cell: &Cell, wide: &Moments) -> Pose {
+        let prior = HOLD * self.edge * self.edge;
+        let mut parent = cell.pose;
+        if wide.weight > 6.0 {
+            parent = wide.step(&parent, self.model.scale, prior).unwrap_or(parent);
+        }
+        let mut near = next_to(&self.cells, cell);
+        near.add(&cell.centre, &parent.apply(&cell.centre), HOLD);
+        near.step(&parent, Scale::Metric, prior).unwrap_or(parent)
+    }
+
+    /// Noise from the residuals, shared displacement from the products of neighbours' residuals.
+    fn estimate_noise(&mut self) {
+        let (mut squares, mut weights) = (0.0, 0.0);
+        for partner in self.partners.iter().flatten() {
+            squares += partner.weight * partner.residual.norm_squared();
+            weights += partner.weight;
+        }
+        if weights < 3.5 {
+            return;
+        }
+        let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
+        self.shared = shared_by_neighbours(self.query, residual);
+        if self.shared < 0.01 * self.sigma * self.sigma {
+            self.shared = 0.0;
+        }
+        // Residuals about the patches hold noise and shared displacement; the gate cuts 3 % off.
+        let mean = squares / (3.0 * weights - 6.0).max(weights);
+        let prior = self.model.sigma * self.model.sigma;
+        let noise = (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean))
+            / (self.freedoms + 3.0 * weights);
+        self.sigma = noise.sqrt();
+    }
+}

@@ -1,0 +1,241 @@
+//! The last word on patches and noise, before pairs are reported.
+//!
+//! Growth goes by nearest partners. Where fruits crowd, the nearest is often a stranger, and a patch that is fitted to
+//! strangers meets them ever closer: the noise comes out small, the pairs surer than they are. So what growth found is
+//! settled once more, in turns:
+//!
+//! 1. Every fruit is predicted without its own partner (leave-one-out).
+//! 2. The noise and the share seen again come from distances, nobody said to be who ([`super::scatter`]).
+//! 3. Every pair gets its probability ([`super::association`]).
+//! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
+//!    the common pose as firmly as the clouds show that they move together.
+
+use super::association::Marginals;
+use super::cells::{Cell, surroundings, total};
+use super::growth::{Growth, Partner};
+use super::landscape::{Landscape, SHARE_OF_ROWS};
+use super::overlap::{Overlap, Prediction};
+use super::patches::{DRIFT, Footing, HOLD, SHARE_OF_CELLS, next_to};
+use super::pose::{Moments, Pose};
+use super::scatter::{Expected, scatter};
+use super::sharing::{displacement, shared_by_neighbours};
+use super::size::{Cue, Sizes};
+use crate::geometry::Scale;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Turns: the noise stands after the first, the patches after the second.
+const TURNS: usize = 3;
+
+/// Pairs that hold a patch to its surroundings where neighbours do not differ from them together, and at the least.
+const HOLDS: (f64, f64) = (0.5, 50.0);
+
+/// The same for the surroundings and the common pose.
+const WIDE_HOLDS: (f64, f64) = (0.5, 1000.0);
+
+/// A prediction loses at most this share of its fit when its own partner is left out.
+const MAX_LEVERAGE: f64 = 0.8;
+
+/// Fruits with less probability of any partner say nothing to the fit.
+const LEAST_WEIGHT: f64 = 1e-3;
+
+/// The overlap as it stands in the end.
+pub(crate) struct Settled {
+    pub(crate) overlap: Overlap,
+    /// Pairs by their probabilities.
+    pub(crate) marginals: Marginals,
+}
+
+/// Mean partner of a fruit, and the probability that it has one.
+type Target = Option<(Vector3<f64>, f64)>;
+
+struct Settlement<'a> {
+    query: &'a Landscape,
+    map: &'a Landscape,
+    scale: Scale,
+    expected: Expected,
+    cells: Vec<Cell>,
+    cell_of: &'a [u32],
+    edge: f64,
+    pose: Pose,
+    /// Noise of a pair under a pose that is known exactly, metres of the map.
+    sigma: f64,
+    share: f64,
+    /// Pairs that hold the patches, and their surroundings.
+    holds: [f64; 2],
+    /// Variance that neighbours' residuals about the patches share, square metres.
+    shared: f64,
+    targets: Vec<Target>,
+    predictions: Vec<Option<Prediction>>,
+}
+
+/// Settles what `growth` found; `noise_m` is the relative noise where it is known.
+pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Sizes>) -> Settled {
+    let mut settlement = Settlement::new(growth, noise_m);
+    let mut cue = None;
+    for _ in 0..TURNS {
+        settlement.predict();
+        settlement.measure();
+        let marginals = settlement.marginals(cue.as_ref());
+        cue = sizes.and_then(|sizes| sizes.cue(marginals.links()));
+        settlement.refit(&marginals);
+    }
+    settlement.predict();
+    settlement.measure();
+    let marginals = settlement.marginals(cue.as_ref());
+    let overlap = Overlap {
+        pose: settlement.pose,
+        sigma: settlement.sigma,
+        predictions: settlement.predictions,
+        ..growth.overlap()
+    };
+    Settled { overlap, marginals }
+}
+
+impl<'a> Settlement<'a> {
+    fn new(growth: &'a Growth, noise_m: Option<f64>) -> Self {
+        let mut cells = growth.cells.clone();
+        for (i, cell) in cells.iter_mut().enumerate() {
+            if !growth.convincing(i) {
+                cell.reached = false;
+                cell.moments = Moments::default();
+            }
+        }
+        let target = |partner: &Partner| (growth.map.points[partner.row as usize], partner.weight);
+        Self {
+            query: growth.query,
+            map: growth.map,
+            scale: growth.model.scale,
+            expected: match noise_m {
+                Some(noise_m) => Expected::Given(noise_m),
+                None if growth.whole => Expected::Outlined(growth.sigma),
+                None => Expected::Guess(growth.model.sigma),
+            },
+            cells,
+            cell_of: &growth.cut.cell_of,
+            edge: growth.edge,
+            pose: growth.pose,
+            sigma: growth.sigma,
+            share: 0.5,
+            holds: [HOLD; 2],
+            shared: growth.shared,
+            targets: growth.partners.iter().map(|partner| partner.as_ref().map(target)).collect(),
+            predictions: vec![None; growth.query.len()],
+        }
+    }
+
+    /// From the mean partner to where the patch puts the fruit.
+    fn residual(&self, row: usize) -> Target {
+        let (target, weight) = self.targets[row]?;
+        let pose = &self.cells[self.cell_of[row] as usize].pose;
+        Some((target - pose.apply(&self.query.points[row]), weight))
+    }
+
+    /// Where each fruit should lie by all partners but its own, and how surely.
+    fn predict(&mut self) {
+        let footing = |moments: Moments, hold: f64, cell: &Cell| Footing::new(&moments, hold, self.edge, cell.centre);
+        let footings: Vec<Option<[Footing; 2]>> = self
+            .cells
+            .par_iter()
+            .with_min_len(SHARE_OF_CELLS)
+            .map(|cell| {
+                cell.reached.then(|| {
+                    let near = footing(next_to(&self.cells, cell), self.holds[0], cell);
+                    [near, footing(surroundings(&self.cells, cell), self.holds[1], cell)]
+                })
+            })
+            .collect();
+        let at = |row: usize| footings[self.cell_of[row] as usize].map(|footing| self.prediction(row, &footing));
+        self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
+    }
+
+    fn prediction(&self, row: usize, [near, wide]: &[Footing; 2]) -> Prediction {
+        let p = self.query.points[row];
+        let away2 = wide.away2(&p);
+        let bent = if away2 > self.edge * self.edge { DRIFT * DRIFT * away2 } else { 0.0 };
+        // The patch follows its surroundings in the measure in which it is held to them.
+        let looseness = near.looseness(&p) + near.share_held(self.holds[0]) * wide.looseness(&p);
+        let noise = self.sigma * self.sigma;
+        let (shift, unexplained) = displacement(self.query, row, (self.shared, noise), |other| self.residual(other));
+        let mut place = self.cells[self.cell_of[row] as usize].pose.apply(&p) + shift;
+        if let Some((residual, weight)) = self.residual(row) {
+            // Of a linear fit: the residual without the own partner is r / (1 - h), h the leverage.
+            let leverage = (weight * looseness).min(MAX_LEVERAGE);
+            place -= residual * (leverage / (1.0 - leverage));
+        }
+        Prediction { place, variance: noise * (1.0 + looseness) + bent + unexplained }
+    }
+
+    /// Noise and share from the distances; the predictions' variances follow.
+    fn measure(&mut self) {
+        let found = scatter(self.query, self.map, &self.predictions, self.pose.scale, self.expected);
+        self.share = found.share;
+        let both = self.predictions.iter().zip(&self.targets);
+        let (sum, weights) = both
+            .filter_map(|(prediction, target)| Some((prediction.as_ref()?.variance, (*target)?.1)))
+            .fold((0.0, 0.0), |sum, (variance, weight)| (sum.0 + weight * variance, sum.1 + weight));
+        if weights > 0.0 {
+            let stretch = found.sigma * found.sigma * weights / sum;
+            self.sigma *= stretch.sqrt();
+            self.predictions.iter_mut().flatten().for_each(|prediction| prediction.variance *= stretch);
+        }
+    }
+
+    fn marginals(&self, cue: Option<&Cue>) -> Marginals {
+        let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
+        Marginals::new(self.query, self.map, &self.predictions, &self.pose, self.share, &size)
+    }
+
+    /// Common pose, surroundings and patches from the mean partners.
+    fn refit(&mut self, marginals: &Marginals) {
+        self.follow(marginals);
+        let all = total(self.cells.iter().map(|cell| (&cell.moments, 1.0)));
+        self.pose = all.step(&self.pose, self.scale, 0.0).unwrap_or(self.pose);
+        self.cells.iter_mut().for_each(|cell| cell.pose = self.pose);
+        self.holds[1] = self.hold(WIDE_HOLDS);
+        self.fit(surroundings, self.holds[1]);
+        self.holds[0] = self.hold(HOLDS);
+        self.fit(next_to, self.holds[0]);
+        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
+        self.shared = if shared < 0.01 * self.sigma * self.sigma { 0.0 } else { shared };
+    }
+
+    /// Mean partners by the probabilities, and their sums in every cell.
+    fn follow(&mut self, marginals: &Marginals) {
+        let mut sums = vec![(Vector3::zeros(), 0.0); self.query.len()];
+        for link in marginals.links() {
+            let sum = &mut sums[link.query as usize];
+            sum.0 += self.map.points[link.map as usize] * link.probability;
+            sum.1 += link.probability;
+        }
+        let mean = |(sum, weight): (Vector3<f64>, f64)| (weight > LEAST_WEIGHT).then(|| (sum / weight, weight));
+        self.targets = sums.into_iter().map(mean).collect();
+        let (query, targets) = (self.query, &self.targets);
+        for cell in self.cells.iter_mut().filter(|cell| cell.reached) {
+            cell.moments = Moments::default();
+            for &row in cell.rows.iter() {
+                if let Some((target, weight)) = targets[row as usize] {
+                    cell.moments.add(&query.points[row as usize], &target, weight);
+                }
+            }
+        }
+    }
+
+    /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that together.
+    fn hold(&self, (least, most): (f64, f64)) -> f64 {
+        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
+        (self.sigma * self.sigma / shared.max(f64::MIN_POSITIVE)).clamp(least, most)
+    }
+
+    /// Fits every cell's pose to the pairs around it, held to the pose that it has.
+    fn fit(&mut self, around: impl Fn(&[Cell], &Cell) -> Moments + Sync, hold: f64) {
+        let prior = hold * self.edge * self.edge;
+        let fitted = |cell: &Cell| {
+            let mut moments = around(&self.cells, cell);
+            moments.add(&cell.centre, &cell.pose.apply(&cell.centre), hold);
+            moments.step(&cell.pose, Scale::Metric, prior).unwrap_or(cell.pose)
+        };
+        let poses: Vec<Pose> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
+        self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
+    }
+}
