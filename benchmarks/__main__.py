@@ -16,6 +16,8 @@ NAMES = (
     "clouds",
     "odometry",
     "tracking",
+    "scan",
+    "endurance",
     "speed",
     "readme",
 )

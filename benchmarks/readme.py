@@ -1,11 +1,10 @@
-"""The README's table of accuracy, taken from results/cells.md: `python -m benchmarks readme`."""
+"""The README's tables, taken from results/: `python -m benchmarks readme`."""
 
 from pathlib import Path
 
 from benchmarks.results import FOLDER, markdown
 
 README = Path(__file__).parent.parent / "README.md"
-START, END = "<!-- accuracy: python -m benchmarks readme -->\n", "<!-- end of accuracy -->\n"
 METHODS = ("paper", "verified")
 CELLS = {
     "base": "five trees, 30 % hidden, 2 cm of noise",
@@ -22,14 +21,27 @@ HEADER = ("two visits", "method", "right", "wrong", "P", "R", "P of true pose", 
 
 
 def main(_options: list[str]) -> None:
-    """Replace the table between the two marks."""
+    """Replace what is between each pair of marks."""
     text = README.read_text(encoding="utf-8")
-    before, rest = text.split(START)
-    after = rest.split(END)[1]
-    README.write_text(f"{before}{START}{table()}{END}{after}", encoding="utf-8")
+    for name, block in blocks().items():
+        start, end = marks(name)
+        before, rest = text.split(start)
+        text = before + block + rest.split(end)[1]
+    README.write_text(text, encoding="utf-8")
 
 
-def table() -> str:
+def blocks() -> dict[str, str]:
+    """Return each block of the README with its marks, as the committed results have it."""
+    found = {"accuracy": accuracy(), "scan": (FOLDER / "scan.md").read_text(encoding="utf-8")}
+    return {name: text.join(marks(name)) for name, text in found.items()}
+
+
+def marks(name: str) -> tuple[str, str]:
+    """Return the lines around a block."""
+    return f"<!-- {name}: python -m benchmarks readme -->\n", f"<!-- end of {name} -->\n"
+
+
+def accuracy() -> str:
     """Return the table of the cells a reader wants first, both methods, noise estimated where it was measured so."""
     rows = measured()
     lines = []

@@ -281,3 +281,16 @@ def test_where_the_track_breaks_a_new_session_begins(pomona, shared_data, tmp_pa
         assert len(session.cloud) > 10
         np.testing.assert_allclose(session.trajectory.session_from_camera[0], np.eye(4), atol=1e-9)
     assert "row-part2.gpkg: frames" in printed
+
+
+def test_depth_can_be_measured_otherwise(pomona, shared_data, tmp_path):
+    stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
+    clouds = {}
+    for how in ("auto", "stereo", "dense"):
+        code, _, _ = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / f"{how}.csv", "--depth", how)
+        assert code == 0
+        clouds[how] = (tmp_path / f"{how}.csv").read_bytes()
+    assert clouds["auto"] == clouds["stereo"] != clouds["dense"]
+    code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "no.csv", "--depth", "sgbm")
+    assert (code, told.count("\n")) == (2, 1)
+    assert "depth: found 'sgbm', expected stereo, dense or a stereo network" in told

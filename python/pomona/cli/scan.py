@@ -41,7 +41,9 @@ def scan(
     topics: str | None = typer.Option(
         None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
     ),
-    stereo: bool = typer.Option(False, "--stereo", help="Depth from left and right, even where depth was recorded."),
+    depth: str = typer.Option(
+        "auto", metavar="auto|stereo|dense|ONNX", help="Depth pictures, else stereo at the fruits; or stereo all over."
+    ),
     odometry: bool = typer.Option(False, "--odometry", help="Poses from the pictures, even where they were recorded."),
     retrack: bool = typer.Option(False, "--retrack", help="Track the boxes, even where they have ids."),
     config: Path | None = typer.Option(None, metavar="TOML", help="Settings; `pomona config` prints them all."),
@@ -81,15 +83,17 @@ def scan(
         detections, model, whole, family=family, min_score=min_score, classes=_classes(classes), tiles=tiles
     )
     opened = selected(whole, every=every, first=first, last=last)
-    looks = {"detector": detector.configuration, "stereo": stereo}
+    looks = {"detector": detector.configuration, "depth": depth}
     kept = None if keep is None else _kept(keep, opened, detector.path, looks)
     check_sides(opened)
-    choices = {"stereo": stereo, "odometry": odometry, "retrack": retrack}
+    choices = {"odometry": odometry, "retrack": retrack}
     with (
         scan_output.scanning(opened, detector.description, told=model is not None) as progress,
         first_interrupt() as stop,
     ):
-        survey = scan_recording(opened, detector, **choices, config=overrides, keep=kept, progress=progress, stop=stop)
+        survey = scan_recording(
+            opened, detector, depth=depth, **choices, config=overrides, keep=kept, progress=progress, stop=stop
+        )
     configuration = {"scan": {**looks, **choices, "every": every}, **overrides}
     written = _write(output, survey, opened, name, date, configuration, detector.path)
     _write_extras(keep, preview, opened, survey)

@@ -14,7 +14,7 @@ from pomona.errors import PomonaError
 from pomona.recording import Calibration, Frame, Recording
 from pomona.recording.check import is_blank
 from pomona.recording.pictures import UnreadablePictureError
-from pomona.stereo import StereoDepth
+from pomona.stereo import open_stereo
 from pomona.survey.prefetch import Kind
 
 __all__ = ["Look", "Seeing"]
@@ -62,8 +62,9 @@ class Seeing:
         With depth, or with left and right pictures and a baseline.
     detector : Detector
         Gives the boxes.
-    stereo : bool
-        Measure depth from left and right even where there are depth pictures.
+    depth : str
+        ``auto``: depth pictures, else from left and right at the fruits. Or from left and right even where there are
+        depth pictures: ``stereo``, ``dense`` or a file, as in `pomona.stereo.open_stereo`.
 
     Raises
     ------
@@ -71,9 +72,9 @@ class Seeing:
         When the recording has neither depth nor a stereo pair.
     """
 
-    def __init__(self, recording: Recording, detector: Detector, *, stereo: bool = False) -> None:
+    def __init__(self, recording: Recording, detector: Detector, *, depth: str = "auto") -> None:
         self._detector = detector
-        self._depth = _depth_of(recording, stereo)
+        self._depth = _depth_of(recording, depth)
         self._colour = "left" in recording.description()["pictures"]
 
     @property
@@ -118,14 +119,14 @@ def _colour(picture: NDArray[np.uint8], box_px: NDArray[np.float64]) -> NDArray[
     return np.asarray(np.median(middle, axis=0))
 
 
-def _depth_of(recording: Recording, stereo: bool) -> _Depth:
+def _depth_of(recording: Recording, how: str) -> _Depth:
     pictures = recording.description()["pictures"]
-    if "depth" in pictures and not stereo:
+    if "depth" in pictures and how == "auto":
         return _FromPictures(recording)
     if {"left", "right"} <= pictures.keys() and recording.calibration.baseline_m is not None:
-        return _FromStereo(recording.calibration)
+        return _FromStereo(recording.calibration, "stereo" if how == "auto" else how)
     found = " and ".join(pictures)
-    expected = "left and right" if stereo else "depth, or left and right"
+    expected = "depth, or left and right" if how == "auto" else "left and right"
     raise PomonaError(f"{recording.path}: found {found} pictures, expected {expected}")
 
 
@@ -144,15 +145,15 @@ class _FromPictures:
 
 
 class _FromStereo:
-    """Depth from left and right, at the boxes alone."""
+    """Depth from left and right."""
 
     needs: tuple[Kind, ...] = ("left", "right")
 
-    def __init__(self, calibration: Calibration) -> None:
-        self._calibration, self._stereo = calibration, StereoDepth(calibration)
+    def __init__(self, calibration: Calibration, how: str) -> None:
+        self._calibration, self._measure = calibration, open_stereo(how, calibration)
 
     def __call__(self, frame: Frame, boxes_px: NDArray[np.float64]) -> Lifted:
         if frame.read_left is None or frame.read_right is None:
             raise PomonaError(f"frame {frame.number}: found one picture, expected left and right")
-        found = self._stereo(frame.read_left(), frame.read_right(), boxes_px)
+        found = self._measure(frame.read_left(), frame.read_right(), boxes_px)
         return lift(found, boxes_px, self._calibration)

@@ -79,7 +79,7 @@ def scan(
     recording: Recording,
     detector: Detector,
     *,
-    stereo: bool = False,
+    depth: str = "auto",
     odometry: bool = False,
     retrack: bool = False,
     config: Mapping[str, Any] | None = None,
@@ -95,8 +95,8 @@ def scan(
         With depth, or left and right, pictures.
     detector : Detector
         Gives boxes. Where they have ids, those say which boxes are one fruit; else the boxes are tracked.
-    stereo : bool
-        Measure depth from left and right even where there are depth pictures.
+    depth : str
+        ``auto``: depth pictures, else from left and right at the fruits; or as in `pomona.stereo.open_stereo`.
     odometry : bool
         Find the poses even where the recording has some.
     retrack : bool
@@ -116,7 +116,7 @@ def scan(
         When pictures that are needed are not there, or no frame can be used. Single ones that cannot are skipped and
         told.
     """
-    seeing = Seeing(recording, detector, stereo=stereo)
+    seeing = Seeing(recording, detector, depth=depth)
     camera = camera_of(recording, odometry=odometry)
     named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
     findings = _Findings(partial(_open_part, recording, None if named else config or {}))
