@@ -12,21 +12,22 @@ from benchmarks.tracking_scores import MIN_VIEWS, Names, Numbers
 RIGHT, WRONG, LOST = "tab:green", "tab:red", "0.3"
 
 
-def draw(names: Names, numbers: Numbers, curve: list[dict[str, object]], path: Path) -> None:
-    """Draw one run and the curve."""
+def draw(runs: list[tuple[str, Names, Numbers]], curve: list[dict[str, object]], path: Path) -> None:
+    """Draw titled runs and the curve."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(13, 7), width_ratios=(3, 2), layout="constrained")
-    _draw_tracks(left, names, numbers)
-    _draw_curve(right, curve)
+    figure, panels = plt.subplots(1, len(runs) + 1, figsize=(6 * len(runs) + 6, 7), layout="constrained")
+    for axes, run in zip(panels, runs, strict=False):
+        _draw_tracks(axes, *run)
+    _draw_curve(panels[-1], curve)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
-def _draw_tracks(axes, names: Names, numbers: Numbers) -> None:
+def _draw_tracks(axes, title: str, names: Names, numbers: Numbers) -> None:
     """One line a fruit, in the order of its first frame; a dot a box."""
     of_fruit = defaultdict(list)
     for frame, (found, told) in enumerate(zip(names, numbers, strict=True)):
@@ -43,7 +44,7 @@ def _draw_tracks(axes, names: Names, numbers: Numbers) -> None:
     for colour, text in ((RIGHT, "the fruit's track"), (WRONG, "another track"), (LOST, "no track")):
         x, y = np.array(dots[colour]).reshape(-1, 2).T
         axes.scatter(x, y, s=9, color=colour, label=f"{text}: {len(x)} boxes", zorder=2)
-    axes.set(xlabel="frame", ylabel=f"fruits seen in {MIN_VIEWS} frames or more", title="2024-08-09, exact depth")
+    axes.set(xlabel="frame", ylabel=f"fruits seen in {MIN_VIEWS} frames or more", title=title)
     axes.legend(loc="upper left", fontsize=8)
 
 

@@ -44,6 +44,21 @@ fn every_fruit_is_followed_once() {
 }
 
 #[test]
+fn frames_may_follow_closely() {
+    // 1.5 cm a frame, as a video at a walk: one frame says nothing about depth that the one before did not say.
+    let places: Vec<_> = (0..200).map(|frame| f64::from(frame) / 10.0).collect();
+    let (tracks, names, _) = tracked(29, &places, 0.7, 0.05);
+    let found = names_of(&tracks, &names);
+    let mut once: Vec<_> = found.iter().map(|of| of[0]).collect();
+    once.sort_unstable();
+    once.dedup();
+    assert!(once.len() > 50);
+    assert_eq!(once.len(), found.len(), "a fruit is split");
+    let strange: usize = found.iter().map(|of| of.iter().filter(|&&name| name != of[0]).count()).sum();
+    assert!(strange * 100 <= found.iter().map(Vec::len).sum(), "{strange} boxes of other fruits");
+}
+
+#[test]
 fn fruits_are_known_again_after_a_gap() {
     // There, half of the row away, and back: the first trees are out of view for some 20 frames.
     let places: Vec<_> = (0..16).chain((0..16).rev()).map(f64::from).collect();

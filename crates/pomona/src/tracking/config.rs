@@ -45,11 +45,12 @@ impl Default for TrackingConfig {
         Self {
             // The paper's; a box that shows no fruit does not come five times to one place.
             min_views: 5,
-            // Longer than a fruit stays in view: after that nothing more is learned about it.
-            lag: 30,
+            // Longer than a fruit stays in view at walking pace and 30 frames a second: two metres at a metre a second.
+            // After that nothing more is learned about it. A hundred frames are some megabytes.
+            lag: 100,
             // Half a pixel of rounding, and what people and detectors disagree by on a clear outline.
             edge_sigma_px: 1.0,
-            // At three fruits on each centimetre of way and 15 cm a frame; only its logarithm counts.
+            // Some thirty fruits come up on a metre of way, 0.15 m a frame; only the logarithm counts.
             new_per_frame: 5.0,
             // A tenth of forty boxes.
             false_per_frame: 4.0,
