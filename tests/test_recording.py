@@ -7,6 +7,7 @@ import pytest
 
 from pomona import PomonaError
 from pomona.recording import Calibration, open_recording
+from pomona.recording.pictures import UnreadablePictureError
 from recording_maker import FIELDS, make_recording
 
 
@@ -183,7 +184,10 @@ def test_frames_without_a_number_or_twice_are_refused(folder):
 def test_a_frame_that_is_missing_in_one_folder_is_named(folder):
     (folder / "left").mkdir()
     cv2.imwrite(str(folder / "left" / "0000.png"), np.zeros((480, 640, 3), np.uint8))
-    refused(folder, "frame 1", "left/", "depth/")
+    whole, lacking = open_recording(folder).frames()
+    assert whole.read_left().shape == lacking.read_depth().shape + (3,)
+    with pytest.raises(UnreadablePictureError, match=r"left/0001\.png: not there"):
+        lacking.read_left()
 
 
 def test_what_is_no_recording_is_refused(tmp_path):

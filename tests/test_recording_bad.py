@@ -145,9 +145,18 @@ def test_pictures_of_another_size_cost_their_frame(pomona, tmp_path):
     assert "0003.png: found 320x100 pixels, expected 320x240 as in the calibration" in printed
 
 
-def test_lengths_that_differ(pomona, tmp_path):
+def test_a_picture_that_is_not_there_costs_its_frame(pomona, tmp_path):
     row = write_folder(tmp_path / "row", pairs())
     (row / "right" / "0005.png").unlink()
+    code, printed, _ = pomona("info", row, "--check")
+    assert code == 1
+    assert "0005.png: not there, but the other pictures of this frame are" in printed
+
+
+def test_folders_that_share_no_frame(pomona, tmp_path):
+    row = write_folder(tmp_path / "row", pairs())
+    for file in sorted((row / "right").iterdir()):
+        file.rename(file.with_name(f"1{file.name}"))
     code, _, errors = pomona("info", row)
     assert code == 2
-    assert "frame 5 is only in one of left/ and right/" in errors
+    assert "expected the same numbers in each folder" in errors

@@ -8,7 +8,7 @@ import json
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
-from pomona.recording.pictures import numbered_pictures
+from pomona.recording.pictures import UnreadablePictureError, numbered_pictures
 from pomona.recording.poses import read_tum
 from pomona.recording.rectification import Optics
 from pomona.recording.rectified_pictures import read_rectified, size_of_first
@@ -104,12 +104,13 @@ class FolderRecording:
             )
 
     def inputs(self) -> Iterator[Path]:
-        """Give calibration, poses, detections and depth pictures."""
+        """Give calibration, poses, detections and pictures."""
         yield from self.optics.inputs
         for name in ("recording.json", "poses_tum.txt", "detections.csv"):
             if (self.path / name).is_file():
                 yield self.path / name
-        yield from self.pictures.get("depth", {}).values()
+        for files in self.pictures.values():
+            yield from files.values()
 
     def description(self) -> dict[str, Any]:
         """Say what was found."""
@@ -119,24 +120,28 @@ class FolderRecording:
         return describe(self, "recording folder", times_s, counts, detections=boxes)
 
     def _reader(self, kind: str, number: int) -> Any:
-        file = self.pictures.get(kind, {}).get(number)
-        if file is None:
+        files = self.pictures.get(kind)
+        if not files:
             return None
-        return functools.partial(read_rectified, kind, file, self.optics)
+        if number not in files:
+            suffix = next(iter(files.values())).suffix
+            return functools.partial(_not_there, self.path / kind / f"{number:04d}{suffix}")
+        return functools.partial(read_rectified, kind, files[number], self.optics)
+
+
+def _not_there(file: Path) -> NoReturn:
+    raise UnreadablePictureError(f"{file}: not there, but the other pictures of this frame are")
 
 
 def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, ...]:
-    """Frame numbers; every kind of picture that has a file has all of them."""
+    """Numbers of all frames; one that lacks a picture stays, so that it is named when the picture is asked for."""
     kinds = {kind: files for kind, files in pictures.items() if files}
     if not ("depth" in kinds or "left" in kinds):
         raise PomonaError(f"{folder}: no pictures found, expected depth/0000.png ... or left/0000.png ...")
-    numbers = next(iter(kinds.values())).keys()
-    for kind, files in kinds.items():
-        odd = numbers ^ files.keys()
-        if odd:
-            first = next(iter(kinds))
-            raise PomonaError(f"{folder}: frame {min(odd)} is only in one of {first}/ and {kind}/, expected it in both")
-    return tuple(numbers)
+    if not set.intersection(*(set(files) for files in kinds.values())):
+        ranges = ", ".join(f"{kind}/ {min(files)} to {max(files)}" for kind, files in kinds.items())
+        raise PomonaError(f"{folder}: found frames {ranges}, expected the same numbers in each folder")
+    return tuple(sorted(set.union(*(set(files) for files in kinds.values()))))
 
 
 def _optics(folder: Path, pictures: dict[str, dict[int, Path]], calibration: Path | None) -> Optics:
