@@ -185,7 +185,7 @@ def test_a_frame_that_is_missing_in_one_folder_is_named(folder):
     (folder / "left").mkdir()
     cv2.imwrite(str(folder / "left" / "0000.png"), np.zeros((480, 640, 3), np.uint8))
     whole, lacking = open_recording(folder).frames()
-    assert whole.read_left().shape == lacking.read_depth().shape + (3,)
+    assert whole.read_left().shape == (*lacking.read_depth().shape, 3)
     with pytest.raises(UnreadablePictureError, match=r"left/0001\.png: not there"):
         lacking.read_left()
 
@@ -258,3 +258,8 @@ def test_read_errors_name_one_file(folder):
     (folder / "depth" / "0000.png").mkdir()
     with pytest.raises(PomonaError, match=re.escape("0000.png")):
         next(open_recording(folder).frames()).read_depth()
+
+
+def test_a_calibration_of_another_size_is_told_before_anything_is_read(folder):
+    with_fields(folder, width=1280, height=960, cx=640.0, cy=480.0, fx=1200.0, fy=1200.0)
+    refused(folder, "calibration.json: width, height: found 1280x960, expected 640x480 as 0000.png is")

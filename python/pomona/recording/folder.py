@@ -18,7 +18,7 @@ from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
-from pomona.recording.pictures import UnreadablePictureError, numbered_pictures
+from pomona.recording.pictures import UnreadablePictureError, numbered_pictures, picture_size
 from pomona.recording.poses import read_tum
 from pomona.recording.rectification import Optics
 from pomona.recording.rectified_pictures import read_rectified, size_of_first
@@ -146,15 +146,27 @@ def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, .
 
 def _optics(folder: Path, pictures: dict[str, dict[int, Path]], calibration: Path | None) -> Optics:
     own = folder / "calibration.json"
+    files = tuple(next(files for files in pictures.values() if files).values())
     if calibration is None and own.is_file():
         optics = Optics.of(Calibration.read(own), own)
+        _require_size(own, optics.calibration, files)
     else:
-        files = next(files for files in pictures.values() if files)
-        size_px = size_of_first(tuple(files.values()))
+        size_px = size_of_first(files)
         optics = find_optics(folder, size_px, stereo="right" in pictures, given=calibration)
     if "right" in pictures and optics.calibration.baseline_m is None:
         raise PomonaError(f"{own}: baseline_m: missing, expected metres: there is a right/")
     return optics
+
+
+def _require_size(own: Path, calibration: Calibration, files: tuple[Path, ...]) -> None:
+    """Compare with the first picture; when that cannot be read it will be named when it is asked for."""
+    try:
+        size_px = picture_size(files[0])
+    except PomonaError:
+        return
+    if size_px != calibration.size_px:
+        found, expected = ("{}x{}".format(*size) for size in (calibration.size_px, size_px))
+        raise PomonaError(f"{own}: width, height: found {found}, expected {expected} as {files[0].name} is")
 
 
 def _trajectory(path: Path, numbers: tuple[int, ...], optics: Optics) -> Trajectory | None:

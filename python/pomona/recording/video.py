@@ -173,7 +173,12 @@ def open_video(path: Path, calibration: Path | None = None) -> VideoRecording:
         raise PomonaError(f"{path}: found {len(files)} videos, expected left and right, or one side by side")
     kind = "side-by-side video" if left is right else "left and right video"
     pairs = np.arange(len(left.times_s)).repeat(2).reshape(-1, 2) if left is right else _pairs(left, right)
-    return VideoRecording(path, kind, find_optics(place, size_px, stereo=True, given=calibration), left, right, pairs)
+    try:
+        optics = find_optics(place, size_px, stereo=True, given=calibration)
+    except PomonaError as error:
+        hint = "; one video is taken for left and right side by side" if left is right else ""
+        raise PomonaError(f"{error}{hint}") from None
+    return VideoRecording(path, kind, optics, left, right, pairs)
 
 
 def _require_sizes(left: VideoFile, right: VideoFile) -> None:
