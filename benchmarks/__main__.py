@@ -9,6 +9,7 @@ import sys
 NAMES = (
     "robustness",
     "cells",
+    "stereo",
     "lifting",
     "diameters",
     "kinect",

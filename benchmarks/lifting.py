@@ -3,7 +3,8 @@
 Four Kinect captures of one scene: distance of the same fruits after the best rigid motion between two captures, for
 pomona and for the positions that came with the data, over the same fruits. The rendered row: centres and diameters
 against the exact truth, with true boxes around the visible part of each fruit, single sightings by how much of the
-fruit shows, and fused over the frames. Writes lifting.csv and lifting.md.
+fruit shows, and fused over the frames; from exact depth, and from the stereo pictures alone. Writes lifting.csv and
+lifting.md.
 """
 
 import argparse
@@ -47,7 +48,10 @@ def main(arguments: list[str]) -> None:
             folder = Path(scratch) / date
             boxes = with_true_boxes(data / "rendered_row" / date, folder)
             sightings += sighting_rows(date, folder, rendered_truth(data / "rendered_row" / date), boxes)
-            fused += fused_rows(date, scanned(folder).cloud, rendered_truth(data / "rendered_row" / date))
+            pair = Path(scratch) / f"{date} stereo"
+            with_true_boxes(data / "rendered_row" / date, pair, pictures=("left", "right"))
+            for what, recorded in ((f"fused {date}", folder), (f"stereo, fused {date}", pair)):
+                fused += fused_rows(what, scanned(recorded).cloud, rendered_truth(data / "rendered_row" / date))
     write_rows("lifting.csv", [*captures, *sightings, *fused])
     text = report(captures, sightings, fused)
     write_text("lifting.md", text)
@@ -109,13 +113,13 @@ def sighting_rows(date: str, folder: Path, truth: FruitCloud, boxes: list[TrueBo
     ]
 
 
-def fused_rows(date: str, cloud: FruitCloud, truth: FruitCloud) -> list[dict[str, object]]:
+def fused_rows(what: str, cloud: FruitCloud, truth: FruitCloud) -> list[dict[str, object]]:
     """Errors of fused fruits, by the number of frames; no alignment, the poses are true."""
     true = rows_named(truth, list(cloud.ids))
     distances_mm = 1000 * np.linalg.norm(cloud.positions - true.positions, axis=1)
     sizes_mm = 1000 * (cloud.diameters_m - true.diameters_m)
     return [
-        row(f"fused {date}", f"{views} frames or more", "pomona", distances_mm[of], sizes_mm[of])
+        row(what, f"{views} frames or more", "pomona", distances_mm[of], sizes_mm[of])
         for views in MIN_VIEWS
         if (of := cloud.n_views >= views).any()
     ]
@@ -166,5 +170,5 @@ def report(
         "Distance between the same fruits of two Kinect captures after a rigid motion, mm:\n\n"
         f"{rigid}\nDistance of fruits to their true place, and error of their diameter, mm:\n\n{true}\n"
         "Not held out: how wide the votes are (`SURFACE_SIGMA`) was chosen on these captures, and how much leaves\n"
-        "hide (`HIDDEN`) measured on this row.\n"
+        "hide (`HIDDEN`, `HIDDEN_UNMATCHED`) measured on this row.\n"
     )

@@ -8,8 +8,8 @@ use super::picture::{Bounds, Picture};
 use crate::camera::PixelBox;
 
 /// Cost of a step of one disparity, and of any greater one; a pixel's own cost goes to 90 (`TRUNCATION`).
-const STEP: u16 = 15;
-const JUMP: u16 = 60;
+const STEP: i16 = 15;
+const JUMP: i16 = 60;
 
 /// Disparities up to this multiple of the fruit's are tried: what is nearer covers it from a third of the way.
 const NEARER: f64 = 1.6;
@@ -29,7 +29,7 @@ impl Surroundings {
         let mut volume = Vec::with_capacity(pixels.width() * pixels.height() * count);
         for (column, row) in pixels.pixels() {
             right.costs(left.at(column, row), column, row, first, &mut costs);
-            volume.extend(costs.iter().map(|&cost| u16::from(cost)));
+            volume.extend(costs.iter().map(|&cost| i16::from(cost)));
         }
         let sums = aggregated(&volume, pixels.width(), pixels.height(), count);
         let disparities_px = sums.chunks_exact(count).map(|sums| (first as f64 + least(sums)) as f32).collect();
@@ -38,7 +38,7 @@ impl Surroundings {
 }
 
 /// Sums of the four paths.
-fn aggregated(volume: &[u16], width: usize, height: usize, count: usize) -> Vec<u16> {
+fn aggregated(volume: &[i16], width: usize, height: usize, count: usize) -> Vec<i16> {
     let mut sums = vec![0; volume.len()];
     let mut path = Path::new(count);
     for row in 0..height {
@@ -56,30 +56,31 @@ fn aggregated(volume: &[u16], width: usize, height: usize, count: usize) -> Vec<
 
 /// Costs of one path at the pixel before and at this one, with a border on both sides.
 struct Path {
-    before: Vec<u16>,
-    here: Vec<u16>,
+    before: Vec<i16>,
+    here: Vec<i16>,
 }
 
-/// Never the least, and far from overflow with a step added.
-const BORDER: u16 = u16::MAX / 2;
+/// Never the least, and far from overflow with a step added; signed, as every processor compares those at once.
+const BORDER: i16 = i16::MAX / 2;
 
 impl Path {
     fn new(count: usize) -> Self {
         Self { before: vec![BORDER; count + 2], here: vec![BORDER; count + 2] }
     }
 
-    fn walk(&mut self, volume: &[u16], sums: &mut [u16], places: impl Iterator<Item = usize>) {
+    fn walk(&mut self, volume: &[i16], sums: &mut [i16], places: impl Iterator<Item = usize>) {
         let count = self.here.len() - 2;
         self.before[1..=count].fill(0);
         for place in places {
             let range = place * count..(place + 1) * count;
-            let least = self.before[1..=count].iter().copied().min().unwrap_or_default();
+            let least = self.before[1..=count].iter().fold(BORDER, |least, &one| least.min(one));
             let jump = least + JUMP;
-            for (d, (cost, sum)) in volume[range.clone()].iter().zip(&mut sums[range]).enumerate() {
-                let step = self.before[d].min(self.before[d + 2]) + STEP;
-                let best = cost + self.before[d + 1].min(step).min(jump) - least;
-                self.here[d + 1] = best;
-                *sum += best;
+            let (below, same, above) = (&self.before[..count], &self.before[1..=count], &self.before[2..]);
+            let around = below.iter().zip(same).zip(above);
+            let costs = volume[range.clone()].iter().zip(&mut sums[range]).zip(&mut self.here[1..=count]);
+            for (((&below, &same), &above), ((cost, sum), here)) in around.zip(costs) {
+                *here = cost + same.min(below.min(above) + STEP).min(jump) - least;
+                *sum += *here;
             }
             std::mem::swap(&mut self.before, &mut self.here);
         }
@@ -87,7 +88,7 @@ impl Path {
 }
 
 /// Where the sums are least, to a part of a step.
-fn least(sums: &[u16]) -> f64 {
+fn least(sums: &[i16]) -> f64 {
     let least = (0..sums.len()).min_by_key(|&d| sums[d]).unwrap_or_default();
     if least == 0 || least + 1 == sums.len() {
         return least as f64;
