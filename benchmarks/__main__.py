@@ -11,6 +11,7 @@ NAMES = (
     "cells",
     "stereo",
     "lifting",
+    "field",
     "diameters",
     "kinect",
     "season",
