@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -44,12 +43,6 @@ WANTED_INLIERS = 120
 CORNERS_PER_CELL = (3, 12)
 """Bounds of what is followed for that: on walls nearly all corners agree, on foliage from 20 cm further one in ten."""
 
-REMEMBERED = 3
-"""Keyframes whose points are looked for in a new one: leaves that were hidden for one or two come back."""
-
-REMEMBERED_PX = 3.0
-"""How far from the expected place such a point may be: 3 sigma of its place and the pose's."""
-
 
 @dataclass(frozen=True, eq=False)
 class Placed:
@@ -76,7 +69,7 @@ class Part:
     camera: Camera
     window: Window
     frames: dict[int, Placed] = field(default_factory=dict)
-    _references: deque[Reference] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+    _reference: Reference | None = None
     _last_frame: int = 0
     _last_pose: Array = field(default_factory=lambda: np.eye(4))
     _velocity: Array | None = None
@@ -86,17 +79,16 @@ class Part:
     def begin(cls, camera: Camera, frame: int, picture: Picture, measure: Measure) -> Part | str:
         """Begin with a frame, or say why it is none to begin with."""
         part = cls(camera, Window(camera), _last_frame=frame)
-        part._add_keyframe(frame, picture, np.eye(4), measure, None)
-        offered = len(part._references[-1].numbers)
+        offered = len(part._add_keyframe(frame, picture, np.eye(4), measure, None).numbers)
         if offered < MIN_INLIERS:
             return f"found {offered} points with depth, expected at least {MIN_INLIERS}"
         return part
 
     def place(self, frame: int, picture: Picture, measure: Measure) -> bool | str:
         """Place a frame: whether it became a keyframe, or why it cannot be placed."""
-        reason = ""
+        reason, reference = "", self._newest
         for expected in self._expected(frame, picture):
-            found = self._references[-1].locate(picture, expected)
+            found = reference.locate(picture, expected)
             objection = "found no points to follow" if found is None else self._objection(frame, found)
             if found is not None and not objection:
                 return self._accept(frame, picture, measure, found)
@@ -105,7 +97,7 @@ class Part:
 
     def end(self) -> None:
         """Let go of pictures and points; poses stay."""
-        self._references.clear()
+        self._reference = None
         self.window.end()
 
     def pose(self, frame: int) -> Array:
@@ -118,7 +110,7 @@ class Part:
         yield self._predicted(frame)
         if self._velocity is not None:
             yield self._last_pose
-        found = self._references[-1].find_again(picture, self._last_pose)
+        found = self._newest.find_again(picture, self._last_pose)
         if found is not None:
             yield found
 
@@ -153,7 +145,7 @@ class Part:
         return False
 
     def _is_keyframe(self, found: Found) -> bool:
-        reference = self._references[-1]
+        reference = self._newest
         moved = np.linalg.inv(reference.pose) @ found.pose
         depths = (reference.positions[found.agrees] - found.pose[:3, 3]) @ found.pose[:3, 2]
         return bool(
@@ -162,39 +154,34 @@ class Part:
             or _angle(moved) > KEYFRAME_RAD
         )
 
-    def _add_keyframe(self, frame: int, picture: Picture, pose: Array, measure: Measure, found: Found | None) -> None:
-        """Make a frame the newest reference: points that agree go on, old ones come back, new corners fill the gaps."""
-        numbers, places, depths = self._seen_again(picture, pose, found)
+    def _add_keyframe(
+        self, frame: int, picture: Picture, pose: Array, measure: Measure, found: Found | None
+    ) -> Reference:
+        """Make a frame the reference: points that agree go on, new corners fill the gaps."""
+        numbers, places, expected = np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0)
         if found is not None:
+            numbers, places = self._newest.numbers[found.agrees], found.places[found.agrees]
+            depths = (self._newest.positions[found.agrees] - pose[:3, 3]) @ pose[:3, 2]
+            expected = self.camera[0] * self.camera[4] / depths
             per_cell = int(np.ceil(self._per_cell * WANTED_INLIERS / found.inliers))
             self._per_cell = int(np.clip(per_cell, *CORNERS_PER_CELL))
         new = corners(picture, places, self._per_cell)
-        expected = np.concatenate([self.camera[0] * self.camera[4] / depths, np.full(len(new), np.nan)])
         everything = np.concatenate([places, new])
-        seen = np.column_stack([everything, measure(everything, expected)])
+        seen = np.column_stack([everything, measure(everything, np.concatenate([expected, np.full(len(new), np.nan)]))])
         fresh = seen[len(places) :]
         self.window.add(pose, numbers, seen[: len(places)], fresh[np.isfinite(fresh[:, 2])])
         self.frames[frame] = Placed(len(self.window.poses) - 1, np.eye(4), None, len(numbers))
         numbers, seen = self.window.newest
         known = self.window.known(numbers)
         newest = self.window.poses[-1]
-        self._references.append(Reference(self.camera, picture, measure, newest, numbers, seen[:, :2], *known))
+        self._reference = Reference(self.camera, picture, measure, newest, numbers, seen[:, :2], *known)
+        return self._reference
 
-    def _seen_again(self, picture: Picture, pose: Array, found: Found | None) -> tuple[NDArray[np.int64], Array, Array]:
-        """Numbers, places (N, 2) and depths (N,) of known points that a picture shows."""
-        numbers, places, depths = [np.zeros(0, np.int64)], [np.zeros((0, 2))], [np.zeros(0)]
-        for reference in reversed(self._references):
-            there, agrees = np.zeros((len(reference.numbers), 2)), np.zeros(len(reference.numbers), bool)
-            if found is not None and reference is self._references[-1]:
-                there, agrees = found.places, found.agrees
-            else:
-                wanted = ~np.isin(reference.numbers, np.concatenate(numbers)) & self.window.knows(reference.numbers)
-                agrees = reference.follow(picture, pose, wanted, there)
-                agrees &= np.linalg.norm(there - reference.project(pose)[0], axis=1) < REMEMBERED_PX
-            numbers.append(reference.numbers[agrees])
-            places.append(there[agrees])
-            depths.append((reference.positions[agrees] - pose[:3, 3]) @ pose[:3, 2])
-        return np.concatenate(numbers), np.concatenate(places), np.concatenate(depths)
+    @property
+    def _newest(self) -> Reference:
+        """The newest keyframe, which a part has from its begin to its end."""
+        assert self._reference is not None
+        return self._reference
 
 
 def _angle(transform: Array) -> float:

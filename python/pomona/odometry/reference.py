@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 Measure = Callable[[Array, Array], Array]
 """Gives the disparities (N,) of picture points (N, 2), from what is expected (N,), NaN for unknown; NaN for none."""
 
-ENOUGH_INLIERS = 80
+ENOUGH_INLIERS = 60
 """Points below which those that were not found are looked for again where the found pose shows them."""
 
 NEAREST_M = 0.1

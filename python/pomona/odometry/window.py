@@ -106,10 +106,6 @@ class Window:
         """Numbers (N,) of the points that the newest keyframe sees, and u, v, disparity (N, 3)."""
         return self._kept[-1].points, self._kept[-1].seen
 
-    def knows(self, numbers: Rows) -> NDArray[np.bool_]:
-        """Whether each of some points is still in the window."""
-        return np.asarray(numbers >= self.base, bool)
-
     def known(self, numbers: Rows) -> tuple[Array, Array]:
         """Positions (N, 3) and covariances (N, 3, 3) of points of the window."""
         rows = numbers - self.base
