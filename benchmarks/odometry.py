@@ -57,10 +57,11 @@ def main(arguments: list[str]) -> None:
         for variant in VARIANTS:
             sys.stderr.write(f"odometry: {name}, {variant}\n")
             trajectory, row = measured(drive, variant)
-            true = drive.poses[:: step(variant)][trajectory.frames]
+            of = longest(trajectory)
+            true = drive.poses[:: step(variant)][trajectory.frames[of]]
             rows.append({"recording": name, "variant": variant, **row})
-            found[name, variant] = (true, trajectory.session_from_camera)
-            if name.startswith("rendered_row") and variant in WITH_FRUITS:
+            found[name, variant] = (true, trajectory.session_from_camera[of])
+            if name.startswith("rendered_row") and variant in WITH_FRUITS and of.all():
                 poses = refined(data / name, trajectory, step(variant))
                 errors = compare(poses, true, 1, SEGMENTS_M["rendered_row"])
                 rows.append({**rows[-1], "variant": f"{variant}, with fruits", **vars(errors), **NOT_MEASURED})
@@ -86,6 +87,11 @@ def step(variant: str) -> int:
     return 2 if variant == "every 2nd" else 1
 
 
+def longest(trajectory: OdometryTrajectory) -> NDArray[np.bool_]:
+    """Frames of the longest part."""
+    return trajectory.parts == int(np.bincount(trajectory.parts).argmax())
+
+
 def measured(drive: Drive, variant: str) -> tuple[OdometryTrajectory, dict[str, object]]:
     """Follow the camera; the row of the table is about the longest part."""
     pictures, true = drive.pictures[:: step(variant)], drive.poses[:: step(variant)]
@@ -101,7 +107,7 @@ def measured(drive: Drive, variant: str) -> tuple[OdometryTrajectory, dict[str, 
         cpu_s.append(time.process_time() - began_s)
     wall_s = time.perf_counter() - wall_s
     trajectory = odometry.trajectory()
-    of = trajectory.parts == int(np.bincount(trajectory.parts).argmax())
+    of = longest(trajectory)
     parts = int(trajectory.parts.max()) + 1
     segments_m = SEGMENTS_M[drive.name.partition("/")[0]]
     errors = compare(trajectory.session_from_camera[of], true[trajectory.frames[of]], parts, segments_m)

@@ -43,6 +43,9 @@ FORTH_AND_BACK_PX = 1.0
 MAX_ROW_ERROR_PX = 1.5
 """Rectified pictures show a point in the same row; real rectifications are off by a few tenths of a pixel."""
 
+MIN_DISPARITY_PX = 1.0
+"""Two standard deviations; what is farther has a direction and no place."""
+
 EDGE_PX = 8
 """Windows this near to the edge of the picture are cut."""
 
@@ -149,7 +152,7 @@ def disparities(left: Picture, right: Picture, points: Array, expected: Array, f
     places, kept = follow(left, right, points[known], there, levels=0)
     kept &= np.abs(places[:, 1] - points[known, 1]) < MAX_ROW_ERROR_PX
     found = points[known, 0] - places[:, 0]
-    kept &= found > 0
+    kept &= found > MIN_DISPARITY_PX
     result = np.full(len(points), np.nan)
     result[known[kept]] = found[kept]
     return result

@@ -17,13 +17,13 @@ __all__ = ["Part", "Placed"]
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-MIN_INLIERS = 12
-MIN_SHARE = 0.2
-"""Points that must agree with a pose, and their part of those that were followed. Wrong poses of `rendered_row` gather
-up to 8 of 50 points (16 %), true ones 25 or more (45 to 85 %)."""
+MIN_INLIERS = 18
+MIN_SHARE = 0.33
+"""Points that must agree with a pose, and their part of those that were followed. Wrong poses of `rendered_row`, every
+second frame, gather up to 13 of 43 points (30 %), true ones 25 or more (42 % or more)."""
 
-SURE_INLIERS = 20
-SURE_SHARE = 0.3
+SURE_INLIERS = 24
+SURE_SHARE = 0.38
 """The same for a pose that is not where the motion so far leads to."""
 
 SMOOTH_M = 0.15

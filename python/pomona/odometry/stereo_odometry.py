@@ -113,6 +113,7 @@ class StereoOdometry:
                 return self._motion(frame, keyframe=placed)
             if self._failed is None:
                 return self._lose(placed)
+            self._failed = f"{self._failed}; then {placed}"
         begun = Part.begin(self._camera, frame, left, measure)
         if isinstance(begun, str):
             return self._lose(begun)

@@ -16,7 +16,7 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Point3, Vector2,
 pub struct KnownPoints {
     /// Places in the session.
     pub points: Vec<Point3<f64>>,
-    /// Their covariances, square metres, positive definite.
+    /// Their covariances, square metres. A point whose covariance is not positive definite is not used.
     pub covariances: Vec<Matrix3<f64>>,
     /// u, v in the picture, pixels.
     pub pixels: Vec<Vector2<f64>>,
@@ -183,7 +183,12 @@ fn cost(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, settings: &Loca
 
 fn agreeing(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> Vec<bool> {
     let agrees = |i| squared_error(camera, known, pose, i, settings.sigma_px) <= settings.gate;
-    (0..known.points.len()).map(agrees).collect()
+    (0..known.points.len()).map(|i| agrees(i) && known.covariances[i].cholesky().is_some()).collect()
+}
+
+/// L^-1 of C = L L^T; `None` where C is not positive definite: a point that nothing fixes says nothing.
+fn whitening(covariance: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    covariance.cholesky()?.l().solve_lower_triangular(&Matrix3::identity())
 }
 
 /// Adjusts the pose to the agreeing matches. What is known of a point is a place seen from a pose that stays: the
@@ -199,11 +204,7 @@ fn refined(
     let sharpness = 1.0 / settings.sigma_px;
     let mut observations = Vec::with_capacity(2 * rows.len());
     for (point, &i) in rows.iter().enumerate() {
-        let whitening = known.covariances[i]
-            .try_inverse()
-            .and_then(Matrix3::cholesky)
-            .map(|factor| factor.l().transpose())
-            .ok_or(Error::Covariance { row: i })?;
+        let Some(whitening) = whitening(&known.covariances[i]) else { continue };
         let place = Measured::Place(known.points[i].coords);
         observations.push(Observation { pose: 0, point, measured: place, whitening });
         let seen = Measured::Picture(Vector3::new(known.pixels[i].x, known.pixels[i].y, 0.0));
