@@ -99,6 +99,6 @@ def report(rows: list[dict[str, object]]) -> str:
     summary = markdown((f"{len(rows)} apples, mm", "median", "median size", "largest"), lines)
     return (
         f"# In the field, against a tape\n\n{' '.join((__doc__ or '').split())}\n\n{summary}\n{table}\n"
-        f"The positions published with the pictures have a median error of {PUBLISHED_MM:.0f} mm, with a bias along the\n"
-        "depth axis.\n"
+        f"The positions published with the pictures have a median error of {PUBLISHED_MM:.0f} mm, with a bias along\n"
+        "the depth axis.\n"
     )
