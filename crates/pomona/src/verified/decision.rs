@@ -37,6 +37,9 @@ const ROUNDS: [(u64, usize); 4] = [(1, 32), (1, 32), (4, 48), (u64::MAX, 64)];
 /// Fruits whose seeds make the first round: where the visits overlap well, few are enough in a cloud of any size.
 const FIRST_FRUITS: usize = 256;
 
+/// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
+const RIVAL_SEED: f64 = 0.3;
+
 /// A pose found with fewer seeds than that has this many more of every fruit tried in search of a rival.
 const RIVAL_TURNS: u64 = 3;
 
@@ -256,9 +259,12 @@ impl<'a> Search<'a> {
     /// Grows the best hypotheses that no finding explains yet; returns how many.
     pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
         let mut grown = 0;
+        let threshold = self.threshold();
         for seed in hypotheses {
-            if grown as usize == GROWN {
-                break;
+            let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > threshold);
+            let best = accepted.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
+            if grown as usize == GROWN || seed.log_odds < RIVAL_SEED * best {
+                break; // hypotheses come with most evidence first
             }
             if findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
                 continue;
