@@ -161,16 +161,14 @@ impl Default for Log {
 impl<'a> Search<'a> {
     fn new(prepared: &'a Prepared, query: &'a Landscape, request: &Request, config: &VerifiedConfig) -> Self {
         let map = &prepared.landscape;
-        let sigma = request.noise_m.unwrap_or(SEED_SIGMA * map.spacing).max(0.2 * SEED_SIGMA * map.spacing);
+        // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
+        let common = SEED_SIGMA * map.spacing;
+        let sigma = request.noise_m.unwrap_or(common).max(common);
         Self {
             query,
             map,
             seeds: &prepared.seeds,
-            model: Model {
-                sigma: sigma.min(2.0 * SEED_SIGMA * map.spacing),
-                detection: DETECTION,
-                scale: prepared.scale,
-            },
+            model: Model { sigma: sigma.min(2.0 * common), detection: DETECTION, scale: prepared.scale },
             config: *config,
             up: request.up.map(|pair| pair.map(|up| up.normalize())),
             noise_m: request.noise_m,
