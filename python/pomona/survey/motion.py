@@ -18,6 +18,7 @@ from pomona.recording.pictures import UnreadablePictureError
 from pomona.refinement import refine
 from pomona.survey.prefetch import Kind
 from pomona.survey.sightings import Sightings
+from pomona.survey.thinning import between_keys, followed, stride
 
 __all__ = ["Camera", "Place", "camera_of"]
 
@@ -156,10 +157,14 @@ class _Followed:
         rows = np.flatnonzero(way.parts == part)
         of_part = {int(count): row for row, count in enumerate(way.frames[rows])}
         ours = np.array([of_part[self._count_of[frame]] for frame in frames], np.int64)
-        found = refine(
-            way.session_from_camera[rows], _seen(sightings, fruits, ours), _between(way, rows)
-        ).session_from_camera[ours]
-        return np.asarray(found)
+        poses, motions = way.session_from_camera[rows], _between(way, rows)
+        seen = _seen(sightings, fruits, ours)
+        every = stride(seen.frames, seen.fruits, len(rows))
+        if every == 1:
+            return np.asarray(refine(poses, seen, motions).session_from_camera[ours])
+        keys = np.unique([*range(0, len(rows), every), len(rows) - 1])
+        refined = refine(poses[keys], _seen_by(seen, keys), between_keys(poses, motions, keys))
+        return followed(poses, keys, refined.session_from_camera)[ours]
 
     @cached_property
     def _way(self) -> OdometryTrajectory:
@@ -173,6 +178,17 @@ def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int6
     return refinement.Sightings(
         frames=rows[sightings.rows[kept]],
         fruits=np.unique(fruits[kept], return_inverse=True)[1],
+        centres_in_camera=sightings.centres_in_camera[kept],
+        covariances=sightings.covariances[kept],
+    )
+
+
+def _seen_by(sightings: refinement.Sightings, keys: NDArray[np.int64]) -> refinement.Sightings:
+    """Sightings of some frames, which become the rows 0, 1, ... ."""
+    kept = np.flatnonzero(np.isin(sightings.frames, keys))
+    return refinement.Sightings(
+        frames=np.searchsorted(keys, sightings.frames[kept]),
+        fruits=np.unique(sightings.fruits[kept], return_inverse=True)[1],
         centres_in_camera=sightings.centres_in_camera[kept],
         covariances=sightings.covariances[kept],
     )

@@ -25,6 +25,10 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 const ITERATIONS: usize = 10;
 
+/// Sightings at whose centres the descent begins, at most. A valley that holds a fifth of the sightings is missed with a
+/// probability of 0.8^32, once in a thousand fruits, if they are spread by chance.
+const STARTS: usize = 32;
+
 /// Diameters at which the likelihood is summed: a tenth of a millimetre apart for an apple.
 const CANDIDATES: usize = 400;
 
@@ -59,9 +63,11 @@ pub fn fuse_centres(measured: &[MeasuredCentre]) -> Option<(Point3<f64>, Matrix3
     let middle = Point3::from(Vector3::from_fn(|axis, _| {
         median(&mut measured.iter().map(|one| one.centre[axis]).collect::<Vec<_>>())
     }));
-    // The cost has a valley for each depth that some sightings agree on: begin at each, keep the deepest.
+    // The cost has a valley for each depth that some sightings agree on: begin at each, keep the deepest. Of many
+    // sightings some are enough to have one in every valley that counts.
     let mut best = (f64::INFINITY, middle);
-    for start in measured.iter().map(|one| one.centre).chain([middle]) {
+    let every = measured.len().div_ceil(STARTS);
+    for start in measured.iter().step_by(every).map(|one| one.centre).chain([middle]) {
         let centre = descend(&sightings, start)?;
         let cost = sightings.iter().map(|one| one.cost(&centre)).sum();
         if cost < best.0 {
