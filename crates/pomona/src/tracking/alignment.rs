@@ -4,7 +4,9 @@
 //! camera and J the derivative of its projection, a motion of (a, w) moves what is seen of it by J (a + w x p). The motion
 //! minimises
 //!
-//!     sum_i rho(|r_i - J_i (a + w x p_i)|^2_S_i) + |a|^2 / sigma_t^2 + |w|^2 / sigma_r^2
+//! ```text
+//! sum_i rho(|r_i - J_i (a + w x p_i)|^2_S_i) + |a|^2 / sigma_t^2 + |w|^2 / sigma_r^2
+//! ```
 //!
 //! over the residuals r of assigned fruits, S their covariances, rho Cauchy's. Where poses are right, the minimum says
 //! nothing that noise would not say, and nothing is moved.

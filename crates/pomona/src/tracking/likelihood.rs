@@ -3,7 +3,9 @@
 //! With the predicted middle and depth m of covariance P, z of covariance C what depth says and (u, v) of covariance R the
 //! middle of the box,
 //!
-//!     p(box | fruit) = [ t N3(z - m; P + C) + w(z_Z) N2((u, v) - m; P + R) ] p(size | fruit)
+//! ```text
+//! p(box | fruit) = [ t N3(z - m; P + C) + w(z_Z) N2((u, v) - m; P + R) ] p(size | fruit)
+//! ```
 //!
 //! where t is the probability that a depth is the fruit's and w the density of a wrong one ([`super::trust`]). A box
 //! without depth has N2 alone. C and R grow by what the box lacks of the predicted outline: the hidden part may be on

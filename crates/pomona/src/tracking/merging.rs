@@ -3,7 +3,9 @@
 //! Two records at the distance d, S the sum of their covariances, are weighed as one fruit seen twice against two fruits
 //! of a cluster, whose centres solid bodies keep apart:
 //!
-//!     L = ln N3(d; 0, S) - ln[ rho Phi((|d| - solid (R1 + R2)) / sigma_d) ] - SEEN_TOGETHER n
+//! ```text
+//! L = ln N3(d; 0, S) - ln[ rho Phi((|d| - solid (R1 + R2)) / sigma_d) ] - SEEN_TOGETHER n
+//! ```
 //!
 //! rho is the density of other fruits around a fruit, `sigma_d` the deviation of S along d, and n the number of frames that
 //! saw both: one fruit seldom has two boxes.
