@@ -31,7 +31,7 @@ const VALLEY_PX: usize = 2;
 /// The margin by which a match is sure enough to speak for the sizes of others.
 const SURE_MARGIN: f64 = 0.1;
 
-/// A match by less than this is a guess: on the rendered row a fifth of those above and a half of those below are wrong.
+/// A match by less than this is a guess; set by eye on the rendered row.
 const MIN_MARGIN: f64 = 0.05;
 
 /// The disparity that leads back from the right picture differs by less than this, in pixels.
