@@ -93,9 +93,9 @@ class Seeing:
         Raises
         ------
         UnreadablePictureError
-            When one of its pictures cannot be read, or is black.
+            When one of its pictures cannot be read, or the left one, which depth is measured in, shows nothing.
         """
-        if self._colour and frame.read_left is not None and is_blank(frame.read_left()):
+        if "left" in self._depth.needs and frame.read_left is not None and is_blank(frame.read_left()):
             raise UnreadablePictureError(f"frame {frame.number}: the left picture shows nothing")
         detections = self._detector(frame)
         lifted = self._depth(frame, detections.boxes_px)
