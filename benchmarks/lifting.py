@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.recordings import (
+    DATES,
     TrueBox,
     detector,
     in_camera,
@@ -30,7 +31,6 @@ from pomona.cloud import FruitCloud
 from pomona.depth import lift
 from pomona.recording import open_recording
 
-DATES = ("2024-08-09", "2024-08-28")
 VISIBLE = ((0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.2))
 MIN_VIEWS = (1, 5, 10)
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.lifting import rigid_residuals
 from benchmarks.recordings import DATES, TrueBox, detector, rendered_truth, with_true_boxes
 from benchmarks.results import markdown, share, shared_data, write_rows, write_text
 from pomona import match
@@ -102,7 +102,7 @@ def fruit_row(found: Scanned) -> dict[str, object]:
     judged = np.array([row for row, name in enumerate(ids) if name], int)
     row_of = {name: row for row, name in enumerate(found.truth.ids or ())}
     true = found.truth.select([row_of[ids[row]] for row in judged])
-    distances_mm = 1000 * after_rigid_motion(cloud.positions[judged], true.positions)
+    distances_mm = 1000 * rigid_residuals(cloud.positions[judged], true.positions)
     often = cloud.n_views[judged] >= MIN_VIEWS
     sizes_mm = 1000 * (cloud.diameters_m[judged] - true.diameters_m)[often]
     copies = Counter(ids[row] for row in judged)
@@ -122,13 +122,6 @@ def fruit_row(found: Scanned) -> dict[str, object]:
         "diameter_rmse_mm": float(np.sqrt((sizes_mm**2).mean())),
         "cpu_ms_per_frame": 1000 * found.seconds / found.frames,
     }
-
-
-def after_rigid_motion(found: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances after the least-squares rigid motion of `found` onto `true` (Kabsch)."""
-    from benchmarks.lifting import rigid_residuals
-
-    return rigid_residuals(found, true)
 
 
 def match_row(query: Scanned, map: Scanned, method: str) -> dict[str, object]:

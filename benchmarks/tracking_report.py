@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from benchmarks.recordings import DATES
 from benchmarks.results import markdown
 from benchmarks.tracking_runs import Disturbance
 
 Rows = list[dict[str, object]]
 
-DATES = ("2024-08-09", "2024-08-28")
 DEPTHS = ("exact", "stereo")
 MISSING = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 KINDS = {"boxes missing": Disturbance(), "and 10 % false, 1 px": Disturbance(false=0.1, jitter_px=1.0)}

@@ -4,7 +4,6 @@ import csv
 import json
 import os
 import signal
-import sys
 import threading
 from collections import Counter
 
@@ -14,7 +13,6 @@ import pytest
 from benchmarks.lifting import rigid_residuals, rows_named
 from benchmarks.recordings import detector, rendered_truth, true_boxes
 
-from pomona.cli import main
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.orchard import load_session
@@ -30,18 +28,6 @@ STEPS_M = (0.0, 0.05, 0.1, 0.15)
 @pytest.fixture
 def row(tmp_path):
     return make_recording(tmp_path / "2024-08-09", STEPS_M)
-
-
-@pytest.fixture
-def pomona(monkeypatch, capsys):
-    def run_main(*arguments):
-        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return ended.value.code, printed.out, printed.err
-
-    return run_main
 
 
 def with_left(folder):

@@ -4,6 +4,6 @@ from pomona.depth import FruitDepth
 from pomona.stereo.dense import DenseStereo
 from pomona.stereo.fruits import StereoDepth
 from pomona.stereo.onnx import OnnxStereo
-from pomona.stereo.opening import PairDepth, open_stereo
+from pomona.stereo.opening import open_stereo
 
-__all__ = ["DenseStereo", "FruitDepth", "OnnxStereo", "PairDepth", "StereoDepth", "open_stereo"]
+__all__ = ["DenseStereo", "FruitDepth", "OnnxStereo", "StereoDepth", "open_stereo"]

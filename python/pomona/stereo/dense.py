@@ -8,12 +8,9 @@ from numpy.typing import NDArray
 
 from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
-from pomona.stereo.pair import Picture, depth_of_disparity, focal_baseline_px_m, in_colour
+from pomona.stereo.pair import NEAREST_M, Picture, depth_of_disparity, focal_baseline_px_m, in_colour
 
 __all__ = ["DenseStereo"]
-
-NEAREST_M = 0.3
-"""Nothing nearer is looked for, nor beyond half the width of the picture."""
 
 WINDOW_PX = 3
 """Side of the window that is compared; the smoothness terms do the rest, and a larger one runs over edges."""

@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 from pomona import _core
 from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
-from pomona.stereo.pair import Picture, focal_baseline_px_m, in_colour
+from pomona.stereo.pair import NEAREST_M, Picture, focal_baseline_px_m, in_colour
 
 __all__ = ["StereoDepth"]
-
-NEAREST_M = 0.3
-"""Nothing nearer than this is looked for: nearer fruits fill the picture."""
 
 
 class StereoDepth:

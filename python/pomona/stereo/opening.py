@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pomona.depth import FruitDepth
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
-from pomona.stereo.pair import Picture
+from pomona.stereo.pair import Stereo
 
-__all__ = ["PairDepth", "open_stereo"]
-
-
-class PairDepth(Protocol):
-    """Measures the depth of fruits in a stereo pair; `StereoDepth` says what the arguments are."""
-
-    def __call__(self, left: Picture, right: Picture, boxes_px: NDArray[np.float64]) -> FruitDepth:
-        """Measure depth at boxes."""
+__all__ = ["open_stereo"]
 
 
-def open_stereo(how: str, calibration: Calibration) -> PairDepth:
+def open_stereo(how: str, calibration: Calibration) -> Stereo:
     """Open a way to measure depth.
 
     Parameters

@@ -12,9 +12,12 @@ from pomona.depth import FruitDepth
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 
-__all__ = ["Picture", "Stereo", "depth_of_disparity", "focal_baseline_px_m", "in_colour"]
+__all__ = ["NEAREST_M", "Picture", "Stereo", "depth_of_disparity", "focal_baseline_px_m", "in_colour"]
 
 Picture = NDArray[np.uint8]
+
+NEAREST_M = 0.3
+"""Nothing nearer is looked for: nearer things fill the picture with one leaf or fruit."""
 
 FARTHEST_M = 20.0
 """Nothing farther is taken: at 20 m a fruit is smaller than detectors see, and a pixel of disparity is worth metres."""
