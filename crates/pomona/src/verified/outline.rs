@@ -8,7 +8,7 @@ use super::hypothesis::{Hypothesis, gaussian};
 use super::landscape::Landscape;
 use super::pose::{Moments, Pose};
 use crate::geometry::Scale;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Standard deviations of the annealing, in spacings of the map: from the width of a branch down by a factor 0.75.
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
@@ -41,8 +41,30 @@ pub(crate) fn hypothesis(
     if first < 0.5 * threshold(query) {
         return None;
     }
-    let (sigma, log_odds) = sharpest(query, map, &pose);
-    (log_odds > threshold(query)).then(|| Hypothesis { pose, log_odds, place: middle(query), sigma })
+    let (sigma, sharp) = sharpest(query, map, &pose);
+    if sharp < threshold(query) {
+        return None;
+    }
+    let shared = beside(query, &pose, &axes_map, ASIDE * map.spacing)
+        .map(|aside| fine_structure(query, map, &aside, sigma))
+        .fold(0.0, f64::max);
+    let log_odds = sharp - shared;
+    (log_odds > OUTSTANDING * threshold(query)).then(|| Hypothesis { pose, log_odds, place: middle(query), sigma })
+}
+
+/// The pose moved along each of the axes, and turned about each, either way, so that fruits move by `distance`.
+///
+/// In a hedge, a pergola or the skin of a round crown fruits hang denser than the width of a branch tells, and layer laid
+/// on layer gains anywhere. But it gains nearly as much a little aside, along the layer; fruits on fruits do not.
+fn beside(query: &Landscape, pose: &Pose, axes: &Matrix3<f64>, distance: f64) -> impl Iterator<Item = Pose> {
+    let directed = (0..3).flat_map(|i| [1.0, -1.0].map(|sign| axes.column(i) * sign));
+    directed.flat_map(move |axis| {
+        let arm2: f64 = query.points.iter().map(|p| (pose.rotation * p).cross(&axis).norm_squared()).sum();
+        let arm = pose.scale * (arm2 / query.len() as f64).sqrt();
+        let turn = Rotation3::new(axis * (distance / arm)).into_inner();
+        let shifted = Pose { translation: pose.translation + axis * distance, ..*pose };
+        [shifted, Pose { rotation: turn * pose.rotation, ..*pose }]
+    })
 }
 
 /// Fewer fruits than this have no outline.
@@ -54,6 +76,12 @@ const MIN_FRUITS: usize = 100;
 pub(crate) fn threshold(query: &Landscape) -> f64 {
     6.5 * (query.len() as f64).sqrt()
 }
+
+/// Share of the threshold by which the evidence exceeds the best beside it.
+///
+/// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over disjoint
+/// rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
+const OUTSTANDING: f64 = 0.85;
 
 /// Principal axes as a proper rotation, and the root-mean-square extent.
 fn axes(cloud: &Landscape) -> Option<(Matrix3<f64>, f64)> {
@@ -126,6 +154,9 @@ fn fine_structure(query: &Landscape, map: &Landscape, pose: &Pose, sigma: f64) -
         })
         .sum()
 }
+
+/// How far aside, in spacings, fruits no longer lie on themselves at any noise that is tried.
+const ASIDE: f64 = 0.9;
 
 /// Noise in spacings that is tried: 1.5 to 11 cm in an orchard.
 const SIGMAS: [f64; 8] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33];
