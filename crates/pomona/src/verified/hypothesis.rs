@@ -87,7 +87,7 @@ pub(crate) fn first_look(query: &Landscape, map: &Landscape, q: &Quad, pose: &Po
         let p = query.points[row as usize];
         let variance = sigma2 * (1.25 + (p - centroid).norm_squared() / inertia);
         let place = pose.apply(&p);
-        match map.nearest(&place, GATE * variance.sqrt(), |_| true) {
+        match map.nearest(&place, GATE * variance.sqrt()) {
             Some((partner, d2)) => model.gain(d2, variance, map.density[partner as usize]),
             None => model.miss(map.support(&place)),
         }
@@ -216,7 +216,7 @@ fn pair_up(
     for (at, &row) in scratch.region.iter().enumerate() {
         let p = query.points[row as usize];
         let variance = variance_at(&p);
-        let found = map.nearest(&pose.apply(&p), GATE * variance.sqrt(), |_| true);
+        let found = map.nearest(&pose.apply(&p), GATE * variance.sqrt());
         let Some((partner, d2)) = found else {
             scratch.partners.push((u32::MAX, 0.0, variance));
             continue;

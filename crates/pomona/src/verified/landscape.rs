@@ -4,6 +4,7 @@ use super::cells::Cut;
 use super::chance::{Companions, crowding, kinship, local_density};
 use super::grid::{Grid, Support};
 use super::space::Tree;
+use super::vicinity::Vicinity;
 use crate::cloud::FruitCloud;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -11,6 +12,9 @@ use std::sync::OnceLock;
 
 /// Neighbours kept per fruit: enough for the seeds (the nearest ten) and for the first look at a hypothesis.
 pub(crate) const NEIGHBOURS: usize = 24;
+
+/// Edge of a grid's cell in spacings: the gate of a prediction that is as uncertain as predictions are.
+const CELL: f64 = 0.6;
 
 /// Points of one cloud, centred on their mean, with the neighbourhood questions that verification asks.
 #[derive(Debug, Clone)]
@@ -40,6 +44,7 @@ pub(crate) struct Landscape {
     cut: OnceLock<Cut>,
     companions: Companions,
     grid: Grid,
+    vicinity: Vicinity,
     support: Support,
 }
 
@@ -70,7 +75,8 @@ impl Landscape {
         let density = local_density(&points, &neighbours, spacing, floor);
         let crowding = crowding(&points, &neighbours, spacing);
         let companions = Companions::new(&points, &neighbours, spacing);
-        let grid = Grid::new(&points, 0.6 * spacing);
+        let grid = Grid::new(&points, CELL * spacing);
+        let vicinity = Vicinity::new(&points, CELL * spacing);
         let support = Support::new(&points, spacing);
         let covariances = cloud.covariances.as_ref().map(|all| rows.iter().map(|&row| all[row as usize]).collect());
         Self {
@@ -88,6 +94,7 @@ impl Landscape {
             cut: OnceLock::new(),
             companions,
             grid,
+            vicinity,
             support,
         }
     }
@@ -114,18 +121,23 @@ impl Landscape {
         self.cut.get_or_init(|| Cut::new(&self.points, super::growth::CELL * self.spacing))
     }
 
-    /// The nearest point within `gate` that `free` admits, with its squared distance.
+    /// The nearest point within `gate`, with its squared distance.
     #[inline]
-    pub(crate) fn nearest(&self, place: &Vector3<f64>, gate: f64, free: impl Fn(u32) -> bool) -> Option<(u32, f64)> {
+    pub(crate) fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)> {
         let mut best: Option<(u32, f64)> = None;
         let mut limit = gate * gate;
-        self.near(place, gate, |row| {
+        let mut offer = |row: u32| {
             let d2 = (self.points[row as usize] - place).norm_squared();
-            if d2 <= limit && free(row) {
+            if d2 <= limit {
                 limit = d2;
                 best = Some((row, d2));
             }
-        });
+        };
+        if gate <= self.vicinity.reach {
+            self.vicinity.of(place).iter().copied().for_each(offer);
+        } else {
+            self.near(place, gate, &mut offer);
+        }
         best
     }
 

@@ -32,6 +32,7 @@ mod settlement;
 mod sharing;
 mod size;
 mod space;
+mod vicinity;
 
 pub use acceptance::VerifiedConfig;
 pub(crate) use decision::{MAX_FRUITS, Prepared, pairs_under, search};

@@ -145,7 +145,7 @@ impl Growth<'_> {
 
     /// What a prediction meets in the map.
     fn meet(&self, Prediction { place, variance }: &Prediction) -> Met {
-        let found = self.map.nearest(place, GATE * variance.sqrt(), |_| true);
+        let found = self.map.nearest(place, GATE * variance.sqrt());
         let partner = found.map(|(row, d2)| (row, self.model.gain(d2, *variance, self.map.density[row as usize])));
         Met { partner, alone: self.model.miss(self.map.support(place)) }
     }
