@@ -78,7 +78,18 @@ pub(super) fn hash(cell: [i64; 3], mask: u64) -> usize {
 #[derive(Debug, Clone)]
 pub(super) struct Support {
     inverse_cell: f64,
-    cells: std::collections::HashMap<[i64; 3], f32, Mixing>,
+    mask: u64,
+    /// A cell and its support at the place of its hash or the next free one behind; at least half are free.
+    slots: Vec<([i32; 3], f32)>,
+}
+
+/// No cell's support is zero.
+const FREE: ([i32; 3], f32) = ([0; 3], 0.0);
+
+/// A cell in short: no recording is 2^31 spacings long.
+#[inline]
+fn key(cell: [i64; 3]) -> [i32; 3] {
+    cell.map(|x| x as i32)
 }
 
 type Mixing = std::hash::BuildHasherDefault<CellHasher>;
@@ -125,14 +136,28 @@ impl Support {
                 }
             }
         }
-        for value in cells.values_mut() {
-            *value = 1.0 - (-*value / 2.0).exp();
+        let mask = (2 * cells.len()).next_power_of_two() as u64 - 1;
+        let mut slots = vec![FREE; mask as usize + 1];
+        for (cell, count) in cells {
+            let mut slot = hash(cell, mask);
+            while slots[slot] != FREE {
+                slot = (slot + 1) & mask as usize;
+            }
+            slots[slot] = (key(cell), 1.0 - (-count / 2.0).exp());
         }
-        Self { inverse_cell, cells }
+        Self { inverse_cell, mask, slots }
     }
 
     #[inline]
     pub(super) fn at(&self, place: &Vector3<f64>) -> f64 {
-        self.cells.get(&cell_of(place, self.inverse_cell)).map_or(0.0, |&value| f64::from(value))
+        let cell = cell_of(place, self.inverse_cell);
+        let mut slot = hash(cell, self.mask);
+        loop {
+            let (found, support) = self.slots[slot];
+            if found == key(cell) || support == 0.0 {
+                return f64::from(support);
+            }
+            slot = (slot + 1) & self.mask as usize;
+        }
     }
 }

@@ -1,10 +1,9 @@
-//! Poses proposed by seeds: a first look at the fruits around the seed, then local refinement.
+//! Poses with the evidence around them, refined from what seeds propose.
 
 use super::landscape::Landscape;
 use super::pose::{Moments, Pose};
-use super::seeds::{Quad, frame};
 use crate::geometry::Scale;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// What is assumed of one pair of visits while poses are compared.
 #[derive(Debug, Clone, Copy)]
@@ -23,13 +22,25 @@ impl Model {
     /// exceeds the fruits that chance puts there (Lang et al. 2010, eq. for the foreground-background odds).
     #[inline]
     pub(crate) fn gain(&self, d2: f64, variance: f64, density: f64) -> f64 {
-        (1.0 - self.detection + self.detection * gaussian(d2, variance) / density).ln()
+        self.met(d2, variance, density).ln()
+    }
+
+    /// The likelihood ratio of which [`Model::gain`] is the logarithm.
+    #[inline]
+    pub(crate) fn met(&self, d2: f64, variance: f64, density: f64) -> f64 {
+        1.0 - self.detection + self.detection * gaussian(d2, variance) / density
     }
 
     /// Log-odds of a fruit without a partner at a place of `support`; of a fruit of either visit.
     #[inline]
     pub(crate) fn miss(&self, support: f64) -> f64 {
-        (1.0 - self.detection * support).ln()
+        self.missed(support).ln()
+    }
+
+    /// The likelihood ratio of which [`Model::miss`] is the logarithm.
+    #[inline]
+    pub(crate) fn missed(&self, support: f64) -> f64 {
+        1.0 - self.detection * support
     }
 }
 
@@ -54,58 +65,6 @@ pub(crate) struct Hypothesis {
     /// Relative noise per axis that the residuals show, metres of the map.
     pub(crate) sigma: f64,
 }
-
-/// Least-squares pose of a seed and the sum of its squared residuals. `None` where a seed is degenerate.
-#[inline]
-pub(crate) fn fit_seed(query: &Landscape, map: &Landscape, q: &Quad, m: &Quad, scale: Scale) -> Option<(Pose, f64)> {
-    let frame_query = Matrix3::from_columns(&frame(&query.points, q)?);
-    let frame_map = Matrix3::from_columns(&frame(&map.points, m)?);
-    let mut moments = Moments::default();
-    for i in 0..q.len() {
-        moments.add(&query.points[q[i] as usize], &map.points[m[i] as usize], 1.0);
-    }
-    let rotation = frame_map * frame_query.transpose();
-    let start = Pose { rotation, translation: Vector3::zeros(), scale: 1.0 };
-    let pose = moments.step(&start, scale, 0.0)?;
-    let residual = (0..q.len())
-        .map(|i| (map.points[m[i] as usize] - pose.apply(&query.points[q[i] as usize])).norm_squared())
-        .sum();
-    Some((pose, residual))
-}
-
-/// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
-///
-/// The pose of four noisy fruits is uncertain: at distance r from their centroid the variance is
-/// s^2 (1 + 1/4 + r^2 / S), S being the seed's moment of inertia (cf. s^2 (1 + r^2/Q^2) of Lang et al.).
-#[inline]
-pub(crate) fn first_look(query: &Landscape, map: &Landscape, q: &Quad, pose: &Pose, model: &Model) -> f64 {
-    let centroid = q.iter().map(|&row| query.points[row as usize]).sum::<Vector3<f64>>() / q.len() as f64;
-    let inertia: f64 =
-        q.iter().map(|&row| (query.points[row as usize] - centroid).norm_squared()).sum::<f64>() * 2.0 / 3.0;
-    let sigma2 = model.sigma * model.sigma;
-    let weigh = |row: u32| {
-        let p = query.points[row as usize];
-        let variance = sigma2 * (1.25 + (p - centroid).norm_squared() / inertia);
-        let place = pose.apply(&p);
-        match map.nearest(&place, GATE * variance.sqrt()) {
-            Some((partner, d2)) => model.gain(d2, variance, map.density[partner as usize]),
-            None => model.miss(map.support(&place)),
-        }
-    };
-    let anchor = q[0];
-    let mut around = 0.0;
-    for &row in query.neighbours(anchor as usize).iter().filter(|&row| !q.contains(row)) {
-        around += weigh(row);
-        // A sequential test: a true pose falls this low only when its first four fruits or so are all hidden.
-        if around < HOPELESS {
-            return f64::NEG_INFINITY;
-        }
-    }
-    around + q.iter().map(|&row| weigh(row)).sum::<f64>()
-}
-
-/// Evidence of the fruits beside the seed, in nats, at which a first look ends.
-const HOPELESS: f64 = -2.5;
 
 /// Buffers of [`refine`], reused between hypotheses.
 #[derive(Debug, Default)]

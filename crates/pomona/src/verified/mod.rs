@@ -3,7 +3,7 @@
 //! 1. Seeds of four fruits, their metric codes (invariant ones where the scale is free), near-tie labelings included,
 //!    find candidates in the map ([`seeds`], [`search`]).
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
-//!    local density, with an early exit; the best are refined ([`hypothesis`]).
+//!    local density, with an early exit ([`proposal`]); the best are refined ([`hypothesis`]).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement ([`growth`]).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach ([`acceptance`]).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell ([`outline`]).
@@ -15,6 +15,7 @@ mod answer;
 mod association;
 mod cells;
 mod chance;
+mod codes;
 mod decision;
 mod doubts;
 mod grid;
@@ -25,6 +26,7 @@ mod outline;
 mod overlap;
 mod patches;
 mod pose;
+mod proposal;
 mod scatter;
 mod search;
 mod seeds;

@@ -1,8 +1,9 @@
 //! From seeds to hypotheses: rounds of query seeds, their candidates in the map, the best of them refined.
 
-use super::hypothesis::{Hypothesis, Model, Scratch, first_look, fit_seed, refine};
+use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::pose::Pose;
+use super::proposal::Proposer;
 use super::seeds::{Code, Quad, SeedIndex, canonical, near_ties, shuffled, without_scale};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
@@ -87,7 +88,7 @@ fn candidates_of(
     if length < 6.0 * sigma {
         return effort;
     }
-    let mut hits: Vec<(u32, f32)> = Vec::new();
+    let (mut runs, mut hits) = (Vec::new(), Vec::new());
     near_ties(&query.points, seed.0, 2.8 * sigma, &mut |quad, code| {
         effort.codes += 1;
         let (code, radius) = match model.scale {
@@ -95,22 +96,22 @@ fn candidates_of(
             Scale::Free => (without_scale(&code), RADIUS * sigma / length),
         };
         hits.clear();
-        index.tree.within(&code, radius as f32, |hit, d2| hits.push((hit, d2)));
+        index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
         effort.candidates += hits.len() as u64;
         if hits.len() > COMMON {
             return; // a shape that every cluster shows says nothing about the place
         }
-        for &(hit, _) in &hits {
+        let Some(proposer) = Proposer::new(query, map, model, quad) else { return };
+        for &hit in &hits {
             let target = &index.quads[hit as usize];
-            let Some((pose, residual)) = fit_seed(query, map, &quad, target, model.scale) else { continue };
+            let Some((pose, residual)) = proposer.fit(target) else { continue };
             if residual > MAX_RESIDUAL * model.sigma * model.sigma || !admits(&pose) {
                 continue;
             }
             effort.fitted += 1;
-            let log_odds = first_look(query, map, &quad, &pose, model);
+            let log_odds = proposer.first_look(&pose);
             if log_odds > 0.0 {
-                let place = quad.iter().map(|&row| query.points[row as usize]).sum::<Vector3<f64>>() / 4.0;
-                found.push(Candidate { pose, log_odds, place, key: (quad, *target) });
+                found.push(Candidate { pose, log_odds, place: proposer.centroid, key: (quad, *target) });
             }
         }
     });

@@ -4,8 +4,8 @@
 //! it. Four fruits survive occlusion far more often than five (0.55^4 against 0.55^5 at 45 %), and verification is
 //! cheap enough to sort out the additional false candidates (METHOD: what beats it, 1 and 2).
 
+use super::codes::CodeGrid;
 use super::landscape::{Landscape, SHARE_OF_ROWS};
-use super::space::Tree;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -180,11 +180,15 @@ fn sets_of(landscape: &Landscape, row: u32) -> Vec<[u32; STARS]> {
     sets
 }
 
+/// Seeds that are worth a thread of their own.
+const SHARE_OF_SEEDS: usize = 4096;
+
 /// The seeds of the map, searchable by code.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedIndex {
+    /// In the order of the grid.
     pub(crate) quads: Vec<Quad>,
-    pub(crate) tree: Tree<6>,
+    pub(crate) codes: CodeGrid,
 }
 
 impl SeedIndex {
@@ -194,7 +198,8 @@ impl SeedIndex {
             Scale::Metric => codes,
             Scale::Free => codes.iter().map(without_scale).collect(),
         };
-        Self { quads, tree: Tree::new(&codes) }
+        let (codes, order) = CodeGrid::new(&codes);
+        Self { quads: order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| quads[row as usize]).collect(), codes }
     }
 }
 

@@ -1,0 +1,103 @@
+//! A seed of the query laid on seeds of the map: the least-squares pose, and a first look at the fruits around.
+
+use super::hypothesis::{GATE, Model};
+use super::landscape::Landscape;
+use super::pose::Pose;
+use super::seeds::{Quad, STARS, frame};
+use crate::geometry::Scale;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// A seed of the query with all that its candidates have in common.
+pub(crate) struct Proposer<'a> {
+    query: &'a Landscape,
+    map: &'a Landscape,
+    model: &'a Model,
+    quad: Quad,
+    pub(crate) centroid: Vector3<f64>,
+    /// Axes of the seed as rows: from the query to the frame of the seed.
+    to_frame: Matrix3<f64>,
+    /// The fruits about their centroid, in the frame of the seed.
+    fruits: [Vector3<f64>; STARS],
+    /// Sum of the squared distances from the centroid.
+    square: f64,
+    /// From the torque on the fruits to the turn that relieves it.
+    inverse_inertia: Matrix3<f64>,
+}
+
+/// The fruits of a seed about their centroid, in the frame of the seed, whose axes are the rows.
+fn in_frame(points: &[Vector3<f64>], quad: &Quad, to_frame: &Matrix3<f64>) -> (Vector3<f64>, [Vector3<f64>; STARS]) {
+    let fruits = quad.map(|row| points[row as usize]);
+    let centroid = fruits.iter().sum::<Vector3<f64>>() / STARS as f64;
+    (centroid, fruits.map(|p| to_frame * (p - centroid)))
+}
+
+impl<'a> Proposer<'a> {
+    /// `None` where the seed is degenerate.
+    pub(crate) fn new(query: &'a Landscape, map: &'a Landscape, model: &'a Model, quad: Quad) -> Option<Self> {
+        let to_frame = Matrix3::from_columns(&frame(&query.points, &quad)?).transpose();
+        let (centroid, fruits) = in_frame(&query.points, &quad, &to_frame);
+        let moments = fruits.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose());
+        let square = moments.trace();
+        let inverse_inertia = (Matrix3::identity() * square - moments).try_inverse()?;
+        Some(Self { query, map, model, quad, centroid, to_frame, fruits, square, inverse_inertia })
+    }
+
+    /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
+    ///
+    /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does the
+    /// rest (see [`Pose`]'s step): the inertia is the same for all candidates.
+    #[inline]
+    pub(crate) fn fit(&self, target: &Quad) -> Option<(Pose, f64)> {
+        let axes = Matrix3::from_columns(&frame(&self.map.points, target)?);
+        let (centroid, fruits) = in_frame(&self.map.points, target, &axes.transpose());
+        let both = || self.fruits.iter().zip(&fruits);
+        let torque = both().fold(Vector3::zeros(), |sum, (here, there)| sum + here.cross(there));
+        let turn = Rotation3::new(self.inverse_inertia * torque).into_inner();
+        let turned = self.fruits.map(|p| turn * p);
+        let scale = match self.model.scale {
+            Scale::Metric => 1.0,
+            Scale::Free => turned.iter().zip(&fruits).map(|(here, there)| here.dot(there)).sum::<f64>() / self.square,
+        };
+        if scale.is_nan() || scale <= 0.0 {
+            return None;
+        }
+        let residual = turned.iter().zip(&fruits).map(|(here, there)| (there - here * scale).norm_squared()).sum();
+        let rotation = axes * turn * self.to_frame;
+        let translation = centroid - rotation * self.centroid * scale;
+        Some((Pose { rotation, translation, scale }, residual))
+    }
+
+    /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
+    ///
+    /// The pose of four noisy fruits is uncertain: at distance r from their centroid the variance is
+    /// s^2 (1 + 1/4 + r^2 / S), S being the seed's moment of inertia (cf. s^2 (1 + r^2/Q^2) of Lang et al.).
+    #[inline]
+    pub(crate) fn first_look(&self, pose: &Pose) -> f64 {
+        // Likelihood ratios are multiplied: one logarithm in the end costs less than one a fruit.
+        let mut around = 1.0;
+        for &row in self.query.neighbours(self.quad[0] as usize).iter().filter(|&row| !self.quad.contains(row)) {
+            around *= self.ratio(row, pose);
+            // A sequential test: a true pose falls this low only when its first four fruits or so are all hidden.
+            if around < HOPELESS {
+                return f64::NEG_INFINITY;
+            }
+        }
+        self.quad.iter().fold(around, |product, &row| product * self.ratio(row, pose)).ln()
+    }
+
+    /// What a fruit says for the pose, as a likelihood ratio.
+    #[inline]
+    fn ratio(&self, row: u32, pose: &Pose) -> f64 {
+        let p = self.query.points[row as usize];
+        let looseness = 1.25 + (p - self.centroid).norm_squared() / (self.square * 2.0 / 3.0);
+        let variance = self.model.sigma * self.model.sigma * looseness;
+        let place = pose.apply(&p);
+        match self.map.nearest(&place, GATE * variance.sqrt()) {
+            Some((partner, d2)) => self.model.met(d2, variance, self.map.density[partner as usize]),
+            None => self.model.missed(self.map.support(&place)),
+        }
+    }
+}
+
+/// Likelihood ratio of the fruits beside the seed at which a first look ends: 2.5 nats against the pose.
+const HOPELESS: f64 = 0.082_085;
