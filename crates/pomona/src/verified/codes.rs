@@ -57,14 +57,15 @@ impl Axis {
 const ROUNDING: f32 = 1e-3;
 
 impl CodeGrid {
-    /// The grid, and the order of the codes in it.
-    pub(crate) fn new(codes: &[Code]) -> (Self, Vec<u32>) {
-        let (axes, edge) = cut(codes);
+    /// The grid of the codes that the rows from 0 to `count` have, and the rows in its order.
+    pub(crate) fn new(count: usize, code: impl Fn(usize) -> Code + Sync) -> (Self, Vec<u32>) {
+        let (axes, edge) = cut(count, &code);
         let inverse_edge = 1.0 / edge;
-        let cell = |code: &Code| {
+        let cell = |row: usize| {
+            let code = code(row);
             axes.iter().fold(0, |cell, axis| cell * axis.cells + axis.cell(code[axis.number], inverse_edge))
         };
-        let cells: Vec<u32> = codes.par_iter().with_min_len(SHARE_OF_CODES).map(cell).collect();
+        let cells: Vec<u32> = (0..count).into_par_iter().with_min_len(SHARE_OF_CODES).map(cell).collect();
         let mut starts = vec![0u32; axes.iter().map(|axis| axis.cells as usize).product::<usize>() + 1];
         for &cell in &cells {
             starts[cell as usize] += 1;
@@ -74,7 +75,7 @@ impl CodeGrid {
             end += *start;
             *start = end;
         }
-        let mut order = vec![0u32; codes.len()];
+        let mut order = vec![0u32; count];
         // From the last to the first, so that a cell keeps the order of its codes.
         for (row, &cell) in cells.iter().enumerate().rev() {
             let start = &mut starts[cell as usize];
@@ -82,9 +83,11 @@ impl CodeGrid {
             order[*start as usize] = row as u32;
         }
         let block = |rows: &[u32]| {
-            let of =
-                |lane: usize, number: usize| rows.get(lane).map_or(f32::INFINITY, |&row| codes[row as usize][number]);
-            std::array::from_fn(|number| std::array::from_fn(|lane| of(lane, number)))
+            let mut block = [[f32::INFINITY; LANES]; NUMBERS];
+            for (lane, &row) in rows.iter().enumerate() {
+                block.iter_mut().zip(code(row as usize)).for_each(|(numbers, number)| numbers[lane] = number);
+            }
+            block
         };
         let blocks = order.par_chunks(LANES).with_min_len(SHARE_OF_CODES / LANES).map(block).collect();
         (Self { axes, edge, starts, blocks }, order)
@@ -168,10 +171,10 @@ const SAMPLE: usize = 1024;
 const BEYOND: f64 = 0.02;
 
 /// Cuts the axes into cubes.
-fn cut(codes: &[Code]) -> ([Axis; NUMBERS], f32) {
-    let stride = codes.len().div_ceil(SAMPLE).max(1);
+fn cut(count: usize, code: &impl Fn(usize) -> Code) -> ([Axis; NUMBERS], f32) {
+    let sample: Vec<Code> = (0..count).step_by(count.div_ceil(SAMPLE).max(1)).map(code).collect();
     let extents: [(f32, f32); NUMBERS] = std::array::from_fn(|number| {
-        let mut values: Vec<f32> = codes.iter().step_by(stride).map(|code| code[number]).collect();
+        let mut values: Vec<f32> = sample.iter().map(|code| code[number]).collect();
         values.sort_unstable_by(f32::total_cmp);
         let beyond = (values.len() as f64 * BEYOND) as usize;
         let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
@@ -183,7 +186,7 @@ fn cut(codes: &[Code]) -> ([Axis; NUMBERS], f32) {
     loop {
         let finer = 0.9 * edge;
         let all: f64 = extents.iter().map(|&extent| f64::from(cells(extent, finer))).product();
-        if all > CELLS * codes.len() as f64 || finer < FINEST * widest {
+        if all > CELLS * count as f64 || finer < FINEST * widest {
             break;
         }
         edge = finer;
@@ -224,7 +227,7 @@ mod tests {
             let level = |code: &Code| -> Code { std::array::from_fn(|i| if flat[i] { 0.0 } else { code[i] }) };
             let codes: Vec<Code> = codes.iter().map(level).collect();
             let code = level(&code);
-            let (grid, order) = CodeGrid::new(&codes);
+            let (grid, order) = CodeGrid::new(codes.len(), |row| codes[row]);
             let mut found = Vec::new();
             grid.within(&code, radius, &mut Vec::new(), |place| found.push(order[place as usize]));
             found.sort_unstable();

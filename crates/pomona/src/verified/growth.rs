@@ -8,8 +8,10 @@ use super::cells::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
 use super::overlap::Prediction;
+use super::patches::SHARE_OF_CELLS;
 use super::pose::{Moments, Pose};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Edge of a cell in spacings of the query: some ten fruits.
 pub(super) const CELL: f64 = 2.5;
@@ -147,7 +149,8 @@ impl<'a> Growth<'a> {
 
     /// Reaches the neighbours of cells whose surroundings speak for the pose; returns whether any is new.
     fn spread(&mut self) -> bool {
-        let sources: Vec<usize> = (0..self.cells.len()).filter(|&i| self.convincing(i)).collect();
+        let all = (0..self.cells.len()).into_par_iter().with_min_len(SHARE_OF_CELLS);
+        let sources: Vec<usize> = all.filter(|&i| self.convincing(i)).collect();
         let mut new = Vec::new();
         for i in sources {
             for &(other, closeness) in self.cells[i].around.iter() {

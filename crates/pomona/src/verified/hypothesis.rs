@@ -16,28 +16,16 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    /// Log-odds that a fruit at squared distance `d2` from a map fruit is that fruit, against chance at `density`.
+    /// Likelihood ratio of a fruit at squared distance `d2` from a map fruit being that fruit, against chance at `density`.
     ///
-    /// ln(1 - p + p N(d; 0, `variance`) / density): missing costs ln(1 - p), agreement gains what the Gaussian
-    /// exceeds the fruits that chance puts there (Lang et al. 2010, eq. for the foreground-background odds).
-    #[inline]
-    pub(crate) fn gain(&self, d2: f64, variance: f64, density: f64) -> f64 {
-        self.met(d2, variance, density).ln()
-    }
-
-    /// The likelihood ratio of which [`Model::gain`] is the logarithm.
+    /// 1 - p + p N(d; 0, `variance`) / density: missing costs 1 - p, agreement gains what the Gaussian exceeds the
+    /// fruits that chance puts there (Lang et al. 2010, eq. for the foreground-background odds).
     #[inline]
     pub(crate) fn met(&self, d2: f64, variance: f64, density: f64) -> f64 {
         1.0 - self.detection + self.detection * gaussian(d2, variance) / density
     }
 
-    /// Log-odds of a fruit without a partner at a place of `support`; of a fruit of either visit.
-    #[inline]
-    pub(crate) fn miss(&self, support: f64) -> f64 {
-        self.missed(support).ln()
-    }
-
-    /// The likelihood ratio of which [`Model::miss`] is the logarithm.
+    /// Likelihood ratio of a fruit without a partner at a place of `support`; of a fruit of either visit.
     #[inline]
     pub(crate) fn missed(&self, support: f64) -> f64 {
         1.0 - self.detection * support
@@ -49,6 +37,35 @@ impl Model {
 pub(crate) fn gaussian(d2: f64, variance: f64) -> f64 {
     const NORM: f64 = 0.063_493_635_934_240_97; // (2 pi)^(-3/2)
     NORM / (variance * variance.sqrt()) * (-0.5 * d2 / variance).exp()
+}
+
+/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of every
+/// factor.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Evidence {
+    product: f64,
+    nats: f64,
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self { product: 1.0, nats: 0.0 }
+    }
+}
+
+impl Evidence {
+    #[inline]
+    pub(crate) fn multiply(&mut self, ratio: f64) {
+        self.product *= ratio;
+        if !(1e-200..1e200).contains(&self.product) {
+            *self = Self { product: 1.0, nats: self.log_odds() };
+        }
+    }
+
+    #[inline]
+    pub(crate) fn log_odds(&self) -> f64 {
+        self.nats + self.product.ln()
+    }
 }
 
 /// How many standard deviations a partner may lie away: `P(chi^2_3 > 9)` = 3 %.
@@ -100,23 +117,24 @@ pub(crate) fn refine(
         let variance_at = |p: &Vector3<f64>| sigma * sigma * (1.0 + freedom + (p - centroid).norm_squared() / inertia);
         pair_up(query, map, &pose, variance_at, scratch);
         let mut moments = Moments::default();
-        let (mut log_odds, mut residual) = (0.0, 0.0);
+        let (mut evidence, mut residual) = (Evidence::default(), 0.0);
         for (&row, &(partner, d2, variance)) in scratch.region.iter().zip(&scratch.partners) {
             let p = query.points[row as usize];
             if partner == u32::MAX {
-                log_odds += model.miss(map.support(&pose.apply(&p)));
+                evidence.multiply(model.missed(map.support(&pose.apply(&p))));
                 continue;
             }
-            let gain = model.gain(d2, variance, map.density[partner as usize]);
-            log_odds += gain;
+            let met = model.met(d2, variance, map.density[partner as usize]);
+            evidence.multiply(met);
             // Posterior probability that the partner is the fruit and no chance neighbour.
-            let weight = 1.0 - (1.0 - model.detection) * (-gain).exp();
+            let weight = 1.0 - (1.0 - model.detection) / met;
             moments.add(&p, &map.points[partner as usize], weight);
             residual += weight * d2;
         }
         if moments.weight < 3.5 {
             return answer;
         }
+        let mut log_odds = evidence.log_odds();
         if step + 1 == STEPS {
             log_odds += other_side(query, map, &pose, place, reach, model, scratch);
         }
@@ -152,13 +170,13 @@ fn other_side(
 ) -> f64 {
     let due: f64 = scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>()
         * model.detection;
-    let mut missing = 0.0;
+    let mut missing = Evidence::default();
     map.tree.within(&super::landscape::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
         if scratch.owner[row as usize].0 != scratch.stamp {
-            missing += model.miss(query.support(&pose.apply_inverse(&map.points[row as usize])));
+            missing.multiply(model.missed(query.support(&pose.apply_inverse(&map.points[row as usize]))));
         }
     });
-    due + missing
+    due + missing.log_odds()
 }
 
 /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.

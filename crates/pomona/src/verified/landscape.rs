@@ -71,13 +71,18 @@ impl Landscape {
         // Six neighbours within the spacing: their density, were fruits spread evenly.
         let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
         let floor = 0.1 * typical;
-        let kinship = kinship(&points, &neighbours, spacing);
-        let density = local_density(&points, &neighbours, spacing, floor);
-        let crowding = crowding(&points, &neighbours, spacing);
-        let companions = Companions::new(&points, &neighbours, spacing);
-        let grid = Grid::new(&points, CELL * spacing);
-        let vicinity = Vicinity::new(&points, CELL * spacing);
-        let support = Support::new(&points, spacing);
+        let cell = CELL * spacing;
+        let ((kinship, density, crowding, companions), (grid, vicinity, support)) = rayon::join(
+            || {
+                (
+                    kinship(&points, &neighbours, spacing),
+                    local_density(&points, &neighbours, spacing, floor),
+                    crowding(&points, &neighbours, spacing),
+                    Companions::new(&points, &neighbours, spacing),
+                )
+            },
+            || (Grid::new(&points, cell), Vicinity::new(&points, cell), Support::new(&points, spacing)),
+        );
         let covariances = cloud.covariances.as_ref().map(|all| rows.iter().map(|&row| all[row as usize]).collect());
         Self {
             centre,
@@ -124,21 +129,13 @@ impl Landscape {
     /// The nearest point within `gate`, with its squared distance.
     #[inline]
     pub(crate) fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)> {
-        let mut best: Option<(u32, f64)> = None;
-        let mut limit = gate * gate;
-        let mut offer = |row: u32| {
-            let d2 = (self.points[row as usize] - place).norm_squared();
-            if d2 <= limit {
-                limit = d2;
-                best = Some((row, d2));
-            }
-        };
-        if gate <= self.vicinity.reach {
-            self.vicinity.of(place).iter().copied().for_each(offer);
-        } else {
-            self.near(place, gate, &mut offer);
+        let mut nearest = Nearest { points: &self.points, place, limit: gate * gate, row: None };
+        self.vicinity.of(place).iter().for_each(|&row| nearest.offer(row));
+        // What is not within the reach of the list may be listed nevertheless, and be beaten by what is not.
+        if gate > self.vicinity.reach && nearest.limit > self.vicinity.reach * self.vicinity.reach {
+            self.near(place, gate, |row| nearest.offer(row));
         }
-        best
+        nearest.row.map(|row| (row, nearest.limit))
     }
 
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.
@@ -157,6 +154,26 @@ impl Landscape {
     #[inline]
     pub(crate) fn support(&self, place: &Vector3<f64>) -> f64 {
         self.support.at(place)
+    }
+}
+
+/// The nearest of the points that were offered.
+struct Nearest<'a> {
+    points: &'a [Vector3<f64>],
+    place: &'a Vector3<f64>,
+    /// Squared distance of the nearest, or within which it has to be.
+    limit: f64,
+    row: Option<u32>,
+}
+
+impl Nearest<'_> {
+    #[inline]
+    fn offer(&mut self, row: u32) {
+        let d2 = (self.points[row as usize] - self.place).norm_squared();
+        if d2 <= self.limit {
+            self.limit = d2;
+            self.row = Some(row);
+        }
     }
 }
 

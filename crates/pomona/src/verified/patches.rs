@@ -70,10 +70,10 @@ pub(super) fn next_to(cells: &[Cell], cell: &Cell) -> Moments {
     total(cell.around.iter().filter(|a| a.1 > NEXT).map(|a| (&cells[a.0 as usize].moments, a.1)))
 }
 
-/// The nearest fruit of the map with its log-odds, and the log-odds of having none.
+/// The nearest fruit of the map with the probability that it is no stranger, and the log-odds of it, or of having none.
 struct Met {
     partner: Option<(u32, f64)>,
-    alone: f64,
+    gain: f64,
 }
 
 impl Growth<'_> {
@@ -121,22 +121,19 @@ impl Growth<'_> {
             }
         }
         let mut gains = vec![0.0; self.query.len()];
-        let mut alone = vec![0.0; self.query.len()];
         for (row, met) in active.into_iter().map(|row| row as usize).zip(met) {
-            let Some(met) = met else { continue };
-            (gains[row], alone[row]) = (met.alone, met.alone);
-            let Some((partner, gain)) = met.partner else { continue };
-            let owner = &mut self.owner[partner as usize];
-            if let Some(rival) = owner.map(|rival| rival as usize) {
+            let Some(Met { partner, gain }) = met else { continue };
+            gains[row] = gain;
+            let Some((partner, weight)) = partner else { continue };
+            if let Some(rival) = self.owner[partner as usize].map(|rival| rival as usize) {
                 if gains[rival] >= gain {
+                    gains[row] = self.alone(row);
                     continue;
                 }
                 self.partners[rival] = None;
-                gains[rival] = alone[rival];
+                gains[rival] = self.alone(rival);
             }
-            *owner = Some(row as u32);
-            gains[row] = gain;
-            let weight = (1.0 - (1.0 - self.model.detection) * (-gain).exp()).max(0.0);
+            self.owner[partner as usize] = Some(row as u32);
             let residual = self.map.points[partner as usize] - self.patch_places[row];
             self.partners[row] = Some(Partner { row: partner, residual, weight });
         }
@@ -145,9 +142,17 @@ impl Growth<'_> {
 
     /// What a prediction meets in the map.
     fn meet(&self, Prediction { place, variance }: &Prediction) -> Met {
-        let found = self.map.nearest(place, GATE * variance.sqrt());
-        let partner = found.map(|(row, d2)| (row, self.model.gain(d2, *variance, self.map.density[row as usize])));
-        Met { partner, alone: self.model.miss(self.map.support(place)) }
+        let Some((row, d2)) = self.map.nearest(place, GATE * variance.sqrt()) else {
+            return Met { partner: None, gain: self.model.missed(self.map.support(place)).ln() };
+        };
+        let ratio = self.model.met(d2, *variance, self.map.density[row as usize]);
+        let weight = (1.0 - (1.0 - self.model.detection) / ratio).max(0.0);
+        Met { partner: Some((row, weight)), gain: ratio.ln() }
+    }
+
+    /// Log-odds of a fruit that has lost its partner to another.
+    fn alone(&self, row: usize) -> f64 {
+        self.predictions[row].map_or(0.0, |at| self.model.missed(self.map.support(&at.place)).ln())
     }
 
     /// Evidence and sums of every reached cell.

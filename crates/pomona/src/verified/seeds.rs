@@ -193,13 +193,14 @@ pub(crate) struct SeedIndex {
 
 impl SeedIndex {
     pub(crate) fn new(landscape: &Landscape, scale: Scale, shortest: f64) -> Self {
-        let (quads, codes): (Vec<_>, Vec<_>) = enumerate(landscape, shortest).into_iter().unzip();
-        let codes: Vec<Code> = match scale {
-            Scale::Metric => codes,
-            Scale::Free => codes.iter().map(without_scale).collect(),
+        let seeds = enumerate(landscape, shortest);
+        let code = |(_, code): &(Quad, Code)| match scale {
+            Scale::Metric => *code,
+            Scale::Free => without_scale(code),
         };
-        let (codes, order) = CodeGrid::new(&codes);
-        Self { quads: order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| quads[row as usize]).collect(), codes }
+        let (codes, order) = CodeGrid::new(seeds.len(), |row| code(&seeds[row]));
+        let quads = order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| seeds[row as usize].0).collect();
+        Self { quads, codes }
     }
 }
 
