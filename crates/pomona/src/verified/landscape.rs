@@ -13,8 +13,11 @@ use std::sync::OnceLock;
 /// Neighbours kept per fruit: enough for the seeds (the nearest ten) and for the first look at a hypothesis.
 pub(crate) const NEIGHBOURS: usize = 24;
 
-/// Edge of a grid's cell in spacings: the gate of a prediction that is as uncertain as predictions are.
+/// Edge of a grid's cell in spacings.
 const CELL: f64 = 0.6;
+
+/// Reaches of the lists of nearby fruits in spacings: the gates next to a seed, and those at the rim of a region.
+const REACHES: [f64; 2] = [0.4, 0.8];
 
 /// Points of one cloud, centred on their mean, with the neighbourhood questions that verification asks.
 #[derive(Debug, Clone)]
@@ -44,7 +47,8 @@ pub(crate) struct Landscape {
     cut: OnceLock<Cut>,
     companions: Companions,
     grid: Grid,
-    vicinity: Vicinity,
+    /// By their reach.
+    vicinities: [Vicinity; 2],
     support: Support,
 }
 
@@ -71,8 +75,7 @@ impl Landscape {
         // Six neighbours within the spacing: their density, were fruits spread evenly.
         let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
         let floor = 0.1 * typical;
-        let cell = CELL * spacing;
-        let ((kinship, density, crowding, companions), (grid, vicinity, support)) = rayon::join(
+        let ((kinship, density, crowding, companions), (grid, vicinities, support)) = rayon::join(
             || {
                 (
                     kinship(&points, &neighbours, spacing),
@@ -81,7 +84,10 @@ impl Landscape {
                     Companions::new(&points, &neighbours, spacing),
                 )
             },
-            || (Grid::new(&points, cell), Vicinity::new(&points, cell), Support::new(&points, spacing)),
+            || {
+                let vicinities = REACHES.map(|reach| Vicinity::new(&points, reach * spacing));
+                (Grid::new(&points, CELL * spacing), vicinities, Support::new(&points, spacing))
+            },
         );
         let covariances = cloud.covariances.as_ref().map(|all| rows.iter().map(|&row| all[row as usize]).collect());
         Self {
@@ -99,7 +105,7 @@ impl Landscape {
             cut: OnceLock::new(),
             companions,
             grid,
-            vicinity,
+            vicinities,
             support,
         }
     }
@@ -130,12 +136,15 @@ impl Landscape {
     #[inline]
     pub(crate) fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)> {
         let mut nearest = Nearest { points: &self.points, place, limit: gate * gate, row: None };
-        self.vicinity.of(place).iter().for_each(|&row| nearest.offer(row));
-        // What is not within the reach of the list may be listed nevertheless, and be beaten by what is not.
-        if gate > self.vicinity.reach && nearest.limit > self.vicinity.reach * self.vicinity.reach {
-            self.near(place, gate, |row| nearest.offer(row));
+        // What is beyond the reach of a list may be listed nevertheless, and be beaten by what is not.
+        for list in &self.vicinities {
+            list.of(place).iter().for_each(|&row| nearest.offer(row));
+            if nearest.limit <= list.reach * list.reach {
+                return nearest.found();
+            }
         }
-        nearest.row.map(|row| (row, nearest.limit))
+        self.near(place, gate, |row| nearest.offer(row));
+        nearest.found()
     }
 
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.
@@ -167,6 +176,10 @@ struct Nearest<'a> {
 }
 
 impl Nearest<'_> {
+    fn found(&self) -> Option<(u32, f64)> {
+        self.row.map(|row| (row, self.limit))
+    }
+
     #[inline]
     fn offer(&mut self, row: u32) {
         let d2 = (self.points[row as usize] - self.place).norm_squared();
