@@ -121,7 +121,7 @@ fn edges_of(
         let Some(Prediction { place, variance }) = *prediction else { continue };
         let seen = (share * map.support(&place)).max(LEAST_SEEN);
         let first = edges.len();
-        let own = query.covariances.as_ref().map(|all| pose.turned(&all[row]));
+        let own = query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
         let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
         let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
         map.near(&place, gate * (widest * variance).sqrt(), |partner| {

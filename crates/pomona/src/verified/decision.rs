@@ -8,13 +8,12 @@ use super::landscape::Landscape;
 use super::outline;
 use super::overlap::Overlap;
 use super::pose::Pose;
-use super::search::{Candidate, Effort, round};
-use super::seeds::SeedIndex;
+use super::search::{Candidate, Effort, Starts, of_every_fruit, round};
+use super::seeds::{self, Seed, SeedIndex};
+use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
 use crate::matching::{Match, Request, Verdict};
-use nalgebra::Vector3;
-use std::ops::Range;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 const MIN_FRUITS: usize = 5;
@@ -31,17 +30,18 @@ const DETECTION: f64 = 0.55;
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
 const SHARP: f64 = 0.18;
 
-/// Rounds of the search: seeds per fruit up to which they go, and candidates that are refined.
-const ROUNDS: [(u64, usize); 4] = [(1, 32), (1, 32), (4, 48), (u64::MAX, 64)];
+/// Rounds of the search (see [`Search::seeds_of`]): how many candidates are refined, and from where.
+const ROUNDS: [(usize, Starts); 4] =
+    [(32, Starts::Straight), (32, Starts::Straight), (48, Starts::Turned), (64, Starts::Turned)];
 
-/// Fruits whose seeds make the first round: where the visits overlap well, few are enough in a cloud of any size.
+/// Share of the longest seeds that the third round tries.
+const THIRD_ROUND: usize = 5;
+
+/// Fruits whose seeds make the first round, and seeds at the least before an answer stands alone: where the visits overlap well, few are enough in a cloud of any size.
 const FIRST_FRUITS: usize = 256;
 
 /// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
 const RIVAL_SEED: f64 = 0.3;
-
-/// A pose found with fewer seeds than that has this many more of every fruit tried in search of a rival.
-const RIVAL_TURNS: u64 = 3;
 
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
@@ -52,11 +52,8 @@ const GROWN: usize = 6;
 /// A pose with this many times the evidence needed is no local optimum.
 const SURE: f64 = 6.0;
 
-/// Times more seeds where the vertical is known.
-const UPRIGHT_SEEDS: u64 = 4;
-
-/// How far the vertical of a pose may lean from the one given: 10 degrees.
-const MAX_LEAN_RAD: f64 = 0.175;
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
+const UPRIGHT_SEEDS: u64 = 2;
 
 /// A map made ready for many queries.
 #[derive(Debug, Clone)]
@@ -137,7 +134,6 @@ pub(super) struct Search<'a> {
     seeds: &'a SeedIndex,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
-    up: Option<[Vector3<f64>; 2]>,
     pub(super) noise_m: Option<f64>,
 }
 
@@ -145,6 +141,7 @@ pub(super) type Stages = Vec<(&'static str, f64)>;
 
 /// What the search did.
 struct Log {
+    seeds: usize,
     effort: Effort,
     refined: usize,
     grown: u32,
@@ -154,7 +151,7 @@ struct Log {
 
 impl Default for Log {
     fn default() -> Self {
-        Self { effort: Effort::default(), refined: 0, grown: 0, best: f64::NEG_INFINITY }
+        Self { seeds: 0, effort: Effort::default(), refined: 0, grown: 0, best: f64::NEG_INFINITY }
     }
 }
 
@@ -168,51 +165,42 @@ impl<'a> Search<'a> {
             query,
             map,
             seeds: &prepared.seeds,
-            model: Model { sigma: sigma.min(2.0 * common), detection: DETECTION, scale: prepared.scale },
+            model: Model {
+                sigma: sigma.min(2.0 * common),
+                detection: DETECTION,
+                scale: prepared.scale,
+                vertical: request.up.map(Vertical::new),
+            },
             config: *config,
-            up: request.up.map(|pair| pair.map(|up| up.normalize())),
             noise_m: request.noise_m,
         }
     }
 
     fn threshold(&self) -> f64 {
-        // The cap of directions within the lean, over the sphere.
-        let share = if self.up.is_some() { (1.0 - MAX_LEAN_RAD.cos()) / 2.0 } else { 1.0 };
+        let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
         self.config.threshold(poses(self.query.len(), self.map.len(), self.model.scale, share))
     }
 
     fn admits(&self, pose: &Pose) -> bool {
-        self.up.is_none_or(|[query, map]| (pose.rotation * query).dot(&map) > MAX_LEAN_RAD.cos())
+        self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
     /// Rounds of seeds until a pose is accepted, then the outline.
     fn run(&self) -> (Vec<Finding<'a>>, Stages) {
-        // A known vertical rules most candidates out at once, so that more seeds cost no more.
-        let seeds = self.config.seeds_per_fruit * if self.up.is_some() { UPRIGHT_SEEDS } else { 1 };
-        let last = seeds.max(FEW_SEEDS / self.query.len() as u64).min(u64::from(u32::MAX));
         let mut log = Log::default();
-        let mut turn = 0;
         let mut findings = Vec::new();
-        for (index, (turns, keep)) in ROUNDS.into_iter().enumerate() {
-            let end = turns.min(last);
-            let stride = if index == 0 { self.query.len().div_ceil(FIRST_FRUITS) as u64 } else { 1 };
-            let (hypotheses, rest) = self.round((stride, turn..end), keep, &mut log);
-            turn = if stride == 1 { end } else { 0 };
+        let mut longest = Vec::new();
+        for (index, plan) in ROUNDS.into_iter().enumerate() {
+            let seeds = self.seeds_of(index, &mut longest);
+            let (hypotheses, rest) = self.round(&seeds, plan, &mut log);
             log.grown += self.grow_distinct(&hypotheses, &mut findings);
             log.best = findings.iter().map(|finding| finding.overlap.log_odds).fold(log.best, f64::max);
             self.keep_accepted(&mut findings);
             if !findings.is_empty() {
-                log.grown += self.look_for_rivals(&rest, &mut findings);
-                if stride == 1 && (self.query.len() as u64 * turn) < FIRST_FRUITS as u64 {
-                    let (more, _) = self.round((1, turn..turn + RIVAL_TURNS), RIVAL_CANDIDATES, &mut log);
-                    log.grown += self.grow_distinct(&more, &mut findings);
-                }
-                self.keep_accepted(&mut findings);
-                let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * self.threshold();
-                findings.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
+                self.doubt(&mut findings, &rest, &mut log);
                 break;
             }
-            // After the first round, before the long ones: what shows the same trees is found here at any noise.
+            // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
             let outline = (index == 1).then(|| self.by_outline()).flatten();
             findings.extend(outline.filter(|found| self.turns_are_fixed(found)));
             if !findings.is_empty() {
@@ -224,10 +212,39 @@ impl<'a> Search<'a> {
         (findings, stages)
     }
 
+    /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
+    fn seeds_of(&self, round: usize, longest: &mut Vec<Seed>) -> Vec<Seed> {
+        match round {
+            0 => of_every_fruit(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
+            1 => of_every_fruit(self.query, 1, 1..2),
+            2 => {
+                let each = self.config.seeds_per_fruit * self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS);
+                *longest = seeds::longest(self.query, (each * self.query.len() as u64).max(FEW_SEEDS) as usize);
+                longest.split_off(longest.len() - longest.len() / THIRD_ROUND)
+            }
+            _ => std::mem::take(longest),
+        }
+    }
+
+    /// Looks for rivals of what was found, and for better optima near it.
+    fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Candidate], log: &mut Log) {
+        log.grown += self.look_for_rivals(rest, findings);
+        // A pose found with few seeds has shown little of where else the query might lie.
+        let turns = FIRST_FRUITS.saturating_sub(log.seeds).div_ceil(self.query.len()) as u64;
+        if turns > 0 {
+            let more = of_every_fruit(self.query, 1, 2..2 + turns);
+            let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
+            log.grown += self.grow_distinct(&more, findings);
+        }
+        self.keep_accepted(findings);
+        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * self.threshold();
+        findings.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
+    }
+
     /// Hypotheses of one round, and the candidates that were not refined.
-    fn round(&self, which: (u64, Range<u64>), keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Candidate>) {
-        let admits = |pose: &Pose| self.admits(pose);
-        let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, &admits, which, keep);
+    fn round(&self, seeds: &[Seed], plan: (usize, Starts), log: &mut Log) -> (Vec<Hypothesis>, Vec<Candidate>) {
+        let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, seeds, plan);
+        log.seeds += seeds.len();
         log.effort = log.effort + spent;
         log.refined += hypotheses.len();
         (hypotheses, rest)
@@ -235,7 +252,8 @@ impl<'a> Search<'a> {
 
     fn keep_accepted(&self, findings: &mut Vec<Finding>) {
         let threshold = self.threshold();
-        findings.retain(|finding| finding.overlap.log_odds > threshold && self.turns_are_fixed(finding));
+        findings.retain(|Finding { overlap, .. }| overlap.log_odds > threshold && self.admits(&overlap.pose));
+        findings.retain(|finding| self.turns_are_fixed(finding));
     }
 
     fn stages(&self, log: &Log, verified: usize) -> Stages {

@@ -6,8 +6,8 @@ use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::single;
 use super::overlap::Overlap;
 use super::pose::{Moments, Pose};
-use super::search::{Candidate, refined};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use super::search::{Candidate, Starts, refined};
+use nalgebra::{Matrix3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -33,18 +33,8 @@ const POLISHES: usize = 3;
 /// Radius in spacings of the region that decides between turned starts.
 const POLISH_REACH: f64 = 5.0;
 
-/// The pose, and the pose turned about `middle` by 5 and 10 degrees either way about each axis of the map.
-fn turned(pose: &Pose, middle: &Vector3<f64>) -> impl Iterator<Item = Pose> {
-    let (pose, middle) = (*pose, *middle);
-    let fixed = pose.apply(&middle);
-    let turns = [-0.175, -0.087, 0.087, 0.175].into_iter().flat_map(|angle| {
-        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| Rotation3::new(axis * angle).into_inner())
-    });
-    std::iter::once(Matrix3::identity()).chain(turns).map(move |turn| {
-        let rotation = turn * pose.rotation;
-        Pose { rotation, translation: fixed - rotation * middle * pose.scale, scale: pose.scale }
-    })
-}
+/// Turns about each axis that a polish tries, radians: 5 and 10 degrees either way.
+const POLISH_TURNS: [f64; 4] = [-0.175, -0.087, 0.087, 0.175];
 
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
@@ -58,7 +48,7 @@ impl<'a> Search<'a> {
             .take(RIVAL_CANDIDATES)
             .copied()
             .collect();
-        self.grow_distinct(&refined(self.query, self.map, &others, &self.model), findings)
+        self.grow_distinct(&refined(self.query, self.map, &others, &self.model, Starts::Straight), findings)
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
@@ -133,7 +123,8 @@ impl<'a> Search<'a> {
         for _ in 0..POLISHES {
             let Overlap { pose, middle, sigma, .. } = finding.overlap;
             let model = Model { sigma, ..self.model };
-            let best = turned(&pose, &middle)
+            let best = std::iter::once(pose)
+                .chain(pose.turned_by_each(&middle, &POLISH_TURNS))
                 .filter_map(|start| {
                     refine(
                         self.query,

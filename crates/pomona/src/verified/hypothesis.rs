@@ -2,6 +2,7 @@
 
 use super::landscape::Landscape;
 use super::pose::{Moments, Pose};
+use super::vertical::Vertical;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 
@@ -13,6 +14,7 @@ pub(crate) struct Model {
     /// Probability that a fruit of the query, inside the map's support, has its partner there.
     pub(crate) detection: f64,
     pub(crate) scale: Scale,
+    pub(crate) vertical: Option<Vertical>,
 }
 
 impl Model {

@@ -34,6 +34,7 @@ mod settlement;
 mod sharing;
 mod size;
 mod space;
+mod vertical;
 mod vicinity;
 
 pub use acceptance::VerifiedConfig;

@@ -22,7 +22,7 @@ impl Pose {
     }
 
     /// A covariance of the query as the map sees it.
-    pub(crate) fn turned(&self, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    pub(crate) fn seen_from_map(&self, covariance: &Matrix3<f64>) -> Matrix3<f64> {
         self.rotation * covariance * self.rotation.transpose() * (self.scale * self.scale)
     }
 
@@ -30,6 +30,32 @@ impl Pose {
     #[inline]
     pub(crate) fn apply_inverse(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.tr_mul(&(p - self.translation)) / self.scale
+    }
+
+    /// The pose turned about what it makes of `middle`.
+    #[inline]
+    pub(crate) fn turned(&self, middle: &Vector3<f64>, turn: &Rotation3<f64>) -> Self {
+        let rotation = turn * self.rotation;
+        Self { rotation, translation: self.apply(middle) - rotation * middle * self.scale, scale: self.scale }
+    }
+
+    /// The pose turned about `middle` by each of the angles about each axis of the map.
+    pub(crate) fn turned_by_each(
+        &self,
+        middle: &Vector3<f64>,
+        angles_rad: &'static [f64],
+    ) -> impl Iterator<Item = Self> + use<> {
+        let (pose, middle) = (*self, *middle);
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let turns = angles_rad.iter().flat_map(move |angle| axes.map(|axis| Rotation3::new(axis * *angle)));
+        turns.map(move |turn| pose.turned(&middle, &turn))
+    }
+
+    /// Angle of the rotation between two poses, radians.
+    #[inline]
+    pub(crate) fn turn_to(&self, other: &Self) -> f64 {
+        let cosine = (self.rotation.component_mul(&other.rotation).sum() - 1.0) / 2.0;
+        cosine.clamp(-1.0, 1.0).acos()
     }
 
     /// Pose in the clouds' own frames.
@@ -47,13 +73,6 @@ impl Pose {
             translation: t.rotation * centre_query * t.scale + t.translation - centre_map,
             scale: t.scale,
         }
-    }
-
-    #[cfg(test)]
-    /// Angle of the rotation between two poses, radians.
-    pub(crate) fn angle_to(&self, other: &Self) -> f64 {
-        let trace = (self.rotation.transpose() * other.rotation).trace();
-        ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
     }
 }
 
@@ -173,7 +192,7 @@ mod tests {
             for _ in 0..30 {
                 pose = moments.step(&pose, Scale::Free, 0.0).expect("random points span space");
             }
-            prop_assert!(pose.angle_to(&truth) < 1e-6);
+            prop_assert!(pose.turn_to(&truth) < 1e-6);
             prop_assert!((pose.scale - scale).abs() < 1e-9);
             prop_assert!((pose.translation - truth.translation).norm() < 1e-6);
         }

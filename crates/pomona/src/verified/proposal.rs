@@ -13,6 +13,8 @@ pub(crate) struct Proposer<'a> {
     map: &'a Landscape,
     model: &'a Model,
     quad: Quad,
+    /// The fruit of the seed nearest to the centroid: its neighbours are those of the seed.
+    middle: u32,
     pub(crate) centroid: Vector3<f64>,
     /// Axes of the seed as rows: from the query to the frame of the seed.
     to_frame: Matrix3<f64>,
@@ -37,9 +39,11 @@ impl<'a> Proposer<'a> {
         let to_frame = Matrix3::from_columns(&frame(&query.points, &quad)?).transpose();
         let (centroid, fruits) = in_frame(&query.points, &quad, &to_frame);
         let moments = fruits.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose());
+        let off_centre = |&i: &usize| fruits[i].norm_squared();
+        let middle = (0..STARS).min_by(|a, b| off_centre(a).total_cmp(&off_centre(b))).map(|i| quad[i])?;
         let square = moments.trace();
         let inverse_inertia = (Matrix3::identity() * square - moments).try_inverse()?;
-        Some(Self { query, map, model, quad, centroid, to_frame, fruits, square, inverse_inertia })
+        Some(Self { query, map, model, quad, middle, centroid, to_frame, fruits, square, inverse_inertia })
     }
 
     /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
@@ -67,15 +71,21 @@ impl<'a> Proposer<'a> {
         Some((Pose { rotation, translation, scale }, residual))
     }
 
+    /// The pose as a known vertical corrects it; `None` where the two contradict each other.
+    #[inline]
+    pub(crate) fn upright(&self, pose: Pose) -> Option<Pose> {
+        let Some(vertical) = self.model.vertical else { return Some(pose) };
+        let variance = self.model.sigma * self.model.sigma * self.inverse_inertia.trace() / 3.0;
+        vertical.straightened(&pose, &self.centroid, variance)
+    }
+
     /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
     ///
-    /// The pose of four noisy fruits is uncertain: at distance r from their centroid the variance is
-    /// s^2 (1 + 1/4 + r^2 / S), S being the seed's moment of inertia (cf. s^2 (1 + r^2/Q^2) of Lang et al.).
     #[inline]
     pub(crate) fn first_look(&self, pose: &Pose) -> f64 {
         // Likelihood ratios are multiplied: one logarithm in the end costs less than one a fruit.
         let mut around = 1.0;
-        for &row in self.query.neighbours(self.quad[0] as usize).iter().filter(|&row| !self.quad.contains(row)) {
+        for &row in self.query.neighbours(self.middle as usize).iter().filter(|&row| !self.quad.contains(row)) {
             around *= self.ratio(row, pose);
             // A sequential test: a true pose falls this low only when its first four fruits or so are all hidden.
             if around < HOPELESS {
@@ -85,12 +95,22 @@ impl<'a> Proposer<'a> {
         self.quad.iter().fold(around, |product, &row| product * self.ratio(row, pose)).ln()
     }
 
+    /// Variance of where the pose of the seed puts a fruit, in variances of one pair.
+    ///
+    /// The pose of four noisy fruits is uncertain: with the inertia J about their centroid, a fruit at r from there has
+    /// 1/4 + tr([r] J^-1 [r]^T) / 3 per axis (cf. 1 + r^2/Q^2 of Lang et al.).
+    #[inline]
+    fn looseness(&self, p: &Vector3<f64>) -> f64 {
+        let r = self.to_frame * (p - self.centroid);
+        let turn = self.inverse_inertia;
+        1.0 / STARS as f64 + (turn.trace() * r.norm_squared() - r.dot(&(turn * r))) / 3.0
+    }
+
     /// What a fruit says for the pose, as a likelihood ratio.
     #[inline]
     fn ratio(&self, row: u32, pose: &Pose) -> f64 {
         let p = self.query.points[row as usize];
-        let looseness = 1.25 + (p - self.centroid).norm_squared() / (self.square * 2.0 / 3.0);
-        let variance = self.model.sigma * self.model.sigma * looseness;
+        let variance = self.model.sigma * self.model.sigma * (1.0 + self.looseness(&p));
         let place = pose.apply(&p);
         match self.map.nearest(&place, GATE * variance.sqrt()) {
             Some((partner, d2)) => self.model.met(d2, variance, self.map.density[partner as usize]),

@@ -4,7 +4,7 @@ use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::pose::Pose;
 use super::proposal::Proposer;
-use super::seeds::{Code, Quad, SeedIndex, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{Quad, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ impl std::ops::Add for Effort {
 }
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
-fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<(Quad, Code)> {
+fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
     let near = query.neighbours(row as usize);
     let n = near.len().min(super::seeds::COMPANIONS) as u64;
     let count = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
@@ -74,8 +74,7 @@ fn candidates_of(
     map: &Landscape,
     index: &SeedIndex,
     model: &Model,
-    admits: &(impl Fn(&Pose) -> bool + Sync),
-    seed: (Quad, Code),
+    seed: Seed,
     found: &mut Vec<Candidate>,
 ) -> Effort {
     let mut effort = Effort::default();
@@ -105,9 +104,10 @@ fn candidates_of(
         for &hit in &hits {
             let target = &index.quads[hit as usize];
             let Some((pose, residual)) = proposer.fit(target) else { continue };
-            if residual > MAX_RESIDUAL * model.sigma * model.sigma || !admits(&pose) {
+            if residual > MAX_RESIDUAL * model.sigma * model.sigma {
                 continue;
             }
+            let Some(pose) = proposer.upright(pose) else { continue };
             effort.fitted += 1;
             let log_odds = proposer.first_look(&pose);
             if log_odds > 0.0 {
@@ -127,29 +127,30 @@ const COMMON: usize = 48;
 /// Residual sum of a seed's fit over sigma^2: 95 % of chi^2 with 12 - 6 degrees of freedom.
 const MAX_RESIDUAL: f64 = 12.6;
 
-/// One round: `turns` seeds of every `stride`-th fruit, the best `keep` candidates refined, and the other candidates in order.
+/// One seed of every `stride`-th fruit for each of `turns`.
+pub(crate) fn of_every_fruit(query: &Landscape, stride: u64, turns: std::ops::Range<u64>) -> Vec<Seed> {
+    (0..query.len() as u32)
+        .filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride))
+        .flat_map(|row| turns.clone().filter_map(move |turn| seed_of(query, row, turn)))
+        .collect()
+}
+
+/// One round: candidates of all `seeds`, the best `keep` of them refined, and the other candidates in order.
 pub(crate) fn round(
     query: &Landscape,
     map: &Landscape,
     index: &SeedIndex,
     model: &Model,
-    admits: &(impl Fn(&Pose) -> bool + Sync),
-    (stride, turns): (u64, std::ops::Range<u64>),
-    keep: usize,
+    seeds: &[Seed],
+    (keep, starts): (usize, Starts),
 ) -> (Vec<Hypothesis>, Vec<Candidate>, Effort) {
-    let rows: Vec<u32> =
-        (0..query.len() as u32).filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride)).collect();
-    let parts: Vec<(Vec<Candidate>, Effort)> = rows
-        .par_chunks(16)
-        .map(|rows| {
+    let parts: Vec<(Vec<Candidate>, Effort)> = seeds
+        .par_chunks(SHARE_OF_SEEDS)
+        .map(|seeds| {
             let mut found = Vec::new();
             let mut effort = Effort::default();
-            for &row in rows {
-                for turn in turns.clone() {
-                    if let Some(seed) = seed_of(query, row, turn) {
-                        effort = effort + candidates_of(query, map, index, model, admits, seed, &mut found);
-                    }
-                }
+            for &seed in seeds {
+                effort = effort + candidates_of(query, map, index, model, seed, &mut found);
             }
             (found, effort)
         })
@@ -157,23 +158,94 @@ pub(crate) fn round(
     let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
     let mut candidates: Vec<Candidate> = parts.into_iter().flat_map(|part| part.0).collect();
     candidates.sort_unstable_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key)));
-    let rest = candidates.split_off(keep.min(candidates.len()));
-    (refined(query, map, &candidates, model), rest, effort)
+    let best = distinct(query, map, &mut candidates, keep);
+    (refined(query, map, &best, model, starts), candidates, effort)
 }
 
+/// Seeds that are worth a thread of their own.
+const SHARE_OF_SEEDS: usize = 32;
+
+/// Takes the best `keep` candidates out of those given best first, one of each pose.
+fn distinct(query: &Landscape, map: &Landscape, candidates: &mut Vec<Candidate>, keep: usize) -> Vec<Candidate> {
+    let (near, same) = (query.spacing, SAME_PLACE * map.spacing);
+    let mut kept: Vec<Candidate> = Vec::new();
+    candidates.retain(|candidate| {
+        let place = candidate.place;
+        let proposed = |other: &Candidate| {
+            (place - other.place).norm() < near
+                && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
+                && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
+        };
+        let new = kept.len() < keep && !kept.iter().any(proposed);
+        if new {
+            kept.push(*candidate);
+        }
+        !new
+    });
+    kept
+}
+
+/// Candidates of one neighbourhood are the same pose when they put it within this many spacings of one place, turned by
+/// less than that: what one refinement reaches.
+const SAME_PLACE: f64 = 0.4;
+const SAME_TURN_RAD: f64 = 0.15;
+
+/// Where the refinement of a candidate starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Starts {
+    /// From its pose alone.
+    Straight,
+    /// From its pose, and turned by [`TURNS`] on the fruits next to the seed.
+    Turned,
+}
+
+/// Turns about each axis that a refinement tries, radians.
+///
+/// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet their
+/// neighbours' partners, and the refinement can stay there.
+const TURNS: [f64; 2] = [-0.2, 0.2];
+
+/// Share of the reach on which turned starts are compared.
+const NEAR: f64 = 0.75;
+
 /// Candidates refined around their places, most evidence first.
-pub(crate) fn refined(query: &Landscape, map: &Landscape, candidates: &[Candidate], model: &Model) -> Vec<Hypothesis> {
+pub(crate) fn refined(
+    query: &Landscape,
+    map: &Landscape,
+    candidates: &[Candidate],
+    model: &Model,
+    starts: Starts,
+) -> Vec<Hypothesis> {
     let mut hypotheses: Vec<Hypothesis> = candidates
         .par_chunks(8)
         .map_init(Scratch::default, |scratch, part| {
-            part.iter()
-                .filter_map(|c| refine(query, map, &c.pose, &c.place, REACH * query.spacing, model, scratch))
-                .collect::<Vec<_>>()
+            part.iter().filter_map(|one| refine_from(starts, query, map, one, model, scratch)).collect::<Vec<_>>()
         })
         .flatten_iter()
         .collect();
     hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     hypotheses
+}
+
+fn refine_from(
+    starts: Starts,
+    query: &Landscape,
+    map: &Landscape,
+    Candidate { pose, place, .. }: &Candidate,
+    model: &Model,
+    scratch: &mut Scratch,
+) -> Option<Hypothesis> {
+    let more = |a: &Hypothesis, b: &Hypothesis| a.log_odds.total_cmp(&b.log_odds);
+    let reach = REACH * query.spacing;
+    let mut from = |start: &Pose, reach: f64| refine(query, map, start, place, reach, model, scratch);
+    let straight = from(pose, reach);
+    if starts == Starts::Straight {
+        return straight;
+    }
+    let near = std::iter::once(*pose).chain(pose.turned_by_each(place, &TURNS));
+    let best = near.filter_map(|start| from(&start, NEAR * reach)).max_by(more);
+    let turned = best.and_then(|best| from(&best.pose, reach));
+    straight.into_iter().chain(turned).max_by(more)
 }
 
 /// Radius of the region that weighs a refined hypothesis, in spacings.

@@ -27,8 +27,11 @@ pub(crate) type Quad = [u32; STARS];
 /// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
 pub(crate) type Code = [f32; 6];
 
+/// A labelled set with its code.
+pub(crate) type Seed = (Quad, Code);
+
 /// Labels a set: A and B farthest apart, A nearer the centroid, C farther from the line AB than D.
-pub(crate) fn canonical(points: &[Vector3<f64>], set: [u32; STARS]) -> Option<(Quad, Code)> {
+pub(crate) fn canonical(points: &[Vector3<f64>], set: [u32; STARS]) -> Option<Seed> {
     let mut longest = (0, 1);
     let mut length2 = -1.0;
     for i in 0..STARS {
@@ -134,7 +137,7 @@ pub(crate) fn without_scale(code: &Code) -> Code {
 }
 
 /// Every seed of a cloud, each set once, in a fixed order; `shortest` is the least |AB| in metres.
-pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<(Quad, Code)> {
+pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
         .with_min_len(SHARE_OF_ROWS)
@@ -142,6 +145,20 @@ pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<(Quad, Code
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
         .collect()
+}
+
+/// The `count` seeds with the longest |AB|, in a fixed order.
+///
+/// Long seeds fix their pose best and have the fewest lookalikes; how often a seed is seen again hardly depends on its
+/// length (docs page).
+pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
+    let mut seeds = enumerate(landscape, 0.0);
+    if count < seeds.len() {
+        seeds.select_nth_unstable_by(count, |a, b| b.1[0].total_cmp(&a.1[0]).then(a.0.cmp(&b.0)));
+        seeds.truncate(count);
+    }
+    seeds.sort_unstable_by_key(|seed| (shuffled(u64::from(seed.0[0])), seed.0));
+    seeds
 }
 
 /// The sets of a fruit and three companions that no fruit before it forms too, each in ascending order.
