@@ -2,14 +2,15 @@
 
 use nalgebra::Vector3;
 
-/// A hashed grid: cells hold the rows of their points; any extent, memory in proportion to the points.
+/// Columns of cells along z, hashed; any extent, memory in proportion to the points.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     inverse_cell: f64,
     mask: u64,
-    /// Start of each bucket in `rows`, one more than there are buckets.
+    /// Start of each bucket in `points`, one more than there are buckets.
     starts: Vec<u32>,
-    rows: Vec<u32>,
+    /// Cell along z and row of each point, in the order of both within a bucket.
+    points: Vec<(i64, u32)>,
 }
 
 impl Grid {
@@ -17,22 +18,20 @@ impl Grid {
         let buckets = (4 * points.len().max(4)).next_power_of_two();
         let mask = buckets as u64 - 1;
         let inverse_cell = 1.0 / cell;
-        let bucket = |p: &Vector3<f64>| hash(cell_of(p, inverse_cell), mask);
+        let mut placed: Vec<(usize, i64, u32)> = Vec::with_capacity(points.len());
+        placed.extend((0..).zip(points).map(|(row, p)| {
+            let [x, y, z] = cell_of(p, inverse_cell);
+            (hash([x, y, 0], mask), z, row)
+        }));
+        placed.sort_unstable();
         let mut starts = vec![0u32; buckets + 1];
-        for p in points {
-            starts[bucket(p) + 1] += 1;
+        for &(bucket, ..) in &placed {
+            starts[bucket + 1] += 1;
         }
         for i in 0..buckets {
             starts[i + 1] += starts[i];
         }
-        let mut next = starts.clone();
-        let mut rows = vec![0u32; points.len()];
-        for (row, p) in points.iter().enumerate() {
-            let slot = &mut next[bucket(p)];
-            rows[*slot as usize] = row as u32;
-            *slot += 1;
-        }
-        Self { inverse_cell, mask, starts, rows }
+        Self { inverse_cell, mask, starts, points: placed.into_iter().map(|(_, z, row)| (z, row)).collect() }
     }
 
     #[inline]
@@ -42,12 +41,10 @@ impl Grid {
         let high = cell_of(&(place + reach), self.inverse_cell);
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let bucket = hash([x, y, z], self.mask);
-                    for &row in &self.rows[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-                        visit(row);
-                    }
-                }
+                let bucket = hash([x, y, 0], self.mask);
+                let column = &self.points[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
+                let first = column.partition_point(|&(z, _)| z < low[2]);
+                column[first..].iter().take_while(|&&(z, _)| z <= high[2]).for_each(|&(_, row)| visit(row));
             }
         }
     }
