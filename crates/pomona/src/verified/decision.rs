@@ -230,9 +230,10 @@ impl<'a> Search<'a> {
     fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Candidate], log: &mut Log) {
         log.grown += self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
-        let turns = FIRST_FRUITS.saturating_sub(log.seeds).div_ceil(self.query.len()) as u64;
-        if turns > 0 {
-            let more = of_every_fruit(self.query, 1, 2..2 + turns);
+        let (fruits, missing) = (self.query.len(), FIRST_FRUITS.saturating_sub(log.seeds));
+        if let Some(stride) = fruits.checked_div(missing) {
+            let (stride, turns) = (stride.max(1) as u64, missing.div_ceil(fruits) as u64);
+            let more = of_every_fruit(self.query, stride, 2..2 + turns);
             let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
             log.grown += self.grow_distinct(&more, findings);
         }
