@@ -87,12 +87,17 @@ fn candidates_of(
     if length < 6.0 * sigma {
         return effort;
     }
+    // Standard deviations that the two seeds may differ by.
+    let apart = match model.scale {
+        Scale::Metric => RADIUS * (length / (LONG * sigma)).clamp(1.0, WIDEST),
+        Scale::Free => RADIUS,
+    };
     let (mut runs, mut hits) = (Vec::new(), Vec::new());
     near_ties(&query.points, seed.0, 2.8 * sigma, &mut |quad, code| {
         effort.codes += 1;
         let (code, radius) = match model.scale {
-            Scale::Metric => (code, RADIUS * sigma),
-            Scale::Free => (without_scale(&code), RADIUS * sigma / length),
+            Scale::Metric => (code, apart * sigma),
+            Scale::Free => (without_scale(&code), apart * sigma / length),
         };
         hits.clear();
         index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
@@ -104,7 +109,7 @@ fn candidates_of(
         for &hit in &hits {
             let target = &index.quads[hit as usize];
             let Some((pose, residual)) = proposer.fit(target) else { continue };
-            if residual > MAX_RESIDUAL * model.sigma * model.sigma {
+            if residual > 2.0 * (apart * model.sigma).powi(2) {
                 continue;
             }
             let Some(pose) = proposer.upright(pose) else { continue };
@@ -118,14 +123,20 @@ fn candidates_of(
     effort
 }
 
-/// Reach of the code search in standard deviations of one axis; see the docs page for the share it finds.
+/// Reach of the code search in standard deviations of one axis.
+///
+/// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
 const RADIUS: f64 = 2.5;
+
+/// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many times.
+///
+/// They bend more between visits, and where the noise is larger than expected they are found still. It costs little where
+/// the length tells: a long seed has few lookalikes.
+const LONG: f64 = 24.0;
+const WIDEST: f64 = 2.0;
 
 /// Seeds whose code has more neighbours in the map than this are passed over.
 const COMMON: usize = 48;
-
-/// Residual sum of a seed's fit over sigma^2: 95 % of chi^2 with 12 - 6 degrees of freedom.
-const MAX_RESIDUAL: f64 = 12.6;
 
 /// One seed of every `stride`-th fruit for each of `turns`.
 pub(crate) fn of_every_fruit(query: &Landscape, stride: u64, turns: std::ops::Range<u64>) -> Vec<Seed> {
