@@ -5,8 +5,8 @@
 //! settled once more, in turns:
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
-//! 2. The noise and the share seen again come from distances, nobody said to be who ([`super::scatter`]).
-//! 3. Every pair gets its probability ([`super::association`]).
+//! 2. The noise and a first share seen again come from distances, nobody said to be who ([`super::scatter`]).
+//! 3. Every pair gets its probability ([`super::association`]); their sum says the share of the next turn.
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
@@ -39,6 +39,9 @@ const MAX_LEVERAGE: f64 = 0.8;
 /// Fruits with less probability of any partner say nothing to the fit.
 const LEAST_WEIGHT: f64 = 1e-3;
 
+/// Least and largest share of fruits seen again that is believed.
+const SHARES: (f64, f64) = (0.05, 0.97);
+
 /// The overlap as it stands in the end.
 pub(crate) struct Settled {
     pub(crate) overlap: Overlap,
@@ -60,7 +63,9 @@ struct Settlement<'a> {
     pose: Pose,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     sigma: f64,
+    /// Probability that a fruit which the map could have shown is there: by the distances, then by the pairs.
     share: f64,
+    counted: bool,
     /// Pairs that hold the patches, and their surroundings.
     holds: [f64; 2],
     /// Variance that neighbours' residuals about the patches share, square metres.
@@ -78,6 +83,7 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Sizes
         settlement.measure();
         let marginals = settlement.marginals(cue.as_ref());
         cue = sizes.and_then(|sizes| sizes.cue(marginals.links()));
+        settlement.recount(&marginals);
         settlement.refit(&marginals);
     }
     settlement.predict();
@@ -117,6 +123,7 @@ impl<'a> Settlement<'a> {
             pose: growth.pose,
             sigma: growth.sigma,
             share: 0.5,
+            counted: false,
             holds: [HOLD; 2],
             shared: growth.shared,
             targets: growth.partners.iter().map(|partner| partner.as_ref().map(target)).collect(),
@@ -169,7 +176,9 @@ impl<'a> Settlement<'a> {
     /// Noise and share from the distances; the predictions' variances follow.
     fn measure(&mut self) {
         let found = scatter(self.query, self.map, &self.predictions, self.pose.scale, self.expected);
-        self.share = found.share;
+        if !self.counted {
+            self.share = found.share;
+        }
         let both = self.predictions.iter().zip(&self.targets);
         let (sum, weights) = both
             .filter_map(|(prediction, target)| Some((prediction.as_ref()?.variance, (*target)?.1)))
@@ -179,6 +188,17 @@ impl<'a> Settlement<'a> {
             self.sigma *= stretch.sqrt();
             self.predictions.iter_mut().flatten().for_each(|prediction| prediction.variance *= stretch);
         }
+    }
+
+    /// The share as the pairs show it: a step of expectation and maximisation a turn, from what the distances say.
+    ///
+    /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err half as
+    /// much. All the way they would take too little where fruits crowd within the noise.
+    fn recount(&mut self, marginals: &Marginals) {
+        let due: f64 = self.predictions.iter().flatten().map(|at| self.map.support(&at.place)).sum();
+        let found: f64 = marginals.links().map(|link| link.probability).sum();
+        self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
+        self.counted = true;
     }
 
     fn marginals(&self, cue: Option<&Cue>) -> Marginals {
