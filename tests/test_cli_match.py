@@ -83,6 +83,15 @@ def verbs(group: object = None, path: tuple[str, ...] = ()) -> Iterator[tuple[st
         yield from verbs(command, (*path, name))
 
 
+def test_the_module_is_the_command() -> None:
+    by_name, by_module = (
+        subprocess.run([*command, "--version"], capture_output=True, text=True)
+        for command in ([POMONA], [sys.executable, "-m", "pomona"])
+    )
+    assert by_name.returncode == by_module.returncode == 0
+    assert by_name.stdout == by_module.stdout
+
+
 def test_help_of_every_verb_loads_nothing_heavy() -> None:
     program = """
 import contextlib, io, json, sys
