@@ -58,6 +58,14 @@ impl VerifiedConfig {
     pub(crate) fn threshold(&self, poses: f64) -> f64 {
         OFFSET + PER_POSE * poses.max(1.0).ln() - STRETCH * self.false_alarm_rate.ln()
     }
+
+    /// What the pairs of an answer must say together for "the same fruit", nats.
+    ///
+    /// They are settled without the evidence that found the pose: every fruit is predicted without its own partner. So
+    /// Markov's inequality holds as it stands, and no constant is needed.
+    pub(crate) fn least_told(&self, poses: f64) -> f64 {
+        poses.max(1.0).ln() - self.false_alarm_rate.ln()
+    }
 }
 
 /// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales; where the

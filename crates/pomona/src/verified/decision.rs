@@ -76,11 +76,13 @@ pub(super) struct Finding<'a> {
     pub(super) growth: Growth<'a>,
     pub(super) overlap: Overlap,
     pub(super) seed: Hypothesis,
+    /// Found by the outline, not by seeds.
+    outlined: bool,
 }
 
 impl<'a> Finding<'a> {
     pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
-        Self { overlap: growth.overlap(), growth, seed }
+        Self { overlap: growth.overlap(), growth, seed, outlined: false }
     }
 }
 
@@ -105,7 +107,9 @@ pub(crate) fn search(
     if let Some(best) = findings.first_mut().filter(|best| !best.growth.whole) {
         best.growth.reach_all();
     }
-    search.answer(findings, map, query, stages)
+    let outlined = findings.first().is_some_and(|best| best.outlined);
+    let answer = search.answer(findings, map, query, stages);
+    if outlined { answer } else { search.confirmed(answer) }
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
@@ -177,8 +181,24 @@ impl<'a> Search<'a> {
     }
 
     fn threshold(&self) -> f64 {
+        self.config.threshold(self.poses())
+    }
+
+    /// Poses that the two clouds offer.
+    fn poses(&self) -> f64 {
         let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
-        self.config.threshold(poses(self.query.len(), self.map.len(), self.model.scale, share))
+        poses(self.query.len(), self.map.len(), self.model.scale, share)
+    }
+
+    /// The answer, unless its pairs say too little: growth met every fruit with its own partner, settlement without it.
+    fn confirmed(&self, answer: Match) -> Match {
+        let told: f64 = answer.pairs.iter().map(|pair| pair.support.max(0.0)).sum();
+        let mut stages = answer.stages.clone();
+        stages.push(("settled_nats", told));
+        if answer.registration.is_some() && told < self.config.least_told(self.poses()) {
+            return Match::without_answer(Verdict::NoMatch, stages);
+        }
+        Match { stages, ..answer }
     }
 
     fn admits(&self, pose: &Pose) -> bool {
@@ -300,7 +320,7 @@ impl<'a> Search<'a> {
         } else {
             hold(self.query, self.map, &seed, &model)
         };
-        let mut finding = Finding::new(growth, seed);
+        let mut finding = Finding { outlined: true, ..Finding::new(growth, seed) };
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
         Some(finding)
     }
