@@ -55,27 +55,28 @@ impl VerifiedConfig {
     /// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
     /// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. The cells without overlap and the unrelated clouds of the
     /// benchmarks `cells` and `season` hold the three constants to account.
-    pub(crate) fn threshold(&self, poses: f64) -> f64 {
-        OFFSET + PER_POSE * poses.max(1.0).ln() - STRETCH * self.false_alarm_rate.ln()
+    ///
+    /// Where only a `share` of all turns is admitted, the probability is that share of it.
+    pub(crate) fn threshold(&self, poses: f64, share: f64) -> f64 {
+        OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - self.false_alarm_rate.ln())
     }
 
     /// What the pairs of an answer must say together for "the same fruit", nats.
     ///
     /// They are settled without the evidence that found the pose: every fruit is predicted without its own partner. So
     /// Markov's inequality holds as it stands, and no constant is needed.
-    pub(crate) fn least_told(&self, poses: f64) -> f64 {
-        poses.max(1.0).ln() - self.false_alarm_rate.ln()
+    pub(crate) fn least_told(&self, poses: f64, share: f64) -> f64 {
+        (poses * share).max(1.0).ln() - self.false_alarm_rate.ln()
     }
 }
 
-/// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales; where the
-/// vertical is known, with the `share` of all turns that keeps it.
-pub(crate) fn poses(n_query: usize, n_map: usize, scale: Scale, share: f64) -> f64 {
+/// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales.
+pub(crate) fn poses(n_query: usize, n_map: usize, scale: Scale) -> f64 {
     let scales = match scale {
         Scale::Metric => 1.0,
         Scale::Free => 100.0,
     };
-    n_query as f64 * n_map as f64 * scales * share
+    n_query as f64 * n_map as f64 * scales
 }
 
 /// Log-odds, in nats, that a single wrong pose reaches.
@@ -94,9 +95,10 @@ mod tests {
     #[test]
     fn more_poses_and_fewer_false_alarms_ask_for_more() {
         let config = VerifiedConfig::default();
-        assert!(config.threshold(1e5) > config.threshold(1e3));
+        assert!(config.threshold(1e5, 1.0) > config.threshold(1e3, 1.0));
         let strict = VerifiedConfig { false_alarm_rate: 1e-6, ..config };
-        assert!(strict.threshold(1e3) > config.threshold(1e3));
+        assert!(config.threshold(1e3, 0.01) < config.threshold(1e3, 1.0));
+        assert!(strict.threshold(1e3, 1.0) > config.threshold(1e3, 1.0));
     }
 
     #[test]

@@ -181,13 +181,14 @@ impl<'a> Search<'a> {
     }
 
     fn threshold(&self) -> f64 {
-        self.config.threshold(self.poses())
+        let (poses, share) = self.offered();
+        self.config.threshold(poses, share)
     }
 
-    /// Poses that the two clouds offer.
-    fn poses(&self) -> f64 {
+    /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
+    fn offered(&self) -> (f64, f64) {
         let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
-        poses(self.query.len(), self.map.len(), self.model.scale, share)
+        (poses(self.query.len(), self.map.len(), self.model.scale), share)
     }
 
     /// The answer, unless its pairs say too little: growth met every fruit with its own partner, settlement without it.
@@ -195,7 +196,8 @@ impl<'a> Search<'a> {
         let told: f64 = answer.pairs.iter().map(|pair| pair.support.max(0.0)).sum();
         let mut stages = answer.stages.clone();
         stages.push(("settled_nats", told));
-        if answer.registration.is_some() && told < self.config.least_told(self.poses()) {
+        let (poses, share) = self.offered();
+        if answer.registration.is_some() && told < self.config.least_told(poses, share) {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
         Match { stages, ..answer }
