@@ -1,10 +1,11 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::landscape::Landscape;
+use super::landscape::{Landscape, SHARE_OF_ROWS};
 use super::overlap::Prediction;
 use super::pose::Pose;
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Edges reach to `P(chi^2_3 > 14.8)` = 0.2 % of the noise, or as far as a branch may have moved for itself.
 const GATE: f64 = 3.85;
@@ -69,7 +70,7 @@ impl Marginals {
         predictions: &[Option<Prediction>],
         pose: &Pose,
         share: f64,
-        size: &impl Fn(u32, u32) -> f64,
+        size: &(impl Fn(u32, u32) -> f64 + Sync),
     ) -> Self {
         let edges = edges_of(query, map, predictions, pose, share, size);
         let probabilities = belief_propagation(&edges, query.len(), map.len());
@@ -112,13 +113,12 @@ fn edges_of(
     predictions: &[Option<Prediction>],
     pose: &Pose,
     share: f64,
-    size: &impl Fn(u32, u32) -> f64,
+    size: &(impl Fn(u32, u32) -> f64 + Sync),
 ) -> Vec<Edge> {
     let scale = pose.scale;
     let volume_scale = scale.powi(3);
-    let mut edges = Vec::new();
-    for (row, prediction) in predictions.iter().enumerate() {
-        let Some(Prediction { place, variance }) = *prediction else { continue };
+    let of = |row: usize, edges: &mut Vec<Edge>| {
+        let Some(Prediction { place, variance }) = predictions[row] else { return };
         let seen = (share * map.support(&place)).max(LEAST_SEEN);
         let first = edges.len();
         let own = query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
@@ -152,8 +152,16 @@ fn edges_of(
             }
         }
         edges.truncate(kept);
-    }
-    edges
+    };
+    let rows: Vec<usize> = (0..predictions.len()).collect();
+    let in_part = |rows: &[usize]| {
+        let mut edges = Vec::new();
+        for &row in rows {
+            of(row, &mut edges);
+        }
+        edges
+    };
+    rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(in_part).collect()
 }
 
 /// Squared Mahalanobis distance of a residual, and its density per cubic metre.

@@ -8,10 +8,8 @@ use super::cells::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
 use super::overlap::Prediction;
-use super::patches::SHARE_OF_CELLS;
 use super::pose::{Moments, Pose};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Edge of a cell in spacings of the query: some ten fruits.
 pub(super) const CELL: f64 = 2.5;
@@ -149,14 +147,12 @@ impl<'a> Growth<'a> {
 
     /// Reaches the neighbours of cells whose surroundings speak for the pose; returns whether any is new.
     fn spread(&mut self) -> bool {
-        let all = (0..self.cells.len()).into_par_iter().with_min_len(SHARE_OF_CELLS);
-        let sources: Vec<usize> = all.filter(|&i| self.convincing(i)).collect();
         let mut new = Vec::new();
-        for i in sources {
-            for &(other, closeness) in self.cells[i].around.iter() {
-                if closeness > 0.3 && !self.cells[other as usize].reached {
-                    new.push((other as usize, self.cells[i].pose));
-                }
+        for (i, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.reached) {
+            let beyond = |&&(other, closeness): &&(u32, f64)| closeness > 0.3 && !self.cells[other as usize].reached;
+            let mut beyond = cell.around.iter().filter(beyond).peekable();
+            if beyond.peek().is_some() && self.convincing(i) {
+                new.extend(beyond.map(|&(other, _)| (other as usize, cell.pose)));
             }
         }
         for &(i, pose) in &new {

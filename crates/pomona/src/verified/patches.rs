@@ -14,6 +14,7 @@ use super::sharing::{displacement, shared_by_neighbours};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::mem::take;
 
 /// A patch may differ from its surroundings as if this many pairs held it to them.
 pub(super) const HOLD: f64 = 2.0;
@@ -88,8 +89,7 @@ impl Growth<'_> {
         };
         let footings: Vec<Option<Footing>> = self.cells.iter().zip(&self.wide).map(footing).collect();
         let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
-        let at = |row: u32| {
-            let row = row as usize;
+        let at = |row: usize| {
             let cell = self.cut.cell_of[row] as usize;
             let footing = footings[cell]?;
             let p = self.query.points[row];
@@ -100,14 +100,14 @@ impl Growth<'_> {
             let variance = sigma2 * (1.0 + footing.looseness(&p)) + bent + unexplained;
             Some((place, Prediction { place: place + shift, variance }))
         };
-        let active = self.active();
-        let found: Vec<_> = active.par_iter().with_min_len(SHARE_OF_ROWS).map(|&row| at(row)).collect();
-        for (row, found) in active.into_iter().zip(found) {
-            self.predictions[row as usize] = found.map(|(_, prediction)| prediction);
-            if let Some((place, _)) = found {
-                self.patch_places[row as usize] = place;
+        let (mut predictions, mut places) = (take(&mut self.predictions), take(&mut self.patch_places));
+        let both = predictions.par_iter_mut().zip(&mut places).enumerate().with_min_len(SHARE_OF_ROWS);
+        both.for_each(|(row, (prediction, patch_place))| {
+            if let Some((place, found)) = at(row) {
+                (*patch_place, *prediction) = (place, Some(found));
             }
-        }
+        });
+        (self.predictions, self.patch_places) = (predictions, places);
     }
 
     /// Nearest partners of the predictions; of several claims on one fruit the likelier wins.

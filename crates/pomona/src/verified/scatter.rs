@@ -8,8 +8,10 @@
 //! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the true
 //! one where fruits crowd, so that the noise comes out small and the share large.
 
-use super::landscape::{Landscape, single};
+use super::landscape::{Landscape, SHARE_OF_ROWS, single};
 use super::overlap::Prediction;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is known of the noise beforehand, metres of the map.
 #[derive(Debug, Clone, Copy)]
@@ -93,33 +95,57 @@ pub(crate) fn scatter(
     Scatter { sigma: (logarithm / total).exp(), share: share / total }
 }
 
+/// What some of the fruits count.
+#[derive(Default)]
+struct Part {
+    across: [f64; BINS],
+    /// Companions of the fruits.
+    own: [f64; BINS],
+    fruits: f64,
+    due: f64,
+}
+
+impl Part {
+    fn add(mut self, other: &Self) -> Self {
+        for (sum, more) in self.across.iter_mut().zip(&other.across).chain(self.own.iter_mut().zip(&other.own)) {
+            *sum += more;
+        }
+        self.fruits += other.fruits;
+        self.due += other.due;
+        self
+    }
+
+    /// Companions of a fruit, by distance.
+    fn per_fruit(&self) -> [f64; BINS] {
+        self.own.map(|sum| sum / self.fruits.max(1.0))
+    }
+}
+
 impl Counts {
     fn new(query: &Landscape, map: &Landscape, predictions: &[Option<Prediction>], scale: f64) -> Self {
         let bin = BIN * map.spacing;
-        let mut counts = Self { bin, across: [0.0; BINS], companions: [0.0; BINS], due: 0.0 };
-        let mut met = vec![false; map.len()];
-        let mut here = [0.0; BINS];
-        let mut fruits = 0.0;
-        for (row, prediction) in predictions.iter().enumerate() {
-            let Some(Prediction { place, .. }) = prediction else { continue };
-            counts.due += map.support(place);
-            fruits += 1.0;
+        let met: Vec<AtomicBool> = (0..map.len()).map(|_| AtomicBool::new(false)).collect();
+        let here = in_parts(query.len(), |row, part| {
+            let Some(Prediction { place, .. }) = &predictions[row] else { return };
+            part.fruits += 1.0;
+            part.due += map.support(place);
             map.tree.within(&single(place), (BINS as f64 * bin) as f32, |partner, d2| {
-                met[partner as usize] = true;
-                add(&mut counts.across, f64::from(d2).sqrt() / bin);
+                met[partner as usize].store(true, Ordering::Relaxed);
+                add(&mut part.across, f64::from(d2).sqrt() / bin);
             });
-            count_companions(query, row, scale / bin, &mut here);
+            count_companions(query, row, scale / bin, &mut part.own);
+        });
+        let there = in_parts(map.len(), |row, part| {
+            if met[row].load(Ordering::Relaxed) {
+                part.fruits += 1.0;
+                count_companions(map, row, 1.0 / bin, &mut part.own);
+            }
+        });
+        let mut companions = here.per_fruit();
+        for (sum, there) in companions.iter_mut().zip(there.per_fruit()) {
+            *sum = here.due * 0.5 * (*sum + there) + LEAST;
         }
-        let mut there = [0.0; BINS];
-        let mut others = 0.0;
-        for row in (0..map.len()).filter(|&row| met[row]) {
-            others += 1.0;
-            count_companions(map, row, 1.0 / bin, &mut there);
-        }
-        for ((sum, here), there) in counts.companions.iter_mut().zip(here).zip(there) {
-            *sum = counts.due * 0.5 * (here / f64::max(fruits, 1.0) + there / f64::max(others, 1.0)) + LEAST;
-        }
-        counts
+        Self { bin, across: here.across, companions, due: here.due }
     }
 
     /// Log-likelihood of the counts under the noise, and the share that suits it.
@@ -156,6 +182,17 @@ impl Counts {
 
 /// Companions in a bin at the least, so that no distance is impossible.
 const LEAST: f64 = 0.1;
+
+/// What all rows count, the parts summed in the order of the rows.
+fn in_parts(rows: usize, count: impl Fn(usize, &mut Part) + Sync) -> Part {
+    let part = |first: usize| {
+        let mut part = Part::default();
+        (first..rows.min(first + SHARE_OF_ROWS)).for_each(|row| count(row, &mut part));
+        part
+    };
+    let parts: Vec<Part> = (0..rows).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
+    parts.iter().fold(Part::default(), Part::add)
+}
 
 fn add(bins: &mut [f64; BINS], place: f64) {
     if let Some(bin) = bins.get_mut(place as usize) {
