@@ -236,4 +236,23 @@ mod tests {
             prop_assert_eq!(found, (0..codes.len() as u32).filter(near).collect::<Vec<_>>());
         }
     }
+
+    #[test]
+    fn equal_codes_are_found_each_once() {
+        let [here, there] = [[0.5, 0.2, -0.1, 0.3, 0.0, 0.4], [0.5, 0.2, -0.1, 0.3, 0.0, 0.6]];
+        for count in [1, LANES, LANES + 1, 300] {
+            for codes in [vec![here; count], [vec![here; count], vec![there; count]].concat()] {
+                let (grid, order) = CodeGrid::new(codes.len(), |row| codes[row]);
+                let found = |code: &Code, radius: f32| {
+                    let mut found = Vec::new();
+                    grid.within(code, radius, &mut Vec::new(), |place| found.push(order[place as usize]));
+                    found.sort_unstable();
+                    found
+                };
+                assert_eq!(found(&here, 0.1), (0..count as u32).collect::<Vec<_>>());
+                assert_eq!(found(&here, 0.3), (0..codes.len() as u32).collect::<Vec<_>>());
+                assert!(found(&[0.9; NUMBERS], 0.1).is_empty());
+            }
+        }
+    }
 }

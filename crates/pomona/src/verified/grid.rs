@@ -158,3 +158,25 @@ impl Support {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_point_within_the_gate_is_visited(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64).prop_map(Vector3::from), 0..100),
+            place in prop::array::uniform3(-1.5..1.5f64).prop_map(Vector3::from),
+            cell in 0.05..1.0f64,
+            gate in 0.0..1.5f64,
+        ) {
+            let mut visited = vec![false; points.len()];
+            Grid::new(&points, cell).near(&place, gate, |row| visited[row as usize] = true);
+            for (p, visited) in points.iter().zip(visited) {
+                prop_assert!((p - place).norm() > gate || visited);
+            }
+        }
+    }
+}

@@ -235,3 +235,28 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_nearest_equals_brute_force_at_gates_of_both_lists_and_beyond(
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 2..120),
+            place in prop::array::uniform3(-1.2..1.2f64).prop_map(Vector3::from),
+            gates in (0.0..REACHES[0], REACHES[0]..REACHES[1], REACHES[1]..3.0),
+        ) {
+            let cloud = FruitCloud::from_positions(points.into_iter().map(Into::into).collect());
+            let landscape = Landscape::new(&cloud);
+            let apart = |row: u32| (landscape.points[row as usize] - place).norm_squared();
+            for gate in [gates.0, gates.1, gates.2].map(|gate| gate * landscape.spacing) {
+                let within = (0..landscape.len() as u32).map(apart).filter(|&d2| d2 <= gate * gate);
+                let found = landscape.nearest(&place, gate);
+                prop_assert_eq!(found.map(|(_, d2)| d2), within.min_by(f64::total_cmp));
+                prop_assert_eq!(found.map(|(row, _)| apart(row)), found.map(|(_, d2)| d2));
+            }
+        }
+    }
+}

@@ -18,6 +18,8 @@ mod chance;
 mod codes;
 mod decision;
 mod doubts;
+#[cfg(test)]
+mod fixture;
 mod grid;
 mod growth;
 mod hypothesis;

@@ -121,3 +121,62 @@ impl<'a> Proposer<'a> {
 
 /// Likelihood ratio of the fruits beside the seed at which a first look ends: 2.5 nats against the pose.
 const HOPELESS: f64 = 0.082_085;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::FruitCloud;
+    use crate::verified::fixture::visits;
+    use crate::verified::seeds::longest;
+    use nalgebra::Point3;
+
+    fn model(scale: Scale) -> Model {
+        Model { sigma: 0.02, detection: 0.6, scale, vertical: None }
+    }
+
+    /// The row of the map that shows the fruit in `row` of the query, where both show the same cloud.
+    fn shown(query: &Landscape, map: &Landscape, row: u32) -> u32 {
+        let fruit = query.rows[row as usize];
+        map.rows.iter().position(|&other| other == fruit).expect("both show all fruits") as u32
+    }
+
+    #[test]
+    fn the_fit_of_a_moved_seed_is_exact() {
+        let (cloud, _) = visits(0.02);
+        let query = Landscape::new(&cloud);
+        let turn = Rotation3::new(Vector3::new(0.7, -1.9, 0.4));
+        for (model, scale) in [(model(Scale::Metric), 1.0), (model(Scale::Free), 1.3)] {
+            let moved = |p: &Point3<f64>| Point3::from(turn * p.coords * scale + Vector3::new(3.0, -1.0, 2.0));
+            let map = Landscape::new(&FruitCloud::from_positions(cloud.positions.iter().map(moved).collect()));
+            for (quad, _) in longest(&query, 50) {
+                let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
+                let (pose, residual) = proposer.fit(&quad.map(|row| shown(&query, &map, row))).expect("nor its image");
+                assert!(residual < 1e-18, "{residual}");
+                assert!((pose.rotation - turn.matrix()).norm() < 1e-9 && (pose.scale - scale).abs() < 1e-9);
+                for (row, p) in (0..).zip(&query.points) {
+                    let place = map.points[shown(&query, &map, row) as usize];
+                    assert!((pose.apply(p) - place).norm() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_first_look_prefers_the_true_pose_to_a_turned_one() {
+        let (query, map) = visits(0.02);
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let model = model(Scale::Metric);
+        let truth = Pose { translation: query.centre - map.centre, ..Pose::identity() };
+        let mut looks = Vec::new();
+        for (quad, _) in longest(&query, 200) {
+            let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
+            for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                let turned = truth.turned(&proposer.centroid, &Rotation3::new(axis * 0.5));
+                looks.push([truth, turned].map(|pose| proposer.first_look(&pose)));
+            }
+        }
+        // Where the fruits next to a seed are hidden, neither pose is looked at to its end.
+        let preferred = looks.iter().filter(|[truth, turned]| truth > turned).count();
+        assert!(10 * preferred >= 9 * looks.len(), "{preferred} of {}", looks.len());
+    }
+}

@@ -265,6 +265,8 @@ pub(crate) const REACH: f64 = 3.5;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verified::fixture::{Dice, visits};
+    use nalgebra::Rotation3;
 
     #[test]
     fn ranks_walk_through_all_triples_once() {
@@ -273,5 +275,30 @@ mod tests {
         triples.sort_unstable();
         triples.dedup();
         assert_eq!(triples.len(), 120);
+    }
+
+    #[test]
+    fn turned_starts_reach_the_true_pose_from_fifteen_degrees() {
+        let (query, map) = visits(0.02);
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: 0.6, scale: Scale::Metric, vertical: None };
+        let truth = Pose { translation: query.centre - map.centre, ..Pose::identity() };
+        let mut dice = Dice(11);
+        let (mut straight_reached, mut turned_reached) = (0, 0);
+        for i in 0..20 {
+            let place = query.points[i * query.len() / 20];
+            let pose = truth.turned(&place, &Rotation3::new(dice.normal().normalize() * 0.26));
+            let candidate = Candidate { pose, log_odds: 0.0, place, key: ([0; 4], [0; 4]) };
+            let [straight, turned] = [Starts::Straight, Starts::Turned]
+                .map(|starts| refined(&query, &map, &[candidate], &model, starts).pop());
+            let reached =
+                |one: &Option<Hypothesis>| one.is_some_and(|one| one.pose.turn_to(&truth) < 5f64.to_radians());
+            straight_reached += u32::from(reached(&straight));
+            turned_reached += u32::from(reached(&turned));
+            let evidence = |one: Option<Hypothesis>| one.map_or(f64::NEG_INFINITY, |one| one.log_odds);
+            assert!(evidence(turned) >= evidence(straight));
+        }
+        assert!(turned_reached >= 17, "{turned_reached} of 20");
+        assert!(turned_reached > straight_reached, "{straight_reached} without turning");
     }
 }

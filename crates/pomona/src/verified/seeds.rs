@@ -233,6 +233,7 @@ pub(crate) fn shuffled(key: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::cloud::FruitCloud;
+    use crate::verified::fixture::visits;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -294,5 +295,33 @@ mod tests {
         let mirrored = points.map(|p| Vector3::new(p.x, p.y, -p.z));
         let [here, there] = [points, mirrored].map(|p| canonical(&p, [0, 1, 2, 3]).expect("not collinear").1);
         assert!((here[5] + there[5]).abs() < 1e-6 && here[5].abs() > 0.1);
+    }
+
+    #[test]
+    fn no_seed_left_out_is_longer_than_one_taken() {
+        let landscape = Landscape::new(&visits(0.02).0);
+        let lengths = |seeds: Vec<Seed>| {
+            let mut lengths: Vec<f32> = seeds.iter().map(|seed| seed.1[0]).collect();
+            lengths.sort_unstable_by(|a, b| b.total_cmp(a));
+            lengths
+        };
+        let all = lengths(enumerate(&landscape, 0.0));
+        for count in [0, 1, 1000, all.len()] {
+            assert_eq!(lengths(longest(&landscape, count)), all[..count]);
+        }
+        assert_eq!(longest(&landscape, all.len() + 1).len(), all.len());
+    }
+
+    #[test]
+    fn the_longest_seeds_do_not_depend_on_the_order_of_the_input() {
+        let (cloud, _) = visits(0.02);
+        let mut permuted = cloud.clone();
+        permuted.positions.sort_unstable_by_key(|p| shuffled(p.x.to_bits()));
+        let [here, there] = [cloud, permuted].map(|cloud| {
+            let landscape = Landscape::new(&cloud);
+            let fruit = |row: u32| cloud.positions[landscape.rows[row as usize] as usize];
+            longest(&landscape, 1000).iter().map(|seed| seed.0.map(fruit)).collect::<Vec<_>>()
+        });
+        assert_eq!(here, there);
     }
 }

@@ -67,4 +67,17 @@ mod tests {
         assert!(up.straightened(&fallen, &middle, 0.01).is_none());
         assert!(up.admits(&leaning) && !up.admits(&fallen));
     }
+
+    #[test]
+    fn a_pose_that_does_not_lean_is_kept_exactly() {
+        let up = Vertical::new([Vector3::z(); 2]);
+        let middle = Vector3::new(0.4, -0.2, 1.0);
+        let pose = Pose::identity().turned(&middle, &Rotation3::new(Vector3::z() * 0.7));
+        assert_eq!(up.straightened(&pose, &middle, 0.1), Some(pose));
+    }
+
+    #[test]
+    fn the_share_of_turns_is_a_cap_of_ten_degrees() {
+        assert!((Vertical::share_of_turns() - 0.0076).abs() < 1e-4);
+    }
 }
