@@ -203,7 +203,8 @@ def match(
     noise_m
         Standard deviation per axis of the difference of the two visits; None: estimated.
     up
-        The vertical in the query's and in the map's frame, where it is known.
+        The vertical in the query's and in the map's frame, where it is known to some 5 degrees; a pose that leans by
+        more than 10 is refused.
     per_frame
         Give each frame of the query a transform of its own and merge their pairs (paper only). The query must know
         which frame saw which fruit.

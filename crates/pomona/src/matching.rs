@@ -40,7 +40,8 @@ pub struct Request {
     pub scale: Scale,
     /// Relative noise of the two visits per axis, standard deviation in metres; estimated where `None`.
     pub noise_m: Option<f64>,
-    /// The vertical in both clouds' frames, query then map; need not be of unit length. The paper's method does not use it.
+    /// The vertical in both clouds' frames, query then map, true to some 5 degrees; need not be of unit length. The paper's
+    /// method does not use it.
     pub up: Option<[Vector3<f64>; 2]>,
     /// One transform for each frame of the query, their pairs merged (paper only); or one for the whole cloud.
     pub per_frame: bool,
@@ -170,7 +171,8 @@ impl MapIndex {
 impl MapIndex {
     /// Pairs of `query` and the map under `pose`, which is known: the final stage of the verified method alone.
     ///
-    /// The verdict is always `Found`; the registration is the given pose refined on the pairs.
+    /// The verdict is `Found`, or `TooFew` where there is next to nothing to pair; the registration is the given pose
+    /// refined on the pairs.
     ///
     /// # Errors
     /// A cloud or a value that is wrong; an index of another method.

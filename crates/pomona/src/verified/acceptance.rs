@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct VerifiedConfig {
     /// Probability that two clouds without a common fruit are given an answer.
     pub false_alarm_rate: f64,
-    /// Seeds tried per fruit of the query before the answer is "no match".
+    /// Seeds per fruit of the query, the longest of them all, that are tried before the answer is "no match"; twice as
+    /// many where the vertical is known. The short rounds before come on top.
     pub seeds_per_fruit: u64,
     /// Least probability of a reported pair.
     pub min_probability: f64,
@@ -20,9 +21,10 @@ pub struct VerifiedConfig {
 impl Default for VerifiedConfig {
     fn default() -> Self {
         Self {
-            // Three in ten thousand: a dozen fruits on one tree can still be told (METHOD: few fruits sit at the limit).
+            // Three in ten thousand: a dozen fruits on one tree, at the limit of the evidence, can still be told.
             false_alarm_rate: 3e-4,
-            // The longest of some 68 sets each: with one shared tree of five and 45 % hidden, ten true ones are among them.
+            // The longest of some 68 sets each: with one shared tree of five and 45 % hidden, ten true ones are among
+            // them.
             seeds_per_fruit: 32,
             // A wrong pair costs a third of what a right one is worth.
             min_probability: 0.25,
@@ -53,8 +55,8 @@ impl VerifiedConfig {
     ///
     /// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six or
     /// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
-    /// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. The cells without overlap and the unrelated clouds of the
-    /// benchmarks `cells` and `season` hold the three constants to account.
+    /// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. The cells without overlap and the unrelated clouds
+    /// of the benchmarks `cells` and `season` hold the three constants to account.
     ///
     /// Where only a `share` of all turns is admitted, the probability is that share of it.
     pub(crate) fn threshold(&self, poses: f64, share: f64) -> f64 {
@@ -63,8 +65,8 @@ impl VerifiedConfig {
 
     /// What the pairs of an answer must say together for "the same fruit", nats.
     ///
-    /// They are settled without the evidence that found the pose: every fruit is predicted without its own partner. So
-    /// Markov's inequality holds as it stands, and no constant is needed.
+    /// They are settled with every fruit predicted without its own partner, so that no fit stretches their tail:
+    /// Markov's inequality is taken as it stands.
     pub(crate) fn least_told(&self, poses: f64, share: f64) -> f64 {
         (poses * share).max(1.0).ln() - self.false_alarm_rate.ln()
     }

@@ -9,11 +9,13 @@ use crate::cloud::FruitCloud;
 use crate::matching::{Match, Pair, Registration, Verdict};
 
 impl Search<'_> {
+    /// The best finding settled; `NoMatch` where its pairs say less than `least_told`, nats.
     pub(super) fn answer(
         &self,
         mut findings: Vec<Finding>,
         map: &FruitCloud,
         query: &FruitCloud,
+        least_told: Option<f64>,
         mut stages: Stages,
     ) -> Match {
         if findings.is_empty() {
@@ -22,6 +24,13 @@ impl Search<'_> {
         let best = findings.remove(0);
         let sizes = Sizes::new(query, map, self.query, self.map);
         let Settled { overlap, marginals } = settle(&best.growth, self.noise_m, sizes.as_ref());
+        if let Some(least) = least_told {
+            let told = marginals.told();
+            stages.extend([("settled_threshold_nats", least), ("settled_nats", told)]);
+            if told < least {
+                return Match::without_answer(Verdict::NoMatch, stages);
+            }
+        }
         let overlap = Overlap { log_odds: best.overlap.log_odds, ..overlap };
         let rivals: Vec<Registration> = findings
             .iter()

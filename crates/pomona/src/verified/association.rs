@@ -85,6 +85,12 @@ impl Marginals {
         })
     }
 
+    /// What the pairs say together for "the same fruit", nats: their log-odds where these are in favour, as far as each
+    /// is believed.
+    pub(crate) fn told(&self) -> f64 {
+        self.edges.iter().zip(&self.probabilities).map(|(edge, &p)| p * edge.ratio.ln().max(0.0)).sum()
+    }
+
     /// The one-to-one pairs that gain most expected right answers.
     pub(crate) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Association> {
         let both = || self.edges.iter().zip(&self.probabilities);
@@ -167,8 +173,8 @@ fn edges_of(
 /// Squared Mahalanobis distance of a residual, and its density per cubic metre.
 ///
 /// The residuals of all pairs say how large the noise is, the fruits' own covariances which way it points: stereo
-/// centroids are long along the viewing ray. `uncertain` is the sum of the two covariances; a tenth of the variance stays
-/// isotropic, for what the recording does not know of (sag, growth).
+/// centroids are long along the viewing ray. `uncertain` is the sum of the two covariances; a tenth of the variance
+/// stays isotropic, for what the recording does not know of (sag, growth).
 fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
     // Density by the squared Mahalanobis distance, times the product of the three standard deviations.
     let tailed = |d2: f64| {

@@ -8,7 +8,7 @@ use super::landscape::Landscape;
 use super::outline;
 use super::overlap::Overlap;
 use super::pose::Pose;
-use super::search::{Candidate, Effort, Starts, of_every_fruit, round};
+use super::search::{Candidate, Effort, Starts, of_some_fruits, round};
 use super::seeds::{self, Seed, SeedIndex};
 use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
@@ -34,10 +34,11 @@ const SHARP: f64 = 0.18;
 const ROUNDS: [(usize, Starts); 4] =
     [(32, Starts::Straight), (32, Starts::Straight), (48, Starts::Turned), (64, Starts::Turned)];
 
-/// Share of the longest seeds that the third round tries.
+/// One in so many of the longest seeds is tried in the third round.
 const THIRD_ROUND: usize = 5;
 
-/// Fruits whose seeds make the first round, and seeds at the least before an answer stands alone: where the visits overlap well, few are enough in a cloud of any size.
+/// Fruits whose seeds make the first round, at the most: where the visits overlap well, few are enough in a cloud of
+/// any size. Also the seeds that are tried at the least before an answer stands alone.
 const FIRST_FRUITS: usize = 256;
 
 /// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
@@ -108,8 +109,8 @@ pub(crate) fn search(
         best.growth.reach_all();
     }
     let outlined = findings.first().is_some_and(|best| best.outlined);
-    let answer = search.answer(findings, map, query, stages);
-    if outlined { answer } else { search.confirmed(answer) }
+    let least_told = (!outlined).then(|| search.least_told());
+    search.answer(findings, map, query, least_told, stages)
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
@@ -121,6 +122,9 @@ pub(crate) fn pairs_under(
     request: &Request,
     config: &VerifiedConfig,
 ) -> Match {
+    if query.is_empty() || map.len() < MIN_FRUITS {
+        return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
+    }
     let landscape = Landscape::new(query);
     let search = Search::new(prepared, &landscape, request, config);
     let pose = Pose::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
@@ -129,7 +133,7 @@ pub(crate) fn pairs_under(
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
     let model = Model { sigma, ..search.model };
     let growth = hold(search.query, search.map, &seed, &model);
-    search.answer(vec![Finding::new(growth, seed)], map, query, Vec::new())
+    search.answer(vec![Finding::new(growth, seed)], map, query, None, Vec::new())
 }
 
 pub(super) struct Search<'a> {
@@ -191,19 +195,13 @@ impl<'a> Search<'a> {
         (poses(self.query.len(), self.map.len(), self.model.scale), share)
     }
 
-    /// The answer, unless its pairs say too little: growth met every fruit with its own partner, settlement without it.
-    fn confirmed(&self, answer: Match) -> Match {
-        let told: f64 = answer.pairs.iter().map(|pair| pair.support.max(0.0)).sum();
-        let mut stages = answer.stages.clone();
-        stages.push(("settled_nats", told));
+    /// What the settled pairs of a pose that seeds found must say together.
+    fn least_told(&self) -> f64 {
         let (poses, share) = self.offered();
-        if answer.registration.is_some() && told < self.config.least_told(poses, share) {
-            return Match::without_answer(Verdict::NoMatch, stages);
-        }
-        Match { stages, ..answer }
+        self.config.least_told(poses, share)
     }
 
-    fn admits(&self, pose: &Pose) -> bool {
+    pub(super) fn admits(&self, pose: &Pose) -> bool {
         self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
@@ -220,11 +218,12 @@ impl<'a> Search<'a> {
             self.keep_accepted(&mut findings);
             if !findings.is_empty() {
                 self.doubt(&mut findings, &rest, &mut log);
+                log.best = findings.iter().map(|finding| finding.overlap.log_odds).fold(log.best, f64::max);
                 break;
             }
             // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
             let outline = (index == 1).then(|| self.by_outline()).flatten();
-            findings.extend(outline.filter(|found| self.turns_are_fixed(found)));
+            findings.extend(outline.filter(|found| self.admits(&found.overlap.pose) && self.turns_are_fixed(found)));
             if !findings.is_empty() {
                 break;
             }
@@ -237,11 +236,12 @@ impl<'a> Search<'a> {
     /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
     fn seeds_of(&self, round: usize, longest: &mut Vec<Seed>) -> Vec<Seed> {
         match round {
-            0 => of_every_fruit(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
-            1 => of_every_fruit(self.query, 1, 1..2),
+            0 => of_some_fruits(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
+            1 => of_some_fruits(self.query, 1, 1..2),
             2 => {
-                let each = self.config.seeds_per_fruit * self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS);
-                *longest = seeds::longest(self.query, (each * self.query.len() as u64).max(FEW_SEEDS) as usize);
+                let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
+                let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
+                *longest = seeds::longest(self.query, usize::try_from(count).unwrap_or(usize::MAX));
                 longest.split_off(longest.len() - longest.len() / THIRD_ROUND)
             }
             _ => std::mem::take(longest),
@@ -252,10 +252,10 @@ impl<'a> Search<'a> {
     fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Candidate], log: &mut Log) {
         log.grown += self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
-        let (fruits, missing) = (self.query.len(), FIRST_FRUITS.saturating_sub(log.seeds));
-        if let Some(stride) = fruits.checked_div(missing) {
-            let (stride, turns) = (stride.max(1) as u64, missing.div_ceil(fruits) as u64);
-            let more = of_every_fruit(self.query, stride, 2..2 + turns);
+        if log.seeds < FIRST_FRUITS {
+            let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
+            let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
+            let more = of_some_fruits(self.query, stride, 2..2 + turns);
             let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
             log.grown += self.grow_distinct(&more, findings);
         }

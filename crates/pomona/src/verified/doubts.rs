@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
                 .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
             let Some(seed) = best else { return };
             let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
-            if better.overlap.log_odds < finding.overlap.log_odds + 0.5 {
+            if better.overlap.log_odds < finding.overlap.log_odds + 0.5 || !self.admits(&better.overlap.pose) {
                 return;
             }
             *finding = better;

@@ -55,11 +55,12 @@ pub(super) fn cell_of(p: &Vector3<f64>, inverse_cell: f64) -> [i64; 3] {
     [p.x, p.y, p.z].map(|x| floor(x * inverse_cell))
 }
 
-/// By truncation: not every processor has an instruction that rounds down, and a call costs more than the rest of a look.
+/// By truncation: not every processor has an instruction that rounds down, and a call costs more than the rest of a
+/// look.
 #[inline]
 fn floor(x: f64) -> i64 {
     let truncated = x as i64;
-    truncated - i64::from(truncated as f64 > x)
+    truncated.saturating_sub(i64::from(truncated as f64 > x))
 }
 
 #[inline]
@@ -91,7 +92,8 @@ fn key(cell: [i64; 3]) -> [i32; 3] {
 
 type Mixing = std::hash::BuildHasherDefault<CellHasher>;
 
-/// Hashes a cell by the mixing of the grid: cells are no attack surface, and the answer must not change from run to run.
+/// Hashes a cell by the mixing of the grid: cells are no attack surface, and the answer must not change from run to
+/// run.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CellHasher(u64);
 

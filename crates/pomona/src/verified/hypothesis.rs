@@ -18,7 +18,8 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    /// Likelihood ratio of a fruit at squared distance `d2` from a map fruit being that fruit, against chance at `density`.
+    /// Likelihood ratio of a fruit at squared distance `d2` from a map fruit being that fruit, against chance at
+    /// `density`.
     ///
     /// 1 - p + p N(d; 0, `variance`) / density: missing costs 1 - p, agreement gains what the Gaussian exceeds the
     /// fruits that chance puts there (Lang et al. 2010, eq. for the foreground-background odds).
@@ -41,8 +42,8 @@ pub(crate) fn gaussian(d2: f64, variance: f64) -> f64 {
     NORM / (variance * variance.sqrt()) * (-0.5 * d2 / variance).exp()
 }
 
-/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of every
-/// factor.
+/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of
+/// every factor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Evidence {
     product: f64,

@@ -71,7 +71,9 @@ impl Landscape {
                 near.get(5).or(near.last()).map(|&other| (points[other as usize] - points[row]).norm())
             })
             .collect();
-        let spacing = median(&mut sixth).max(f64::MIN_POSITIVE);
+        // Fruits on one spot have no spacing; cells must not become finer than the coordinates.
+        let extent = points.iter().fold(0.0f64, |far, p| far.max(p.amax()));
+        let spacing = median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE);
         // Six neighbours within the spacing: their density, were fruits spread evenly.
         let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
         let floor = 0.1 * typical;

@@ -54,8 +54,8 @@ pub(crate) fn hypothesis(
 
 /// The pose moved along each of the axes, and turned about each, either way, so that fruits move by `distance`.
 ///
-/// In a hedge, a pergola or the skin of a round crown fruits hang denser than the width of a branch tells, and layer laid
-/// on layer gains anywhere. But it gains nearly as much a little aside, along the layer; fruits on fruits do not.
+/// In a hedge, a pergola or the skin of a round crown fruits hang denser than the width of a branch tells, and layer
+/// laid on layer gains anywhere. But it gains nearly as much a little aside, along the layer; fruits on fruits do not.
 fn beside(query: &Landscape, pose: &Pose, axes: &Matrix3<f64>, distance: f64) -> impl Iterator<Item = Pose> {
     let directed = (0..3).flat_map(|i| [1.0, -1.0].map(|sign| axes.column(i) * sign));
     directed.flat_map(move |axis| {
@@ -79,8 +79,8 @@ pub(crate) fn threshold(query: &Landscape) -> f64 {
 
 /// Share of the threshold by which the evidence exceeds the best beside it.
 ///
-/// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over disjoint
-/// rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
+/// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over
+/// disjoint rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
 const OUTSTANDING: f64 = 0.85;
 
 /// Principal axes as a proper rotation, and the root-mean-square extent.

@@ -19,7 +19,7 @@ use std::mem::take;
 /// A patch may differ from its surroundings as if this many pairs held it to them.
 pub(super) const HOLD: f64 = 2.0;
 
-/// Share of the distance by which a crown may have bent between visits (METHOD: alpha = 1-3 %).
+/// Share of the distance by which a crown may have bent between visits; recordings show 1 to 3 %.
 pub(super) const DRIFT: f64 = 0.02;
 
 /// Cells of a patch's own fit, by their weight (see [`super::cells`]): those next to it.

@@ -48,8 +48,8 @@ impl<'a> Proposer<'a> {
 
     /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
     ///
-    /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does the
-    /// rest (see [`Pose`]'s step): the inertia is the same for all candidates.
+    /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does
+    /// the rest (see [`Pose`]'s step): the inertia is the same for all candidates.
     #[inline]
     pub(crate) fn fit(&self, target: &Quad) -> Option<(Pose, f64)> {
         let axes = Matrix3::from_columns(&frame(&self.map.points, target)?);
@@ -75,12 +75,13 @@ impl<'a> Proposer<'a> {
     #[inline]
     pub(crate) fn upright(&self, pose: Pose) -> Option<Pose> {
         let Some(vertical) = self.model.vertical else { return Some(pose) };
-        let variance = self.model.sigma * self.model.sigma * self.inverse_inertia.trace() / 3.0;
+        // The noise is in metres of the map, the inertia in those of the query.
+        let sigma = self.model.sigma / pose.scale;
+        let variance = sigma * sigma * self.inverse_inertia.trace() / 3.0;
         vertical.straightened(&pose, &self.centroid, variance)
     }
 
     /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
-    ///
     #[inline]
     pub(crate) fn first_look(&self, pose: &Pose) -> f64 {
         // Likelihood ratios are multiplied: one logarithm in the end costs less than one a fruit.

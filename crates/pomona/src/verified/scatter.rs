@@ -5,8 +5,8 @@
 //! which hang as each visit shows them around its own fruits. The second is known, so the first is what is left:
 //!
 //! `H(d) = u (p f(d; sigma) + b g(d))`, f Maxwell's distribution, g the companions of a fruit, u the fruits that the
-//! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the true
-//! one where fruits crowd, so that the noise comes out small and the share large.
+//! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
+//! true one where fruits crowd, so that the noise comes out small and the share large.
 
 use super::landscape::{Landscape, SHARE_OF_ROWS, single};
 use super::overlap::Prediction;

@@ -15,7 +15,7 @@ pub(crate) struct Candidate {
     pub(crate) pose: Pose,
     pub(crate) log_odds: f64,
     pub(crate) place: Vector3<f64>,
-    /// Query fruit and the rows of the seeds: a total order for equal evidence.
+    /// Rows of both seeds: an order for equal evidence.
     key: (Quad, Quad),
 }
 
@@ -128,10 +128,11 @@ fn candidates_of(
 /// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
 const RADIUS: f64 = 2.5;
 
-/// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many times.
+/// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many
+/// times.
 ///
-/// They bend more between visits, and where the noise is larger than expected they are found still. It costs little where
-/// the length tells: a long seed has few lookalikes.
+/// They bend more between visits, and where the noise is larger than expected they are found still. It costs little
+/// where the length tells: a long seed has few lookalikes.
 const LONG: f64 = 24.0;
 const WIDEST: f64 = 2.0;
 
@@ -139,7 +140,7 @@ const WIDEST: f64 = 2.0;
 const COMMON: usize = 48;
 
 /// One seed of every `stride`-th fruit for each of `turns`.
-pub(crate) fn of_every_fruit(query: &Landscape, stride: u64, turns: std::ops::Range<u64>) -> Vec<Seed> {
+pub(crate) fn of_some_fruits(query: &Landscape, stride: u64, turns: std::ops::Range<u64>) -> Vec<Seed> {
     (0..query.len() as u32)
         .filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride))
         .flat_map(|row| turns.clone().filter_map(move |turn| seed_of(query, row, turn)))
@@ -212,8 +213,8 @@ pub(crate) enum Starts {
 
 /// Turns about each axis that a refinement tries, radians.
 ///
-/// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet their
-/// neighbours' partners, and the refinement can stay there.
+/// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet
+/// their neighbours' partners, and the refinement can stay there.
 const TURNS: [f64; 2] = [-0.2, 0.2];
 
 /// Share of the reach on which turned starts are compared.

@@ -2,7 +2,7 @@
 //!
 //! The verified method needs a seed only to propose a pose; whether the pose holds is decided by the fruits around
 //! it. Four fruits survive occlusion far more often than five (0.55^4 against 0.55^5 at 45 %), and verification is
-//! cheap enough to sort out the additional false candidates (METHOD: what beats it, 1 and 2).
+//! cheap enough to sort out the additional false candidates.
 
 use super::codes::CodeGrid;
 use super::landscape::{Landscape, SHARE_OF_ROWS};
@@ -88,7 +88,7 @@ fn code(points: &[Vector3<f64>], quad: Quad) -> Option<Code> {
     Some([ab.dot(&e1), ac.dot(&e1), ac.dot(&e2), ad.dot(&e1), ad.dot(&e2), ad.dot(&e3)].map(|x| x as f32))
 }
 
-/// Every other labeling that noise of `margin` metres could have made canonical.
+/// Every labeling that noise of `margin` metres could have made canonical, the given one among them.
 pub(crate) fn near_ties(points: &[Vector3<f64>], quad: Quad, margin: f64, emit: &mut impl FnMut(Quad, Code)) {
     let p = |i: usize| points[quad[i] as usize];
     let longest = (p(1) - p(0)).norm();
@@ -149,8 +149,7 @@ pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
 
 /// The `count` seeds with the longest |AB|, in a fixed order.
 ///
-/// Long seeds fix their pose best and have the fewest lookalikes; how often a seed is seen again hardly depends on its
-/// length (docs page).
+/// Long seeds fix their pose best and have the fewest lookalikes.
 pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
     let mut seeds = enumerate(landscape, 0.0);
     if count < seeds.len() {

@@ -192,8 +192,8 @@ impl<'a> Settlement<'a> {
 
     /// The share as the pairs show it: a step of expectation and maximisation a turn, from what the distances say.
     ///
-    /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err half as
-    /// much. All the way they would take too little where fruits crowd within the noise.
+    /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
+    /// less. All the way they would take too little where fruits crowd within the noise.
     fn recount(&mut self, marginals: &Marginals) {
         let due: f64 = self.predictions.iter().flatten().map(|at| self.map.support(&at.place)).sum();
         let found: f64 = marginals.links().map(|link| link.probability).sum();
@@ -241,7 +241,8 @@ impl<'a> Settlement<'a> {
         }
     }
 
-    /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that together.
+    /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that
+    /// together.
     fn hold(&self, (least, most): (f64, f64)) -> f64 {
         let shared = shared_by_neighbours(self.query, |row| self.residual(row));
         (self.sigma * self.sigma / shared.max(f64::MIN_POSITIVE)).clamp(least, most)

@@ -118,8 +118,8 @@ fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-/// Appends the subtree over `rows`, the first of which is at `start` of the whole. Splits at the median of the widest axis;
-/// leaves take their range as it is.
+/// Appends the subtree over `rows`, the first of which is at `start` of the whole. Splits at the median of the widest
+/// axis; leaves take their range as it is.
 fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
     let at = nodes.len();
     nodes.push(Node { split: 0.0, axis: 0, right: 0, start: start as u32, end: (start + rows.len()) as u32 });

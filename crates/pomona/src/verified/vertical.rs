@@ -35,8 +35,8 @@ impl Vertical {
         (pose.rotation * self.query).dot(&self.map).clamp(-1.0, 1.0).acos()
     }
 
-    /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the vertical is
-    /// surer than the pose; `None` where the two contradict each other.
+    /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the
+    /// vertical is surer than the pose; `None` where the two contradict each other.
     pub(crate) fn straightened(&self, pose: &Pose, middle: &Vector3<f64>, variance: f64) -> Option<Pose> {
         let (lean, both) = (self.lean(pose), variance + LEAN_RAD * LEAN_RAD);
         if lean > GATE * both.sqrt() {

@@ -1,7 +1,7 @@
 //! The nearest fruit to a place, by one look at a list.
 //!
-//! Poses are weighed by asking, again and again, which fruit of the map is nearest to a place. A place's cell has a list of
-//! all fruits that can be within reach of any place in it, so that no neighbouring cell is asked.
+//! Poses are weighed by asking, again and again, which fruit of the map is nearest to a place. A place's cell has a
+//! list of all fruits that can be within reach of any place in it, so that no neighbouring cell is asked.
 
 use super::grid::{cell_of, hash};
 use nalgebra::Vector3;
