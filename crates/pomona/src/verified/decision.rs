@@ -109,8 +109,16 @@ pub(crate) fn search(
         best.growth.reach_all();
     }
     let outlined = findings.first().is_some_and(|best| best.outlined);
-    let least_told = (!outlined).then(|| search.least_told());
-    search.answer(findings, map, query, least_told, stages)
+    if outlined {
+        return search.answer(findings, map, query, None, stages);
+    }
+    let answer = search.answer(findings, map, query, Some(search.least_told()), stages);
+    // Where the noise is heavy, pairs say little even under the true pose: then the outline may still tell.
+    let unconfirmed = answer.verdict == Verdict::NoMatch && answer.stages.iter().any(|stage| stage.0 == "settled_nats");
+    match unconfirmed.then(|| search.by_outline()).flatten() {
+        Some(found) => search.answer(vec![found], map, query, None, answer.stages),
+        None => answer,
+    }
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
@@ -223,7 +231,7 @@ impl<'a> Search<'a> {
             }
             // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
             let outline = (index == 1).then(|| self.by_outline()).flatten();
-            findings.extend(outline.filter(|found| self.admits(&found.overlap.pose) && self.turns_are_fixed(found)));
+            findings.extend(outline);
             if !findings.is_empty() {
                 break;
             }
@@ -324,6 +332,6 @@ impl<'a> Search<'a> {
         };
         let mut finding = Finding { outlined: true, ..Finding::new(growth, seed) };
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
-        Some(finding)
+        Some(finding).filter(|found| self.admits(&found.overlap.pose) && self.turns_are_fixed(found))
     }
 }
