@@ -25,7 +25,7 @@ pub(crate) const MAX_FRUITS: usize = 300_000;
 const SEED_SIGMA: f64 = 0.075;
 
 /// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
-const DETECTION: f64 = 0.55;
+pub(super) const DETECTION: f64 = 0.55;
 
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
 const SHARP: f64 = 0.18;

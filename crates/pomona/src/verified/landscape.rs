@@ -42,7 +42,7 @@ pub(crate) struct Landscape {
     pub(crate) crowding: Vec<f64>,
     /// Floor of the density: a tenth of what the typical spacing gives.
     pub(crate) floor: f64,
-    pub(crate) tree: Tree<3>,
+    pub(crate) tree: Tree,
     /// Cells that growth goes by, once it is asked for.
     cut: OnceLock<Cut>,
     companions: Companions,
@@ -200,7 +200,7 @@ pub(super) struct Neighbours {
 }
 
 impl Neighbours {
-    fn new(points: &[[f32; 3]], tree: &Tree<3>) -> Self {
+    fn new(points: &[[f32; 3]], tree: &Tree) -> Self {
         let each = NEIGHBOURS.min(points.len().saturating_sub(1));
         let mut rows = vec![0; points.len() * each];
         if each > 0 {

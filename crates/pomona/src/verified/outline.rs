@@ -4,6 +4,7 @@
 //! trees still have the same extent. The principal axes give the pose up to half-turns; annealed least squares, from
 //! the width of a branch down to the noise, decides between them.
 
+use super::decision::DETECTION;
 use super::hypothesis::{Hypothesis, gaussian};
 use super::landscape::Landscape;
 use super::pose::{Moments, Pose};
@@ -166,6 +167,3 @@ const SCREENING: f64 = 0.25;
 
 /// Width in spacings of the crowns' structure that chance may share.
 const WIDE: f64 = 0.9;
-
-/// Share of fruits expected to be seen again while poses are compared.
-const DETECTION: f64 = 0.55;

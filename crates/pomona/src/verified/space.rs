@@ -1,11 +1,11 @@
-//! Exact neighbour search among points of a few dimensions: a balanced k-d tree with bucket leaves.
+//! Exact neighbour search among points in space: a balanced k-d tree with bucket leaves.
 
-/// A k-d tree over points of `D` single-precision coordinates.
+/// A k-d tree over points in single precision.
 ///
 /// Leaves hold up to [`LEAF`] points in the order of the tree, so that a leaf is scanned in one sweep.
 #[derive(Debug, Clone)]
-pub(crate) struct Tree<const D: usize> {
-    points: Vec<[f32; D]>,
+pub(crate) struct Tree {
+    points: Vec<[f32; 3]>,
     /// Row in the caller's order of each point in the tree's order.
     rows: Vec<u32>,
     nodes: Vec<Node>,
@@ -23,9 +23,9 @@ struct Node {
 
 const LEAF: usize = 12;
 
-impl<const D: usize> Tree<D> {
+impl Tree {
     /// Builds the tree; the order of `points` decides the rows that queries return.
-    pub(crate) fn new(points: &[[f32; D]]) -> Self {
+    pub(crate) fn new(points: &[[f32; 3]]) -> Self {
         let mut rows: Vec<u32> = (0..points.len() as u32).collect();
         let mut nodes = Vec::with_capacity(4 * points.len() / LEAF + 1);
         if !points.is_empty() {
@@ -35,7 +35,7 @@ impl<const D: usize> Tree<D> {
     }
 
     /// Calls `visit(row, squared distance)` for every point within `radius`, in the order of the tree.
-    pub(crate) fn within(&self, centre: &[f32; D], radius: f32, mut visit: impl FnMut(u32, f32)) {
+    pub(crate) fn within(&self, centre: &[f32; 3], radius: f32, mut visit: impl FnMut(u32, f32)) {
         if self.nodes.is_empty() {
             return;
         }
@@ -68,7 +68,7 @@ impl<const D: usize> Tree<D> {
     }
 
     /// The `count` nearest points, nearest first, ties by row: `(row, squared distance)`.
-    pub(crate) fn nearest(&self, centre: &[f32; D], count: usize, found: &mut Vec<(u32, f32)>) {
+    pub(crate) fn nearest(&self, centre: &[f32; 3], count: usize, found: &mut Vec<(u32, f32)>) {
         found.clear();
         if self.nodes.is_empty() || count == 0 {
             return;
@@ -109,9 +109,9 @@ impl<const D: usize> Tree<D> {
 }
 
 #[inline]
-fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     let mut sum = 0.0;
-    for d in 0..D {
+    for d in 0..3 {
         let difference = a[d] - b[d];
         sum += difference * difference;
     }
@@ -120,20 +120,20 @@ fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
 
 /// Appends the subtree over `rows`, the first of which is at `start` of the whole. Splits at the median of the widest
 /// axis; leaves take their range as it is.
-fn build<const D: usize>(points: &[[f32; D]], rows: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
+fn build(points: &[[f32; 3]], rows: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
     let at = nodes.len();
     nodes.push(Node { split: 0.0, axis: 0, right: 0, start: start as u32, end: (start + rows.len()) as u32 });
     if rows.len() <= LEAF {
         return;
     }
-    let (mut low, mut high) = ([f32::INFINITY; D], [f32::NEG_INFINITY; D]);
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for &row in rows.iter() {
-        for d in 0..D {
+        for d in 0..3 {
             low[d] = low[d].min(points[row as usize][d]);
             high[d] = high[d].max(points[row as usize][d]);
         }
     }
-    let axis = (0..D).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
+    let axis = (0..3).max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0);
     if high[axis] <= low[axis] {
         return; // all in one place: a leaf of any size is still exact
     }
