@@ -113,12 +113,9 @@ impl PyMapIndex {
         let method: Method = parse("method", method)?;
         let scale: Scale = parse("scale", scale)?;
         let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-        let pool = threads
-            .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
-            .transpose()
-            .map_err(wrong)?;
+        let pool = threads.map(pool_of).transpose()?;
         let cloud = map.to_cloud()?;
-        let build = || MapIndex::new(cloud, method, scale, config);
+        let build = || MapIndex::new(&cloud, method, scale, config);
         let built = py.detach(|| match &pool {
             Some(pool) => pool.install(build),
             None => build(),
@@ -161,6 +158,15 @@ impl PyMapIndex {
         let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
         py.detach(|| self.index.pairs_under(&cloud, &pose, noise_m)).map(PyMatch).map_err(wrong)
     }
+}
+
+/// Threads of their own, at most as many as the machine has cores: more would only wait for each other.
+fn pool_of(threads: usize) -> PyResult<rayon::ThreadPool> {
+    if threads == 0 {
+        return Err(wrong("threads: found 0, expected at least 1"));
+    }
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    rayon::ThreadPoolBuilder::new().num_threads(threads.min(cores)).build().map_err(wrong)
 }
 
 /// A name of an enumeration, spelled as in the configuration.

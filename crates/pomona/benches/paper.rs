@@ -72,7 +72,7 @@ fn base_pair(bencher: Bencher) {
 #[divan::bench]
 fn frame_of_40_fruits(bencher: Bencher) {
     let scene = base();
-    let index = MapIndex::new(scene.map.clone(), Method::Paper, Scale::Metric, Config::default()).expect("valid");
+    let index = MapIndex::new(&scene.map, Method::Paper, Scale::Metric, Config::default()).expect("valid");
     let tree = Index::new(scene.query.positions.iter().map(|p| [p.x, p.y, p.z]).collect());
     let rows: Vec<_> = tree.nearest_few(&tree.points()[100], 40).iter().map(|n| n.row).collect();
     let frame = scene.query.select(&rows);

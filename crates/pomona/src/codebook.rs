@@ -1,11 +1,12 @@
 //! The map as codes: which constellation of the map looks most like one of the query, and what it votes for.
 
 use crate::constellation::constellations;
-use crate::descriptor::describe_all;
+use crate::descriptor::{Described, describe_all};
 use crate::index::Index;
 use crate::voting::Votes;
 use nalgebra::Point3;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::fmt::Debug;
 
 /// What one view of the query casts.
@@ -19,7 +20,7 @@ pub struct Ballot {
 
 /// Constellations of a map behind their codes, whatever their size.
 pub trait Codebook: Debug + Send + Sync {
-    /// Constellations of the map that are not degenerate.
+    /// Constellations of the map that are not degenerate, one of each code.
     fn len(&self) -> usize;
 
     /// Whether the map has no constellation.
@@ -57,8 +58,11 @@ struct CodebookOf<const K: usize, const D: usize> {
 
 impl<const K: usize, const D: usize> CodebookOf<K, D> {
     fn new(positions: &[Point3<f64>], n: usize) -> Self {
-        let described = describe_all::<K, D>(positions, &constellations::<K>(positions, n));
-        Self { n, members: described.members, codes: Index::new(described.codes) }
+        let Described { mut members, mut codes } = describe_all::<K, D>(positions, &constellations::<K>(positions, n));
+        let first = first_of_each_code(&codes);
+        retain(&mut members, &first);
+        retain(&mut codes, &first);
+        Self { n, members, codes: Index::new(codes) }
     }
 
     /// The constellations of a view as ascending rows of the whole query.
@@ -104,6 +108,23 @@ impl<const K: usize, const D: usize> Codebook for CodebookOf<K, D> {
             |set: &[u32; K]| row_of_set.binary_search_by_key(set, |entry| entry.0).ok().map(|at| row_of_set[at].1);
         sets.par_iter().map(|sets| ballot(&mut sets.iter().filter_map(find))).collect()
     }
+}
+
+/// Codes that differ by less are one: rounding makes such differences, noise makes far larger ones.
+const SAME_CODE: f64 = 1e-7;
+
+/// For every code, whether it is the first of its kind.
+///
+/// Of equally near codes the first is the answer. A lattice has as many equal codes as cells, and a search would have to
+/// look at all of them, time and again.
+fn first_of_each_code<const D: usize>(codes: &[[f64; D]]) -> Vec<bool> {
+    let mut known = HashSet::with_capacity(codes.len());
+    codes.iter().map(|code| known.insert(code.map(|x| (x / SAME_CODE).round() as i64))).collect()
+}
+
+fn retain<T>(rows: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    rows.retain(|_| kept.next().is_some_and(|&is_kept| is_kept));
 }
 
 fn sorted<const K: usize>(mut set: [u32; K]) -> [u32; K] {

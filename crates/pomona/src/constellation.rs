@@ -157,6 +157,12 @@ mod tests {
     }
 
     #[test]
+    fn coordinates_may_be_as_large_as_numbers_are() {
+        let points: Vec<_> = (0..12).map(|i| Point3::new(1e300 * f64::from(i), 1e-300, f64::from(i * i))).collect();
+        assert_eq!(constellations::<5>(&points[..11], 10).len(), 462);
+    }
+
+    #[test]
     fn fruits_in_one_place_are_sets_too() {
         let points = vec![Point3::new(1.0, 2.0, 3.0); 14];
         assert!(constellations::<5>(&points, 10).iter().all(|set| set.is_sorted_by(|a, b| a < b)));

@@ -56,7 +56,8 @@ pub fn describe<const K: usize, const D: usize>(
     let along: [f64; K] = std::array::from_fn(|i| (points[i] - points[a]).dot(&e1) * per_length);
     let across: [Vector3<f64>; K] = std::array::from_fn(|i| (points[i] - points[a]) * per_length - e1 * along[i]);
     let (c, radius_squared) = farthest(&across, a, b);
-    if radius_squared < MIN_RADIUS * MIN_RADIUS {
+    // Not a number where coordinates are beyond what can be squared.
+    if radius_squared.is_nan() || radius_squared < MIN_RADIUS * MIN_RADIUS {
         return Err(Degenerate::Collinear);
     }
     let radius = radius_squared.sqrt();

@@ -2,8 +2,8 @@
 //!
 //! A balanced k-d tree, sixteen children to a node and up to sixteen points to a leaf ([`LANES`]). Nodes keep the tight
 //! boxes of their children and leaves their points coordinate by coordinate, so that one pass of vector instructions
-//! measures all sixteen. Boxes and leaves are stored in single precision, about the middle of the points; every candidate
-//! that survives is measured again in double precision. The bound that prunes is widened by the largest possible rounding
+//! measures all sixteen. Boxes and leaves are stored in single precision, about the middle of the points and over their
+//! reach; every candidate that survives is measured again in double precision. The bound that prunes is widened by the largest possible rounding
 //! error, so the answer is exact. Of equal distances the smaller row wins, which makes the answer independent of the order
 //! of the search.
 
@@ -17,6 +17,11 @@ const SPLITS: u32 = LANES.ilog2();
 const PARALLEL_BUILD: usize = 4096;
 /// Queries answered in one piece of work.
 const QUERIES_PER_TASK: usize = 512;
+
+/// Points nearer to each other than this are one place; its inverse is finite.
+const LEAST_REACH: f64 = 1e-300;
+/// Coordinates of a query, in reaches, whose squares still add up.
+const FARTHEST: f32 = 1e18;
 
 /// A row of the index and its Euclidean distance from the query.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +45,8 @@ pub struct Index<const D: usize> {
     /// Where each level starts in `nodes`.
     levels: Vec<usize>,
     middle: [f64; D],
-    /// Largest distance of a coordinate from the middle.
-    reach: f64,
+    /// One over the largest distance of a coordinate from the middle: stored coordinates are -1 to 1, whatever the unit.
+    per_reach: f64,
 }
 
 /// Boxes of the children of a node; absent children have boxes at infinity.
@@ -167,6 +172,8 @@ impl Keep for KeepNearestFew {
 struct Probe<'a, const D: usize> {
     exact: &'a [f64; D],
     rounded: [f32; D],
+    /// Of the index: from its distances to those of the tree.
+    per_reach: f64,
     /// Largest error of a distance between this query and a point or box, see [`Index::probe`].
     slack: f64,
 }
@@ -175,7 +182,7 @@ impl<const D: usize> Probe<'_, D> {
     /// A single-precision bound that no rounding error lets a kept point exceed.
     fn widen(&self, limit_squared: f64) -> f32 {
         let relative = 1.0 + D as f64 * f64::from(f32::EPSILON);
-        let widened = (limit_squared.sqrt() + self.slack) * relative;
+        let widened = (limit_squared.sqrt() * self.per_reach + self.slack) * relative;
         (widened * widened * relative) as f32
     }
 }
@@ -190,12 +197,13 @@ impl<const D: usize> Index<D> {
         assert!(points.len() < 1 << 31, "2^31 points or more");
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
         let (low, high) = extent(&points, &order);
-        let middle: [f64; D] = std::array::from_fn(|d| 0.5 * (low[d] + high[d]));
-        let reach = (0..D).map(|d| 0.5 * (high[d] - low[d])).fold(0.0, f64::max);
+        let middle: [f64; D] = std::array::from_fn(|d| 0.5 * low[d] + 0.5 * high[d]);
+        let reach = (0..D).map(|d| 0.5 * high[d] - 0.5 * low[d]).fold(0.0, f64::max);
+        let per_reach = if reach > LEAST_REACH { 1.0 / reach } else { 1.0 };
         let splits = points.len().div_ceil(LANES).next_power_of_two().ilog2();
         split(&points, &mut order, splits);
         let (rows, leaves, nodes, levels) = Default::default();
-        let mut index = Self { points, rows, leaves, nodes, levels, middle, reach };
+        let mut index = Self { points, rows, leaves, nodes, levels, middle, per_reach };
         index.fill_leaves(&order, splits);
         index.fill_nodes(splits);
         index
@@ -260,15 +268,17 @@ impl<const D: usize> Index<D> {
     }
 
     fn round(&self, point: &[f64; D]) -> [f32; D] {
-        std::array::from_fn(|d| (point[d] - self.middle[d]) as f32)
+        // A query beyond the range only seems nearer than it is, which prunes less.
+        std::array::from_fn(|d| (((point[d] - self.middle[d]) * self.per_reach) as f32).clamp(-FARTHEST, FARTHEST))
     }
 
-    /// Rounding moves a coordinate of query or point by half an ulp of at most `reach` or the query's own, and their
-    /// difference by as much again: four ulps per coordinate cover it.
+    /// Rounding moves a coordinate of query or point by half an ulp of at most 1 or the query's own, and their difference
+    /// by as much again: four ulps per coordinate cover it.
     fn probe<'a>(&self, query: &'a [f64; D]) -> Probe<'a, D> {
         let rounded = self.round(query);
-        let largest = rounded.iter().fold(self.reach, |largest, x| largest.max(f64::from(x.abs())));
-        Probe { exact: query, rounded, slack: 4.0 * largest * f64::from(f32::EPSILON) * (D as f64).sqrt() }
+        let largest = rounded.iter().fold(1.0, |largest, x| f64::max(largest, f64::from(x.abs())));
+        let slack = 4.0 * largest * f64::from(f32::EPSILON) * (D as f64).sqrt();
+        Probe { exact: query, rounded, per_reach: self.per_reach, slack }
     }
 
     /// The nearest point; `None` where nothing is indexed.

@@ -14,6 +14,7 @@ pub mod clique;
 pub mod cloud;
 pub mod codebook;
 pub mod completion;
+mod conditioning;
 pub mod config;
 pub mod constellation;
 pub mod descriptor;

@@ -1,6 +1,7 @@
 //! The facade: which fruit of the query is which fruit of the map.
 
 use crate::cloud::FruitCloud;
+use crate::conditioning::Conditioned;
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
@@ -99,7 +100,7 @@ impl Match {
 /// A map made ready for many queries.
 #[derive(Debug)]
 pub struct MapIndex {
-    map: FruitCloud,
+    map: Conditioned,
     config: Config,
     method: Method,
     scale: Scale,
@@ -119,14 +120,16 @@ impl MapIndex {
     ///
     /// # Errors
     /// A cloud or a setting that is wrong.
-    pub fn new(map: FruitCloud, method: Method, scale: Scale, config: Config) -> Result<Self> {
+    pub fn new(map: &FruitCloud, method: Method, scale: Scale, config: Config) -> Result<Self> {
         map.validate()?;
         config.validate()?;
+        let map = Conditioned::new(map, scale);
+        let fruits = &map.cloud;
         let prepared = match method {
-            Method::Verified if map.len() > crate::verified::MAX_FRUITS => return Err(too_many(map.len())),
-            Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(&map, scale))),
-            Method::Paper if map.len() < config.constellation.k => Prepared::TooFew,
-            Method::Paper => Prepared::Paper(Box::new(crate::paper::Prepared::new(&map.positions, &config)?)),
+            Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => return Err(too_many(fruits.len())),
+            Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(fruits, scale))),
+            Method::Paper if fruits.len() < config.constellation.k => Prepared::TooFew,
+            Method::Paper => Prepared::Paper(Box::new(crate::paper::Prepared::new(&fruits.positions, &config)?)),
         };
         Ok(Self { map, config, method, scale, prepared })
     }
@@ -152,19 +155,37 @@ impl MapIndex {
     fn answer(&self, query: &FruitCloud, request: &Request) -> Result<Match> {
         query.validate()?;
         request.validate()?;
+        let query = Conditioned::new(query, self.scale);
+        let request = Request { noise_m: request.noise_m.map(|noise_m| self.map.length(noise_m)), ..*request };
+        let found = self.found(&query, &request)?;
+        Ok(self.restored(&query, found))
+    }
+
+    /// The answer between the conditioned clouds.
+    fn found(&self, query: &Conditioned, request: &Request) -> Result<Match> {
+        let fruits = &query.cloud;
         match &self.prepared {
-            Prepared::Paper(map) if query.len() >= self.config.constellation.k => {
-                map.search(query, request, &self.config)
+            Prepared::Verified(_) if fruits.len() > crate::verified::MAX_FRUITS => Err(too_many(fruits.len())),
+            _ if !self.map.is_comparable(query) => Ok(Match::without_answer(Verdict::NoMatch, Vec::new())),
+            Prepared::Paper(map) if fruits.len() >= self.config.constellation.k => {
+                map.search(fruits, request, &self.config)
             }
             Prepared::Paper(_) | Prepared::TooFew => {
-                let stages = vec![("query fruits", query.len() as f64), ("map fruits", self.map.len() as f64)];
+                let stages = vec![("query fruits", fruits.len() as f64), ("map fruits", self.map.cloud.len() as f64)];
                 Ok(Match::without_answer(Verdict::TooFew, stages))
             }
-            Prepared::Verified(_) if query.len() > crate::verified::MAX_FRUITS => Err(too_many(query.len())),
             Prepared::Verified(prepared) => {
-                Ok(crate::verified::search(prepared, &self.map, query, request, &self.config.verified))
+                Ok(crate::verified::search(prepared, &self.map.cloud, fruits, request, &self.config.verified))
             }
         }
+    }
+
+    /// An answer between the conditioned clouds as the caller knows them, and what took no part.
+    fn restored(&self, query: &Conditioned, found: Match) -> Match {
+        let mut found = self.map.restored(query, found);
+        let left_out = [("query_left_out", query.left_out()), ("map_left_out", self.map.left_out())];
+        found.stages.extend(left_out.into_iter().filter(|side| side.1 > 0).map(|(name, count)| (name, count as f64)));
+        found
     }
 }
 
@@ -184,7 +205,12 @@ impl MapIndex {
             let reason = "pairs under a known pose need an index of the verified method".to_owned();
             return Err(Error::Setting { name: "method", reason });
         };
-        Ok(crate::verified::pairs_under(prepared, &self.map, query, pose, &request, &self.config.verified))
+        let query = Conditioned::new(query, self.scale);
+        let pose = self.map.conditioned_pose(&query, pose);
+        let request = Request { noise_m: noise_m.map(|noise_m| self.map.length(noise_m)), ..request };
+        let config = &self.config.verified;
+        let found = crate::verified::pairs_under(prepared, &self.map.cloud, &query.cloud, &pose, &request, config);
+        Ok(self.restored(&query, found))
     }
 }
 
@@ -218,5 +244,5 @@ impl Request {
 /// # Errors
 /// A cloud or a setting that is wrong. That there is no match is no error.
 pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, config: &Config) -> Result<Match> {
-    MapIndex::new(map.clone(), request.method, request.scale, *config)?.answer(query, request)
+    MapIndex::new(map, request.method, request.scale, *config)?.answer(query, request)
 }

@@ -58,6 +58,16 @@ proptest! {
         let queries: Vec<_> = queries.iter().map(moved).collect();
         check(&all, &queries, 0.01);
     }
+
+    #[test]
+    fn of_any_magnitude(all in points::<3>(100), queries in points::<3>(10), power in -150.0..307.0f64, far in 0.0..307.0f64) {
+        let scaled = |p: &[f64; 3]| p.map(|x| x * 10f64.powf(power));
+        let mut all: Vec<_> = all.iter().map(scaled).collect();
+        let queries: Vec<_> = queries.iter().map(scaled).collect();
+        check(&all, &queries, 10f64.powf(power));
+        all.push([10f64.powf(far), -10f64.powf(far), 0.0]);
+        check(&all, &queries, 10f64.powf(power));
+    }
 }
 
 #[test]

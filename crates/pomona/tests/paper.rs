@@ -178,13 +178,25 @@ fn too_few_is_a_result() {
 }
 
 #[test]
-fn fruits_in_a_line_or_in_one_place_are_no_match() {
+fn fruits_in_a_line_are_no_match_and_in_one_place_too_few() {
     let line: Vec<_> = (0..30).map(|i| Point3::new(0.1 * f64::from(i), 0.0, 0.0)).collect();
     let place = vec![Point3::new(1.0, 2.0, 3.0); 30];
-    for positions in [line, place] {
+    for (positions, verdict) in [(line, Verdict::NoMatch), (place, Verdict::TooFew)] {
         let cloud = FruitCloud::from_positions(positions);
-        assert_eq!(solve(&cloud, &cloud).verdict, Verdict::NoMatch);
+        assert_eq!(solve(&cloud, &cloud).verdict, verdict);
     }
+}
+
+#[test]
+fn a_lattice_whose_constellations_look_alike_is_searched_in_the_time_of_others() {
+    let place = |i: u32| Point3::new(f64::from(i % 60), f64::from(i / 60), 0.0) * 0.2;
+    let lattice = FruitCloud::from_positions((0..3600).map(place).collect());
+    let index = MapIndex::new(&lattice, Method::Paper, Scale::Metric, Config::default()).expect("valid input");
+    let found = index.search(&lattice, None, None).expect("valid input");
+    let stages: std::collections::BTreeMap<_, _> = found.stages.iter().copied().collect();
+    // Half a million sets, of a few hundred shapes.
+    assert!(stages["query constellations"] > 400_000.0);
+    assert!(stages["map constellations"] < 20_000.0, "{}", stages["map constellations"]);
 }
 
 #[test]
@@ -193,7 +205,7 @@ fn every_size_of_constellation_works() {
     for (k, n) in [(4, 8), (5, 10), (6, 8), (7, 8)] {
         let mut config = Config::default();
         (config.constellation.k, config.constellation.n) = (k, n);
-        let index = MapIndex::new(scene.map.clone(), Method::Paper, Scale::Metric, config).expect("valid input");
+        let index = MapIndex::new(&scene.map, Method::Paper, Scale::Metric, config).expect("valid input");
         let found = index.search(&scene.query, None, None).expect("valid input");
         let (precision, recall) = precision_recall(&found, &scene);
         assert!(precision > 0.95 && recall > 0.95, "k {k}: precision {precision}, recall {recall}");
@@ -202,7 +214,9 @@ fn every_size_of_constellation_works() {
 
 #[test]
 fn more_constellations_than_memory_are_refused() {
-    let many = FruitCloud::from_positions((0..2_000_000).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect());
-    let error = MapIndex::new(many, Method::Paper, Scale::Metric, Config::default()).unwrap_err().to_string();
+    let many = FruitCloud::from_positions(
+        (0..2_000_000).map(|i| Point3::new(f64::from(i % 1000), f64::from(i / 1000), 0.0)).collect(),
+    );
+    let error = MapIndex::new(&many, Method::Paper, Scale::Metric, Config::default()).unwrap_err().to_string();
     assert!(error.contains("2000000 fruits of the map give up to 420000000 constellations"), "{error}");
 }

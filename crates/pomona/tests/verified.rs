@@ -218,14 +218,12 @@ fn covariances_say_which_way_the_noise_points() {
             *p += depth * (0.08 * random.normal());
         }
         let pose = scene.map_from_query;
-        let index =
-            MapIndex::new(scene.map.clone(), Method::Verified, Scale::Metric, Config::default()).expect("valid");
+        let index = MapIndex::new(&scene.map, Method::Verified, Scale::Metric, Config::default()).expect("valid");
         without += score(&scene, &index.pairs_under(&scene.query, &pose, Some(0.05)).expect("valid")).0;
         let across = Matrix3::identity() * 1e-4;
         scene.query.covariances = Some(vec![across + depth * depth.transpose() * 0.0064; scene.query.len()]);
         scene.map.covariances = Some(vec![across; scene.map.len()]);
-        let index =
-            MapIndex::new(scene.map.clone(), Method::Verified, Scale::Metric, Config::default()).expect("valid");
+        let index = MapIndex::new(&scene.map, Method::Verified, Scale::Metric, Config::default()).expect("valid");
         with += score(&scene, &index.pairs_under(&scene.query, &pose, Some(0.05)).expect("valid")).0;
     }
     assert!(with as f64 > 1.05 * without as f64, "{with} right pairs with covariances, {without} without");
@@ -234,7 +232,7 @@ fn covariances_say_which_way_the_noise_points() {
 #[test]
 fn pairs_under_a_known_pose_need_the_verified_method() {
     let scene = visits(12, 1, 0.2, 0.01);
-    let index = MapIndex::new(scene.map.clone(), Method::Paper, Scale::Metric, Config::default()).expect("valid");
+    let index = MapIndex::new(&scene.map, Method::Paper, Scale::Metric, Config::default()).expect("valid");
     let error = index.pairs_under(&scene.query, &scene.map_from_query, None).expect_err("the paper has no such stage");
     assert!(error.to_string().contains("verified"));
 }

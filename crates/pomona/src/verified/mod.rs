@@ -41,3 +41,5 @@ mod vicinity;
 
 pub use acceptance::VerifiedConfig;
 pub(crate) use decision::{MAX_FRUITS, Prepared, pairs_under, search};
+pub(crate) use grid::CellHasher;
+pub(crate) use landscape::median;

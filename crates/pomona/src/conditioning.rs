@@ -1,0 +1,280 @@
+//! A cloud as the methods see it: every fruit once, no strays, about its own middle, in one unit where the scale is free.
+//!
+//! A match must not depend on where the origin of a cloud lies, in which unit a reconstruction came, on a row that is
+//! there twice or on one that lies a thousand kilometres away. So both clouds are conditioned before any method sees
+//! them, and the answer is put back into the caller's rows, frames and units:
+//!
+//! 1. Fruits at exactly one place are one fruit; the first row stands for all.
+//! 2. The spacing is the median, over a sample of the fruits, of the distance to the sixth-nearest.
+//! 3. What lies beyond [`REACH`] spacings of the bulk of the sample, or has fewer than six others within [`ISOLATED`]
+//!    spacings, is a stray: no constellation holds it, and it shall set no extent, no grid and no middle.
+//! 4. Where more than [`CROWD`] share a cell of one spacing, which no plant bears, that many are kept: what is near each
+//!    other is compared with each other, and a heap of thousands would take hours.
+//! 5. What is left is moved to its mean; where the scale is free it is also scaled to one spacing.
+
+use crate::cloud::{FruitCloud, Views};
+use crate::geometry::{Scale, Similarity};
+use crate::matching::{Match, Pair, Registration};
+use crate::verified::CellHasher;
+use nalgebra::{Point3, Vector3};
+use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
+
+/// Fruits whose spacing is measured: enough for a median that up to fifteen strays among them do not touch.
+const SAMPLE: usize = 32;
+
+/// Which neighbour measures the spacing: as the verified method does.
+const NEIGHBOUR: usize = 6;
+
+/// Spacings from the bulk of the cloud within which an orchard lies: 27 km.
+const REACH: f64 = 1e5;
+
+/// Spacings within which a fruit that is no stray has others: 13 m, more than the gap that a missing tree leaves.
+const ISOLATED: f64 = 50.0;
+
+/// Fruits of one cell of a spacing's edge at the most. Fruits hang there by six, stars of a cluster by fifty.
+const CROWD: usize = 100;
+
+/// Spacing after conditioning where the scale is free, metres: that of an orchard, for which the lengths of the settings
+/// are chosen.
+const SPACING_M: f64 = 0.27;
+
+/// Spacings of a cloud in metres, and ratios of two, beyond which no arithmetic and no match makes sense.
+const LARGEST: f64 = 1e6;
+
+/// A conditioned cloud with the way back.
+#[derive(Debug, Clone)]
+pub(crate) struct Conditioned {
+    /// Fruits in the order of their coordinates.
+    pub(crate) cloud: FruitCloud,
+    /// The caller's row of each fruit.
+    rows: Vec<usize>,
+    /// Fruits of the caller's cloud.
+    given: usize,
+    /// The origin in the caller's frame.
+    middle: Vector3<f64>,
+    /// The unit of length in the caller's.
+    unit: f64,
+    /// Median distance to the sixth-nearest fruit, in the unit.
+    spacing: f64,
+}
+
+impl Conditioned {
+    /// Conditions a cloud that is valid; where its fruits have no spacing that numbers hold, none is left.
+    pub(crate) fn new(cloud: &FruitCloud, scale: Scale) -> Self {
+        let (distinct, first_of) = distinct(&cloud.positions);
+        let sample = Sample::new(&cloud.positions, &distinct);
+        let measurable = match scale {
+            Scale::Metric => 1.0 / LARGEST..LARGEST,
+            Scale::Free => f64::MIN_POSITIVE.sqrt()..f64::MAX.sqrt(),
+        };
+        let is_measurable = measurable.contains(&sample.spacing);
+        let rows = if is_measurable { sample.kept(&cloud.positions, &distinct) } else { Vec::new() };
+        let unit = match scale {
+            Scale::Metric => 1.0,
+            Scale::Free => sample.spacing / SPACING_M,
+        };
+        let middle = middle(&cloud.positions, &rows);
+        Self {
+            cloud: moved(cloud, &rows, &first_of, &middle, unit),
+            given: cloud.len(),
+            rows,
+            middle,
+            unit,
+            spacing: sample.spacing / unit,
+        }
+    }
+
+    /// Copies, strays and what crowds: they take no part.
+    pub(crate) fn left_out(&self) -> usize {
+        self.given - self.rows.len()
+    }
+
+    /// Whether fruits of the two could lie as far apart as each other; clouds without fruits could.
+    pub(crate) fn is_comparable(&self, other: &Self) -> bool {
+        self.rows.is_empty()
+            || other.rows.is_empty()
+            || (1.0 / LARGEST.sqrt()..LARGEST.sqrt()).contains(&(self.spacing / other.spacing))
+    }
+
+    /// A length of the caller's in the unit.
+    pub(crate) fn length(&self, length_m: f64) -> f64 {
+        length_m / self.unit
+    }
+
+    /// A pose between the callers' frames, between the conditioned ones; `self` is the map.
+    pub(crate) fn conditioned_pose(&self, query: &Self, pose: &Similarity) -> Similarity {
+        self.outward().inverse().compose(pose).compose(&query.outward())
+    }
+
+    /// An answer between conditioned clouds in the callers' rows, frames and units; `self` is the map.
+    pub(crate) fn restored(&self, query: &Self, found: Match) -> Match {
+        let pose = |found: Registration| Registration {
+            map_from_query: self.outward().compose(&found.map_from_query).compose(&query.outward().inverse()),
+            ..found
+        };
+        let pair = |pair: Pair| Pair {
+            query: query.rows[pair.query],
+            map: self.rows[pair.map],
+            distance_m: pair.distance_m * self.unit,
+            ..pair
+        };
+        let mut pairs: Vec<Pair> = found.pairs.into_iter().map(pair).collect();
+        pairs.sort_unstable_by_key(|pair| pair.query);
+        Match {
+            registration: found.registration.map(pose),
+            alternatives: found.alternatives.into_iter().map(pose).collect(),
+            pairs,
+            noise_m: found.noise_m * self.unit,
+            ..found
+        }
+    }
+
+    /// Takes conditioned places into the caller's frame.
+    fn outward(&self) -> Similarity {
+        Similarity { rotation: nalgebra::Rotation3::identity(), translation: self.middle, scale: self.unit }
+    }
+}
+
+/// The first row at every place, in the order of coordinates; and for every row, the first at its place.
+fn distinct(positions: &[Point3<f64>]) -> (Vec<usize>, Vec<usize>) {
+    // Zero has two signs, and they are one place.
+    let key = |row: usize| positions[row].coords.map(|x| x + 0.0);
+    let mut order: Vec<usize> = (0..positions.len()).collect();
+    order.sort_unstable_by(|&a, &b| {
+        let (at, other) = (key(a), key(b));
+        let along = |axis: usize| at[axis].total_cmp(&other[axis]);
+        along(0).then(along(1)).then(along(2)).then(a.cmp(&b))
+    });
+    let mut first_of = vec![0; positions.len()];
+    for place in order.chunk_by(|&a, &b| key(a) == key(b)) {
+        for &row in place {
+            first_of[row] = place[0];
+        }
+    }
+    order.retain(|&row| first_of[row] == row);
+    (order, first_of)
+}
+
+/// The spacing of a cloud, and where its bulk is.
+struct Sample {
+    /// Others that a fruit should have near it: six, or half of a cloud that is smaller than twelve.
+    others: usize,
+    /// Infinite or zero where fruits are too far apart for numbers, or too few.
+    spacing: f64,
+    bulk: Point3<f64>,
+}
+
+impl Sample {
+    fn new(positions: &[Point3<f64>], rows: &[usize]) -> Self {
+        let others = NEIGHBOUR.min(rows.len() / 2);
+        let stride = rows.len().div_ceil(SAMPLE).max(1);
+        let sampled: Vec<Point3<f64>> = rows.iter().step_by(stride).map(|&row| positions[row]).collect();
+        let mut distances = vec![0.0; rows.len()];
+        let mut nearest: Vec<f64> = sampled
+            .iter()
+            .map(|p| {
+                distances.iter_mut().zip(rows).for_each(|(distance, &row)| *distance = (positions[row] - p).norm());
+                *distances.select_nth_unstable_by(others, f64::total_cmp).1
+            })
+            .collect();
+        let spacing = if nearest.is_empty() { 0.0 } else { crate::verified::median(&mut nearest) };
+        let around = |p: &Point3<f64>| sampled.iter().filter(|other| (*other - p).norm() <= REACH * spacing).count();
+        // Of equals the first.
+        let bulk = sampled.iter().rev().max_by_key(|p| around(p)).copied().unwrap_or_default();
+        Self { others, spacing, bulk }
+    }
+
+    /// The fruits that take part, in the order of `rows`.
+    fn kept(&self, positions: &[Point3<f64>], rows: &[usize]) -> Vec<usize> {
+        let within = |row: &usize| (positions[*row] - self.bulk).norm() <= REACH * self.spacing;
+        let near: Vec<usize> = rows.iter().copied().filter(within).collect();
+        self.uncrowded(positions, &self.in_company(positions, &near))
+    }
+
+    /// Those that have enough others within [`ISOLATED`] spacings.
+    fn in_company(&self, positions: &[Point3<f64>], rows: &[usize]) -> Vec<usize> {
+        let far = ISOLATED * self.spacing;
+        // Fruits of one cell are within `far` of each other.
+        let cells = Cells::new(positions, rows, &self.bulk, far / 3f64.sqrt());
+        let has_others = |row: usize| {
+            let is_near = |other: &&usize| (positions[**other] - positions[row]).norm() <= far;
+            let own = cells.of(row);
+            cells.rows[&own].len() > self.others
+                || cells.around(own).filter(is_near).take(self.others + 1).count() > self.others
+        };
+        rows.iter().copied().filter(|&row| has_others(row)).collect()
+    }
+
+    /// At most [`CROWD`] of those that share a cell of one spacing, evenly in the order of `rows`.
+    fn uncrowded(&self, positions: &[Point3<f64>], rows: &[usize]) -> Vec<usize> {
+        let cells = Cells::new(positions, rows, &self.bulk, self.spacing);
+        let is_taken = |row: usize| {
+            let mates = &cells.rows[&cells.of(row)];
+            let stride = mates.len().div_ceil(CROWD);
+            stride == 1 || mates.iter().step_by(stride).any(|&mate| mate == row)
+        };
+        rows.iter().copied().filter(|&row| is_taken(row)).collect()
+    }
+}
+
+/// Fruits by the cell of a grid that they lie in.
+struct Cells<'a> {
+    positions: &'a [Point3<f64>],
+    origin: &'a Point3<f64>,
+    edge: f64,
+    rows: HashMap<[i64; 3], Vec<usize>, BuildHasherDefault<CellHasher>>,
+}
+
+impl<'a> Cells<'a> {
+    fn new(positions: &'a [Point3<f64>], rows: &[usize], origin: &'a Point3<f64>, edge: f64) -> Self {
+        let mut cells = Self { positions, origin, edge, rows: HashMap::default() };
+        for &row in rows {
+            let cell = cells.of(row);
+            cells.rows.entry(cell).or_default().push(row);
+        }
+        cells
+    }
+
+    fn of(&self, row: usize) -> [i64; 3] {
+        let p = (self.positions[row] - self.origin) / self.edge;
+        [p.x, p.y, p.z].map(|x| x.floor() as i64)
+    }
+
+    /// Fruits up to two cells away.
+    fn around(&self, [x, y, z]: [i64; 3]) -> impl Iterator<Item = &usize> {
+        let steps = || -2..=2i64;
+        let cells =
+            steps().flat_map(move |dx| steps().flat_map(move |dy| steps().map(move |dz| [x + dx, y + dy, z + dz])));
+        cells.filter_map(|cell| self.rows.get(&cell)).flatten()
+    }
+}
+
+fn middle(positions: &[Point3<f64>], rows: &[usize]) -> Vector3<f64> {
+    let Some(&first) = rows.first() else { return Vector3::zeros() };
+    // About one of them: the sum of a thousand coordinates of 5,000 km would lose their last digits.
+    let origin = positions[first];
+    let sum: Vector3<f64> = rows.iter().map(|&row| positions[row] - origin).sum();
+    origin.coords + sum / rows.len() as f64
+}
+
+fn moved(cloud: &FruitCloud, rows: &[usize], first_of: &[usize], middle: &Vector3<f64>, unit: f64) -> FruitCloud {
+    let mut moved = cloud.select(rows);
+    for p in &mut moved.positions {
+        *p = Point3::from((p.coords - middle) / unit);
+    }
+    for covariance in moved.covariances.iter_mut().flatten() {
+        *covariance /= unit * unit;
+    }
+    moved.views = cloud.views.as_ref().map(|views| views_of(views, rows, first_of));
+    moved
+}
+
+/// Sightings of the rows that are left, a copy's as those of the row that stands for it.
+fn views_of(views: &Views, rows: &[usize], first_of: &[usize]) -> Views {
+    let mut place = vec![None; first_of.len()];
+    rows.iter().enumerate().for_each(|(at, &row)| place[row] = Some(at));
+    let seen = views.frames.iter().zip(&views.fruits);
+    let (frames, fruits) = seen.filter_map(|(&frame, &row)| Some((frame, place[first_of[row]]?))).unzip();
+    Views { frames, fruits }
+}
