@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files.fields import array_of, size_of
+from pomona.recording.rig_files.fields import array_of, checked_size, size_of
 from pomona.recording.rig_files.yaml_subset import read_documents
 
 __all__ = ["read", "recognises"]
@@ -66,6 +66,5 @@ def _size_px_of(where: str, fields: Mapping[str, Any]) -> tuple[int, int] | None
             return size_of(where, fields, width, height)
     for name in ("imageSize", "image_size", "size"):
         if name in fields:
-            columns, rows = array_of(where, fields, name, (2,)).astype(int).tolist()
-            return columns, rows
+            return checked_size(where, array_of(where, fields, name, (2,)).tolist())
     return None
