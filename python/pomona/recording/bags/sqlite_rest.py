@@ -73,6 +73,8 @@ class SqliteRest:
                 if row is None:
                     return
                 topic, logged_ns, body = self.topics.get(names.get(row[0], "")), row[1], row[2]
+                if not isinstance(logged_ns, int) or not isinstance(body, bytes):  # SQLite keeps what it is given
+                    continue
                 if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
                     yield Message(topic, logged_ns, body)
 
