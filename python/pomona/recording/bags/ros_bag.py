@@ -10,7 +10,7 @@ from typing import Any
 
 from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import Message, Topic
-from pomona.recording.bags.unpacked import unpacked
+from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES, unpacked
 
 __all__ = ["DamagedBagError", "RosBag"]
 
@@ -84,14 +84,24 @@ class _Opened:
     def __enter__(self) -> Any:
         try:
             reader = self.reader.__enter__()
-            if hasattr(reader, "chunks"):  # of ROS 1: rosbags would unpack whatever comes out
-                reader.chunks = {place: _bounded(chunk) for place, chunk in reader.chunks.items()}
+            _bound(reader)
             return reader
         except Exception as error:  # its own errors, SQLite's, and those of what a damaged header makes it do
             raise DamagedBagError(f"{self.path}: not a bag, or a damaged one ({_first_line(error)})") from None
 
     def __exit__(self, *_: object) -> None:
         self.reader.close()
+
+
+def _bound(reader: Any) -> None:
+    """Bound what rosbags takes memory for: chunks of ROS 1, and values that SQLite may compute as it reads them."""
+    if hasattr(reader, "chunks"):
+        reader.chunks = {place: _bounded(chunk) for place, chunk in reader.chunks.items()}
+        return
+    import apsw
+
+    for storage in getattr(reader.storage, "storages", [reader.storage]):
+        storage.dbconn.limit(apsw.SQLITE_LIMIT_LENGTH, MOST_CHUNK_BYTES)
 
 
 def _bounded(chunk: Any) -> Any:

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.message_file import Message, Topic
+from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES
 
 __all__ = ["SqliteRest", "is_cut_off"]
 
@@ -49,10 +50,12 @@ class SqliteRest:
         """
         try:
             with closing(_connected(path)) as database:
+                _require_tables(path, database)
                 rows = database.execute("SELECT name, type, serialization_format FROM topics").fetchall()
         except sqlite3.Error as error:
             raise PomonaError(f"{path}: not a ROS 2 bag, or one cut off before its first message ({error})") from None
-        return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in rows})
+        named = (tuple(map(str, row)) for row in rows)
+        return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in named})
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -91,4 +94,14 @@ def _connected(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro", uri=True, check_same_thread=False)
     # Else SQLite refuses a file that is shorter than its header says.
     database.execute("PRAGMA writable_schema = ON")
+    database.execute("PRAGMA trusted_schema = OFF")
+    # A column may be computed, and then be of any size.
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_CHUNK_BYTES)
     return database
+
+
+def _require_tables(path: Path, database: sqlite3.Connection) -> None:
+    """Refuse views of these names, which may be without end."""
+    kinds = database.execute("SELECT type FROM sqlite_master WHERE name IN ('topics', 'messages')").fetchall()
+    if sorted(kinds) != [("table",), ("table",)]:
+        raise PomonaError(f"{path}: found no tables topics and messages, expected a ROS 2 bag")
