@@ -122,9 +122,9 @@ def _opened(path: Path) -> InputContainer:
     except (av.error.FFmpegError, OSError) as error:
         what = getattr(error, "strerror", None) or str(error)
         raise PomonaError(f"{path}: not a video, or one that was cut off before its index ({what})") from None
-    if not container.streams.video:
+    if not container.streams.video or container.streams.video[0].codec_context is None:
         container.close()
-        raise PomonaError(f"{path}: found no pictures in it, expected a video")
+        raise PomonaError(f"{path}: found no pictures in it that can be decoded, expected a video")
     return container
 
 

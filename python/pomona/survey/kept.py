@@ -32,8 +32,8 @@ MOST_BYTES = 1 << 28
 """256 MiB unpacked: a frame of ten thousand boxes is 4 MB."""
 
 UNREADABLE = (
-    *(OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError),  # of the archive
-    *(KeyError, ValueError, TypeError, AttributeError, MemoryError, RecursionError, PomonaError),  # of what is in it
+    *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError),  # of the archive
+    *(KeyError, ValueError, TypeError, AttributeError, MemoryError, PomonaError),  # of what is in it
 )
 
 LIFTED = ("rows", "centres_in_camera", "covariances", "diameters_m", "diameter_sigmas_m", "hidden", "support")

@@ -18,6 +18,8 @@ __all__ = ["SqliteRest", "is_cut_off"]
 
 HEADER_BYTES = 100
 
+ROWS = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+
 
 def is_cut_off(path: Path) -> bool:
     """Whether the header of a database promises more pages than there are (sqlite.org/fileformat, 1.3)."""
@@ -65,21 +67,21 @@ class SqliteRest:
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
         """Read in the order in which the recorder wrote; the index by time lies at the end and may be lost."""
         with closing(_connected(self.path)) as database:
-            names = dict(database.execute("SELECT id, name FROM topics"))
-            rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
-            while True:
-                try:
-                    row = rows.fetchone()
-                except sqlite3.DatabaseError as error:
-                    self._tell(error)
-                    return
-                if row is None:
-                    return
-                topic, logged_ns, body = self.topics.get(names.get(row[0], "")), row[1], row[2]
+            for row in self._rows(database):
+                topic, logged_ns, body = self.topics.get(str(row[0])), row[1], row[2]
                 if not isinstance(logged_ns, int) or not isinstance(body, bytes):  # SQLite keeps what it is given
                     continue
                 if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
                     yield Message(topic, logged_ns, body)
+
+    def _rows(self, database: sqlite3.Connection) -> Iterator[tuple[object, object, object]]:
+        """Give topic, time and body of each message, up to the first that is lost."""
+        try:
+            names = dict(database.execute("SELECT id, name FROM topics"))
+            for number, logged_ns, body in database.execute(ROWS):
+                yield names.get(number, ""), logged_ns, body
+        except sqlite3.DatabaseError as error:
+            self._tell(error)
 
     def _tell(self, error: sqlite3.DatabaseError) -> None:
         """Say it once, not each time the rows are read."""
