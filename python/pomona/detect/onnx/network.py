@@ -136,9 +136,18 @@ def open_session(path: Path, threads: int | None = None) -> Any:
     # Threads that spin while they wait take the cores from odometry and depth, which run between two pictures.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        _require_texts(session)
+        return session
     except Exception as error:  # ONNX Runtime's errors have no base of their own
         raise PomonaError(f"{path}: not a model that ONNX Runtime can load: {reason_of(error)}") from None
+
+
+def _require_texts(session: Any) -> None:
+    """Read all that the file says of itself: what is no text fails here and not later."""
+    for tensor in (*session.get_inputs(), *session.get_outputs()):
+        f"{tensor.name} {tensor.shape} {tensor.type}"  # noqa: B018 # each is decoded when it is asked for
+    dict(session.get_modelmeta().custom_metadata_map)
 
 
 def _cores() -> int:

@@ -223,7 +223,7 @@ def _record(kind: str, content: bytes) -> Any:
 
     try:
         return getattr(records, kind).read(ReadDataStream(BytesIO(content)))
-    except (McapError, struct.error, UnicodeDecodeError) as error:
+    except (McapError, struct.error, UnicodeDecodeError, OverflowError) as error:
         raise ValueError(f"a {kind.lower()} that cannot be read: {error or type(error).__name__}") from None
 
 
