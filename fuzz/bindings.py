@@ -1,4 +1,4 @@
-"""Every function and class of `pomona._core`, called with arrays of anything."""
+"""Functions of `pomona._core` called with arrays of anything; `matching` and `tracking` are targets of their own."""
 
 from __future__ import annotations
 
@@ -10,13 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fuzz.drawn import Drawn
+from fuzz.drawn import REFUSALS, Drawn
 from pomona import _core
-
-CONFIG = _core.default_config()
-
-REFUSALS = (ValueError, TypeError, OverflowError)
-"""How the bindings say that an argument is wrong."""
 
 
 def seeds() -> list[bytes]:
@@ -33,93 +28,6 @@ def target(content: bytes) -> None:
 
 def _default_config(_: Drawn) -> None:
     json.loads(_core.default_config())
-
-
-def _cloud(draw: Drawn) -> dict[str, Any]:
-    n = draw.count()
-    views = draw.choice(None, None, draw.count())
-    return {
-        "positions": draw.numbers(n, 3),
-        "covariances": draw.choice(None, draw.covariances(n)),
-        "diameters_m": draw.choice(None, np.abs(draw.numbers(n))),
-        "view_frames": None if views is None else draw.rows(views, 5),
-        "view_fruits": None if views is None else draw.rows(views, n),
-    }
-
-
-def _config(draw: Drawn) -> str:
-    """Settings, now and then with one that is absurd."""
-    config = json.loads(CONFIG)
-    if draw.choice(False, False, True):
-        table = draw.choice(*(value for value in config.values() if isinstance(value, dict)))
-        name = draw.choice(*table)
-        table[name] = draw.choice(0, -1, 1, 1e300, -0.5, 1e-300, 2**40, None, "x", True, [], table[name])
-    return json.dumps(config)
-
-
-def _map_index(draw: Drawn) -> None:
-    index = _core.MapIndex(
-        _cloud(draw),
-        method=draw.choice("verified", "paper", "x"),
-        scale=draw.choice("metric", "free"),
-        config=_config(draw),
-        threads=draw.choice(None, 1, 2),
-    )
-    query, noise_m = _cloud(draw), draw.choice(None, None, draw.positive())
-    if draw.choice(False, False, True):
-        found = index.pairs_under(query, map_from_query=draw.poses(1)[0].tolist(), noise_m=noise_m)
-    else:
-        up = draw.choice(None, ([0.0, 0.0, 1.0], draw.numbers(3).tolist()))
-        found = index.search(query, noise_m=noise_m, up=up, per_frame=draw.choice(False, False, True))
-    _look_at(found)
-
-
-def _look_at(found: Any) -> None:
-    """Ask for all that an answer has."""
-    for name in dir(found):
-        if not name.startswith("_"):
-            getattr(found, name)
-
-
-def _tracker(draw: Drawn) -> None:
-    tracker = _core.Tracker(
-        focal_px=(draw.positive() * 500, 500.0),
-        principal_px=(320.0, 240.0 + draw.number()),
-        size_px=(640.0, 480.0 * draw.positive()),
-        config=_config(draw),
-    )
-    for step in range(draw.choice(1, 2, 5)):
-        n = draw.count()
-        m = draw.choice(n, n, n // 2)
-        corners = 200 + 50 * draw.numbers(n, 2)
-        boxes_px = np.hstack([corners, corners + draw.choice(40, 40, -1)]) if corners.ndim == 2 else corners
-        lifted: Any = {
-            "rows": np.arange(m) if draw.choice(True, True, False) else draw.rows(m, n),
-            "centres_in_camera": draw.numbers(m, 3) + [0, 0, 2.0],
-            "covariances": draw.covariances(m),
-            "diameters_m": np.abs(draw.numbers(m)) * 0.07,
-            "diameter_sigmas_m": np.abs(draw.numbers(m)) * 0.01,
-            "support": np.abs(draw.numbers(m)).clip(0, 1),
-        }
-        pose = draw.poses(1)
-        frame = draw.choice(step, step, step, -step, 2**62)
-        tracker.update(
-            frame, pose[0].tolist() if len(pose) else [], boxes_px, np.abs(draw.numbers(n)).clip(0, 1), lifted
-        )
-    _look_at(tracker.finish(draw.choice(None, 0, 1, 2**40)))
-
-
-def _one_fruit_each(draw: Drawn) -> None:
-    n, m = draw.count(), draw.count()
-    _core.one_fruit_each(
-        centres=draw.numbers(n, 3),
-        covariances=draw.covariances(n),
-        radii_m=np.abs(draw.numbers(n)),
-        frames=draw.rows(m, 5),
-        fruits=draw.rows(m, n),
-        place_sigma_m=draw.positive(),
-        config=_config(draw),
-    )
 
 
 def _adjust(draw: Drawn) -> None:
@@ -156,7 +64,7 @@ def _locate(draw: Drawn) -> None:
     expected = draw.poses(1)
     _core.locate(
         (500.0, 500.0, 320.0, 240.0, draw.positive()),
-        draw.numbers(n, 3) + [0, 0, 3.0],
+        draw.numbers(n, 3) + np.array([0, 0, 3.0]),
         draw.covariances(n),
         300 + 50 * draw.numbers(n, 2),
         expected[0].tolist() if expected.shape == (1, 4, 4) else [],
@@ -222,6 +130,5 @@ def _read_pair(draw: Drawn) -> None:
 
 
 _CALLS: tuple[Callable[[Drawn], None], ...] = (
-    *(_map_index, _map_index, _map_index, _tracker, _tracker, _one_fruit_each, _adjust, _locate, _search_rows),
-    *(_describe, _fuse_centres, _fuse_diameters, _lift, _read_pair, _default_config),
+    *(_adjust, _locate, _search_rows, _describe, _fuse_centres, _fuse_diameters, _lift, _read_pair, _default_config),
 )

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import random
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drawn"]
+from pomona import _core
+
+__all__ = ["REFUSALS", "Drawn", "look_at"]
 
 NUMBERS = (0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, 5e-324, 1e-9, 1e9, 1e30, 1e150, 1e300, -1e300, 1.7e308)
 BAD = (float("nan"), float("inf"), float("-inf"))
+CONFIG = _core.default_config()
+
+REFUSALS = (ValueError, TypeError, OverflowError)
+"""How the bindings say that an argument is wrong."""
+
 INDICES = (-1, 0, 1, 2, 7, 2**31, 2**62, -(2**63), 2**63 - 1)
 
 
@@ -78,6 +86,15 @@ class Drawn:
         rows[self._arrays.random(n) < self._odd] = self._draw.choice(INDICES)
         return np.asarray(self._strange(rows))
 
+    def config(self) -> str:
+        """Settings, now and then with one that is absurd."""
+        config = json.loads(CONFIG)
+        if self.choice(False, False, True):
+            table = self.choice(*(value for value in config.values() if isinstance(value, dict)))
+            name = self.choice(*table)
+            table[name] = self.choice(0, -1, 1, 1e300, -0.5, 1e-300, 2**40, None, "x", True, [], table[name])
+        return json.dumps(config)
+
     def bytes_of(self, *shape: int) -> NDArray[np.uint8]:
         """A picture."""
         return np.asarray(self._strange(self._arrays.integers(0, 256, shape, np.uint8)))
@@ -98,3 +115,10 @@ class Drawn:
             "big": array.astype(array.dtype.newbyteorder(">")),
         }
         return np.asarray(changed[how])
+
+
+def look_at(found: Any) -> None:
+    """Ask for all that an answer has."""
+    for name in dir(found):
+        if not name.startswith("_"):
+            getattr(found, name)

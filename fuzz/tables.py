@@ -16,7 +16,7 @@ from pomona.settings import Settings
 CAMERA = Calibration(640, 480, 600.0, 600.0, 320.0, 240.0)
 CLOUD = FruitCloud(np.eye(3), ids=("a", "b", "c"))
 
-TOML = b'[match]\nmethod = "verified"\nnoise_m = 0.01\nup = [[0, 0, 1], [0.0, -1, 0]]\nthreads = 2\n[tracking]\nmin_views = 3\n'
+TOML = b'[match]\nmethod = "verified"\nup = [[0, 0, 1], [0.0, -1, 0]]\nnoise_m = 0.01\n[tracking]\nmin_views = 3\n'
 BOXES = b"frame,xmin,ymin,xmax,ymax,score,id\n0,10,10,20.5,30,0.9,a\n1,11,10,21,30,0.8,a\n1,50,10,61,30,0.5,b\n"
 MOT = b"1,1,10,10,20,20,0.9,-1,-1,-1\n2,1,11,10,20,20,0.9,-1,-1,-1\n"
 PAIRS = b"query,map,probability,distance_m\na,b,0.9,0.01\nb,c,0.8,0.02\n"

@@ -144,9 +144,9 @@ def open_session(path: Path, threads: int | None = None) -> Any:
 
 
 def _require_texts(session: Any) -> None:
-    """Read all that the file says of itself: what is no text fails here and not later."""
+    """Read all that the file says of itself: ONNX Runtime decodes it when it is asked for, and fails then."""
     for tensor in (*session.get_inputs(), *session.get_outputs()):
-        f"{tensor.name} {tensor.shape} {tensor.type}"  # noqa: B018 # each is decoded when it is asked for
+        repr((tensor.name, tensor.shape, tensor.type))
     dict(session.get_modelmeta().custom_metadata_map)
 
 
