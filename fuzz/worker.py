@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import resource
 import time
 import traceback
@@ -118,7 +119,7 @@ class Attempts:
     def _tell_failure(self, name: str, content: bytes, error: BaseException) -> None:
         frames = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in frames if "/pomona/" in frame.filename] or frames
-        first_line = (str(error).splitlines() or [""])[0][:60]
+        first_line = re.sub(r"0x\w+|\d+", "#", (str(error).splitlines() or [""])[0])[:60]
         what = f"{type(error).__name__} {Path(own[-1].filename).name}:{own[-1].lineno} {first_line}"
         if what not in self._told:
             self._told.add(what)

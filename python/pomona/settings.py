@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # Table of the file that holds what `pomona.match` is told by name; the other tables are the core's.
 _CALL_TABLE = "match"
 
+MOST_NAME = 80
+"""Characters of an unknown name that a message repeats."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -93,7 +96,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _refuse_unknown(path: Path | None, found: Mapping[str, Any], known: Mapping[str, Any], table: str = "") -> None:
     for name, value in found.items():
         if name not in known:
-            raise PomonaError(f"{path}: unknown setting {table}{name}, expected one of {', '.join(known)}")
+            raise PomonaError(f"{path}: unknown setting {table}{name[:MOST_NAME]}, expected one of {', '.join(known)}")
         expected = known[name]
         if isinstance(expected, dict):
             if not isinstance(value, dict):

@@ -118,7 +118,7 @@ def _opened(path: Path) -> InputContainer:
     except ImportError:
         raise missing_pyav(path) from None
     try:
-        container = av.open(str(path.absolute()), options=ALONE)
+        container = av.open(str(path.absolute()), options=ALONE, metadata_errors="replace")
     except (av.error.FFmpegError, OSError) as error:
         what = getattr(error, "strerror", None) or str(error)
         raise PomonaError(f"{path}: not a video, or one that was cut off before its index ({what})") from None
