@@ -31,6 +31,9 @@ FORMAT = 1
 MOST_BYTES = 1 << 28
 """256 MiB unpacked: a frame of ten thousand boxes is 4 MB."""
 
+MOST_REASON = 100
+"""Characters of what a library says that a message repeats."""
+
 UNREADABLE = (
     *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError),  # of the archive
     *(KeyError, ValueError, TypeError, AttributeError, MemoryError, PomonaError),  # of what is in it
@@ -131,4 +134,4 @@ def _read(file: Path, frame: int) -> Look:
                 arrays.get("colours"),
             )
     except UNREADABLE as error:
-        raise PomonaError(f"{file}: not a kept frame ({error}): remove it") from None
+        raise PomonaError(f"{file}: not a kept frame ({str(error)[:MOST_REASON]}): remove it") from None
