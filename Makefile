@@ -3,9 +3,11 @@ PYTHON ?= python3
 UV = .tools/bin/uv
 RUN = $(UV) run --frozen
 UV_VERSION = 0.13.8
+FUZZ_SECONDS ?= 600
+FUZZ_SEED ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop demo test test-rust test-python lint format bench docs clean help
+.PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit docs clean help
 
 all: lint test docs ## what CI runs, and the documentation
 
@@ -46,6 +48,12 @@ format: install ## rewrite the sources in the house's format
 
 bench: install ## accuracy and speed; writes benchmarks/results
 	$(RUN) python -m benchmarks
+
+fuzz: install ## damaged input for every reader and binding, FUZZ_SECONDS=600; what fails lies in out/fuzz
+	$(RUN) python -m fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
+
+audit: install ## licences of all dependencies, and advisories as far as they can be fetched
+	$(RUN) python -m audit
 
 docs: $(UV) ## the documentation site, into site/
 	NO_MKDOCS_2_WARNING=1 $(UV) run --frozen --group docs mkdocs build --strict

@@ -104,7 +104,7 @@ def test_refuses_what_is_no_text(tmp_path: Path) -> None:
 
 
 def test_refuses_a_missing_file_and_an_unknown_suffix(tmp_path: Path, full_cloud: FruitCloud) -> None:
-    with pytest.raises(PomonaError, match=r"absent\.csv: cannot be read: No such file"):
+    with pytest.raises(PomonaError, match=r"absent\.csv: not found, expected a fruit cloud"):
         FruitCloud.read(tmp_path / "absent.csv")
     with pytest.raises(PomonaError, match=r"found suffix '.xyz', expected .csv, .ply or .gpkg"):
         FruitCloud.read(tmp_path / "fruits.xyz")

@@ -243,7 +243,7 @@ def test_an_unknown_signature_is_told_with_what_is_accepted(tmp_path):
         ({**ULTRALYTICS, "task": "pose"}, ["metadata task: found 'pose'", "detect or segment"]),
         ({**ULTRALYTICS, "names": "__import__('os').getcwd()"}, ["metadata names: cannot be read"]),
         ({**ULTRALYTICS, "names": "{0: 'apple'}"}, ["outputs: found output0 (6, 420)"]),
-        ({"rfdetr_inference": "{"}, ["metadata rfdetr_inference: cannot be read"]),
+        ({"rfdetr_inference": "{"}, ["metadata rfdetr_inference: line 1: not JSON"]),
         ({"rfdetr_inference": {"task": "keypoints"}}, ["task: found 'keypoints'"]),
         ({"pomona_detector": {"version": 2, "family": "yolov8"}}, ["version: found 2, expected 1"]),
         ({"pomona_detector": {"version": 1}}, ["metadata pomona_detector: cannot be read", "family"]),

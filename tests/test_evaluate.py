@@ -78,7 +78,7 @@ def test_reads_rows_where_there_are_no_ids(tmp_path: Path) -> None:
 
 
 def test_reads_the_standard_input(monkeypatch: pytest.MonkeyPatch, clouds: tuple[FruitCloud, FruitCloud]) -> None:
-    monkeypatch.setattr("sys.stdin", io.StringIO("query,map\na,a\n"))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"query,map\na,a\n")))
     assert read_pairs(Path("-"), *clouds) == [(0, 2)]
 
 
@@ -86,7 +86,7 @@ def test_reads_the_standard_input(monkeypatch: pytest.MonkeyPatch, clouds: tuple
     ("content", "complaint"),
     [
         ("", "line 1: found nothing, expected a header with the columns query and map"),
-        ("x,y\n1,2\n", "line 1: found x,y, expected a header"),
+        ("x,y\n1,2\n", "line 1: found 'x,y', expected a header"),
         ("query,map\na\n", "line 2: found 1 values, expected 2"),
         ("query,map\na,a\nzzz,a\n", "line 3: query 'zzz' is no fruit of the query"),
         ('{"matches": [{"query": "a"}]}', "expected the JSON of `pomona match --json`"),
@@ -106,5 +106,5 @@ def test_refuses_what_are_no_pairs(
 
 
 def test_refuses_a_missing_file(tmp_path: Path, clouds: tuple[FruitCloud, FruitCloud]) -> None:
-    with pytest.raises(PomonaError, match="cannot be read: No such file"):
+    with pytest.raises(PomonaError, match="not found, expected pairs"):
         read_pairs(tmp_path / "none.csv", *clouds)

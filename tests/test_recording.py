@@ -204,7 +204,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
         ("0 0 0 0 0 0 0 1\n", ["found 1 poses", "2 frames"]),
         ("0 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 1\n", ["line 2", "found 7 numbers"]),
         ("0 0 0 0 0 0 0 1\n0.1 0 0 x 0 0 0 1\n", ["line 2", "'x'"]),
-        ("0 0 0 0 0 0 0 1\n0.1 0 0 nan 0 0 0 1\n", ["line 2", "NaN"]),
+        ("0 0 0 0 0 0 0 1\n0.1 0 0 nan 0 0 0 1\n", ["line 2", "'nan'"]),
         ("0 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 0\n", ["line 2", "quaternion of length 0"]),
         ("0.1 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 1\n", ["pose 2", "does not come after"]),
     ],

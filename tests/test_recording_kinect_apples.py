@@ -51,6 +51,6 @@ def test_a_capture_with_a_wrong_part_leaves_nothing_behind(shared_data, tmp_path
     with pytest.raises(PomonaError, match=r"114012_boxes\.csv.*not found"):
         list(import_captures(source, tmp_path / "out"))
     (source / "114012_boxes.csv").write_text("id,x,y\n1,2,3\n")
-    with pytest.raises(PomonaError, match=r"114012_boxes\.csv: found id,x,y"):
+    with pytest.raises(PomonaError, match=r"114012_boxes\.csv: found 'id,x,y'"):
         list(import_captures(source, tmp_path / "out"))
     assert list((tmp_path / "out").iterdir()) == []

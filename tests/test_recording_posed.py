@@ -113,5 +113,5 @@ def test_what_holds_no_poses_is_refused(video, tmp_path, text, parts):
 
 
 def test_poses_that_are_not_there(video, tmp_path):
-    with pytest.raises(PomonaError, match=r"none\.txt: cannot be read"):
+    with pytest.raises(PomonaError, match=r"none\.txt: not found"):
         open_recording(video, poses=tmp_path / "none.txt")

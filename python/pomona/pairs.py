@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
+from pomona.reading import decoded_text, parsed_json, read_text, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,21 +54,15 @@ def read_pairs(path: Path, query: FruitCloud, map: FruitCloud) -> list[tuple[int
         for side, label, rows in (("query", query_label, in_query), ("map", map_label, in_map)):
             if label not in rows:
                 raise PomonaError(
-                    f"{path}: {place}: {side} {label!r} is no fruit of the {side}, expected one of its ids"
+                    f"{path}: {place}: {side} {shown(label)} is no fruit of the {side}, expected one of its ids"
                 )
         pairs.append((in_query[query_label], in_map[map_label]))
     return pairs
 
 
 def _read_text(path: Path) -> str:
-    if str(path) == "-":
-        return sys.stdin.read()
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise PomonaError(f"{path}: found bytes that are not UTF-8, expected pairs as CSV or JSON") from None
+    expected = "pairs as CSV or JSON"
+    return decoded_text(path, sys.stdin.buffer.read(), expected) if str(path) == "-" else read_text(path, expected)
 
 
 def _row_of_label(cloud: FruitCloud) -> dict[str, int]:
@@ -81,25 +75,28 @@ def _labels_of(path: Path, text: str) -> Iterator[tuple[str, str, str]]:
 
 
 def _labels_of_json(path: Path, text: str) -> Iterator[tuple[str, str, str]]:
+    answer = parsed_json(str(path), text, "the JSON of `pomona match --json`")
     try:
-        matches = json.loads(text)["matches"]
-        labels = [(str(entry["query"]), str(entry["map"])) for entry in matches]
-    except (ValueError, KeyError, TypeError) as error:
+        labels = [(str(entry["query"]), str(entry["map"])) for entry in answer["matches"]]
+    except (KeyError, TypeError) as error:
         raise PomonaError(f"{path}: expected the JSON of `pomona match --json`, found {error!r}") from None
     for number, (query_label, map_label) in enumerate(labels):
         yield f"matches[{number}]", query_label, map_label
 
 
 def _labels_of_csv(path: Path, text: str) -> Iterator[tuple[str, str, str]]:
-    lines = csv.reader(io.StringIO(text))
-    header = next(lines, [])
-    if not {"query", "map"} <= set(header):
-        found = ",".join(header) or "nothing"
-        raise PomonaError(f"{path}: line 1: found {found}, expected a header with the columns query and map")
-    query_column, map_column = header.index("query"), header.index("map")
-    for cells in lines:
-        if not cells:
-            continue
-        if len(cells) != len(header):
-            raise PomonaError(f"{path}: line {lines.line_num}: found {len(cells)} values, expected {len(header)}")
-        yield f"line {lines.line_num}", cells[query_column], cells[map_column]
+    lines = csv.reader(io.StringIO(text, newline=""))
+    try:
+        header = next(lines, [])
+        if not {"query", "map"} <= set(header):
+            found = shown(",".join(header)) if header else "nothing"
+            raise PomonaError(f"{path}: line 1: found {found}, expected a header with the columns query and map")
+        query_column, map_column = header.index("query"), header.index("map")
+        for cells in lines:
+            if not cells:
+                continue
+            if len(cells) != len(header):
+                raise PomonaError(f"{path}: line {lines.line_num}: found {len(cells)} values, expected {len(header)}")
+            yield f"line {lines.line_num}", cells[query_column], cells[map_column]
+    except csv.Error as error:
+        raise PomonaError(f"{path}: line {lines.line_num}: is not CSV: {error}") from None

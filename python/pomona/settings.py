@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pomona.errors import PomonaError
+from pomona.reading import read_text, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
 
 # Table of the file that holds what `pomona.match` is told by name; the other tables are the core's.
 _CALL_TABLE = "match"
+
+MOST_NAME = 80
+"""Characters of an unknown name that a message repeats."""
 
 
 @dataclass(frozen=True)
@@ -81,27 +86,27 @@ def _defaults_of_match() -> dict[str, Any]:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # covers TOMLDecodeError and UnicodeDecodeError
+        return tomllib.loads(read_text(path, "settings in TOML"))
+    except ValueError as error:
         raise PomonaError(f"{path}: is not TOML: {error}") from None
+    except RecursionError:
+        raise PomonaError(f"{path}: is not TOML of ours: found lists in lists without end") from None
 
 
 def _refuse_unknown(path: Path | None, found: Mapping[str, Any], known: Mapping[str, Any], table: str = "") -> None:
     for name, value in found.items():
         if name not in known:
-            raise PomonaError(f"{path}: unknown setting {table}{name}, expected one of {', '.join(known)}")
+            raise PomonaError(f"{path}: unknown setting {table}{name[:MOST_NAME]}, expected one of {', '.join(known)}")
         expected = known[name]
         if isinstance(expected, dict):
             if not isinstance(value, dict):
-                raise PomonaError(f"{path}: {table}{name}: found {value!r}, expected a table")
+                raise PomonaError(f"{path}: {table}{name}: found {shown(value)}, expected a table")
             _refuse_unknown(path, value, expected, f"{table}{name}.")
 
 
 def _checked(path: Path | None, name: str, value: Any) -> Any:
     """Return a value of the file's table for `pomona.match`; refuse one of another kind than its flag takes."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    is_number = _is_number(value)
     match name:
         case "method":
             expected, fits = '"paper" or "verified"', value in ("paper", "verified")
@@ -119,12 +124,17 @@ def _checked(path: Path | None, name: str, value: Any) -> Any:
                 return [value, value]
             fits = isinstance(value, list) and len(value) == 2 and all(map(_is_direction, value))
     if not fits:
-        raise PomonaError(f"{path}: {_CALL_TABLE}.{name}: found {value!r}, expected {expected}")
+        raise PomonaError(f"{path}: {_CALL_TABLE}.{name}: found {shown(value)}, expected {expected}")
     return value
 
 
+def _is_number(value: Any) -> bool:
+    # Compared, not converted: a whole number of TOML may be beyond every float.
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
+
+
 def _is_direction(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(type(x) in (int, float) for x in value)
+    return isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
 
 
 def _refuse_wrong_values(path: Path | None, tables: Mapping[str, Any]) -> None:

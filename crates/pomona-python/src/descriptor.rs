@@ -20,6 +20,9 @@ pub fn describe<'py>(
     n: usize,
 ) -> PyResult<Arrays<'py>> {
     let positions = points(&positions)?;
+    if let Some(row) = positions.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
+        return Err(PyValueError::new_err(format!("positions: row {row} is NaN or infinite, expected finite numbers")));
+    }
     match k {
         4 => arrays::<4, 5>(py, &positions, n),
         5 => arrays::<5, 8>(py, &positions, n),

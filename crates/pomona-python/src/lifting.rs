@@ -31,7 +31,7 @@ pub fn lift<'py>(
     sources: PyReadonlyArray2<'py, f64>,
     camera: Fields,
 ) -> PyResult<Lifted<'py>> {
-    let camera = camera.to_camera();
+    let camera = camera.to_camera()?;
     if depth_m.shape() != [camera.height, camera.width] {
         return Err(PyValueError::new_err("depth_m: expected the size of the camera's pictures"));
     }

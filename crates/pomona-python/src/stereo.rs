@@ -22,10 +22,15 @@ pub fn read_pair<'py>(
     focal_baseline_px_m: f64,
     nearest_m: f64,
 ) -> PyResult<Reading<'py>> {
-    let camera = camera.to_camera();
+    let camera = camera.to_camera()?;
     let expected = [camera.height, camera.width, 3];
     if left.shape() != expected || right.shape() != expected {
         return Err(PyValueError::new_err("left, right: expected colour pictures of the camera's size"));
+    }
+    for (name, value) in [("focal_baseline_px_m", focal_baseline_px_m), ("nearest_m", nearest_m)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(PyValueError::new_err(format!("{name}: found {value}, expected a finite number above 0")));
+        }
     }
     let boxes = boxes(&boxes_px)?;
     let rig = Rig { camera, focal_baseline_px_m, nearest_m };

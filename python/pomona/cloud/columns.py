@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.reading import shown
 
-__all__ = ["BLANKABLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split"]
+__all__ = ["BLANKABLE", "MOST_WHOLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split"]
 
 POSITION = ("x", "y", "z")
 COVARIANCE = ("cxx", "cyy", "czz", "cxy", "cxz", "cyz")
@@ -27,17 +29,24 @@ WHOLE = frozenset({"n_views"})
 BLANKABLE = frozenset({"diameter_m"})
 """Columns in which an empty cell means unknown."""
 
+MOST_COLUMNS = 1000
+"""Of a file; each costs time in every row, and a table of measurements has some ten."""
+
+MOST_WHOLE = 2**53
+"""Largest whole number: beyond it a double no longer tells neighbours apart."""
+
 
 def check_names(names: Sequence[str], where: str) -> None:
     """Refuse a header that lacks a coordinate, names a column twice or has only a part of the covariance."""
     missing = [name for name in POSITION if name not in names]
     if missing:
-        found = ",".join(names)
-        shown = found if len(found) <= 80 else found[:77] + "..."
-        raise PomonaError(f"{where}: found columns {shown!r} without {','.join(missing)}, expected at least x,y,z")
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+        found = shown(",".join(names))
+        raise PomonaError(f"{where}: found columns {found} without {','.join(missing)}, expected at least x,y,z")
+    if len(names) > MOST_COLUMNS:
+        raise PomonaError(f"{where}: found {len(names)} columns, expected at most {MOST_COLUMNS}")
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
-        raise PomonaError(f"{where}: column {twice!r} is there twice, expected each name once")
+        raise PomonaError(f"{where}: column {shown(twice)} is there twice, expected each name once")
     lacking = [name for name in COVARIANCE if name not in names]
     if 0 < len(lacking) < len(COVARIANCE):
         raise PomonaError(f"{where}: found a covariance without {','.join(lacking)}, expected {','.join(COVARIANCE)}")
@@ -61,7 +70,7 @@ def number(name: str, cell: str) -> float:
         raise ValueError("expected a number")
     if not math.isfinite(value):
         raise ValueError("expected a finite number")
-    if name in WHOLE and (not value.is_integer() or abs(value) > 2**53):
+    if name in WHOLE and (not value.is_integer() or abs(value) > MOST_WHOLE):
         raise ValueError("expected a whole number")
     if name == "diameter_m" and value <= 0:
         raise ValueError("expected a positive number or nothing")

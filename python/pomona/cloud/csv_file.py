@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
-from pomona.cloud.columns import BLANKABLE, NUMBERS, WHOLE, assemble, check_names, number, split
+from pomona.cloud.columns import BLANKABLE, MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.reading import require_file, shown
 
 __all__ = ["read", "write"]
 
@@ -57,6 +59,7 @@ def _cells(name: str, column: Any) -> list[Any]:
 @contextmanager
 def _opened(path: Path) -> Iterator[IO[str]]:
     """Open the file for the csv module; what cannot be read as text is one line too."""
+    require_file(path, "a fruit cloud: a header with x,y,z")
     try:
         with path.open(newline="", encoding=ENCODING) as file:
             yield file
@@ -100,12 +103,16 @@ def _read_table(file: IO[str], names: list[str], header_lines: int) -> dict[str,
     for name in NUMBERS & columns.keys():
         finite = np.isfinite(columns[name]) | (np.isnan(columns[name]) if name in BLANKABLE else False)
         positive = (columns[name] > 0) | np.isnan(columns[name]) if name == "diameter_m" else np.True_
-        whole = columns[name] == np.rint(columns[name]) if name in WHOLE else np.True_
+        whole = _whole(columns[name]) if name in WHOLE else np.True_
         if not np.all(finite & positive & whole):
             return None
     if "id" in columns and not _names_each_once(columns["id"]):
         return None
     return columns
+
+
+def _whole(column: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray((column == np.rint(column)) & (np.abs(column) <= MOST_WHOLE))
 
 
 def _names_each_once(ids: Any) -> bool:
@@ -127,7 +134,7 @@ def _read_cells(path: Path, file: IO[str], names: list[str], header_lines: int) 
             try:
                 columns[name].append(number(name, cell) if name in NUMBERS else cell)
             except ValueError as error:
-                raise PomonaError(f"{line} (row {row}), column {name}: found {cell!r}, {error}") from None
+                raise PomonaError(f"{line} (row {row}), column {name}: found {shown(cell)}, {error}") from None
         if "id" in columns:
             _require_new(columns["id"][-1], line_of_id, reader.line_num, line)
     return {name: np.array(column) if name in NUMBERS else column for name, column in columns.items()}
@@ -141,5 +148,6 @@ def _require_new(name: str, line_of_id: dict[str, int], line_number: int, line: 
     if not name:
         raise PomonaError(f"{line}, column id: found nothing, expected a name for every fruit or no column id")
     if name in line_of_id:
-        raise PomonaError(f"{line}, column id: found {name!r} as in line {line_of_id[name]}, expected each id once")
+        found = f"{shown(name)} as in line {line_of_id[name]}"
+        raise PomonaError(f"{line}, column id: found {found}, expected each id once")
     line_of_id[name] = line_number

@@ -199,9 +199,12 @@ def _require_finite(name: str, array: NDArray[np.float64]) -> None:
 def _require_covariances(covariances: NDArray[np.float64]) -> None:
     """Refuse what is not symmetric positive semi-definite beyond rounding."""
     _require_finite("covariances", covariances)
-    tolerance = 1e-9 * np.linalg.norm(covariances, axis=(1, 2))
-    skew = np.abs(covariances - covariances.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
-    wrong = (skew > tolerance) | (np.linalg.eigvalsh(covariances).min(axis=1, initial=np.inf) < -tolerance)
+    # Scaled first: squares of what is finite need not be.
+    largest = np.abs(covariances).max(axis=(1, 2), keepdims=True, initial=0.0)
+    scaled = np.divide(covariances, largest, out=np.zeros_like(covariances), where=largest > 0)
+    tolerance = 1e-9 * np.linalg.norm(scaled, axis=(1, 2))
+    skew = np.abs(scaled - scaled.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
+    wrong = (skew > tolerance) | (np.linalg.eigvalsh(scaled).min(axis=1, initial=np.inf) < -tolerance)
     if wrong.any():
         raise PomonaError(f"covariances: row {int(np.argmax(wrong))} is not symmetric positive semi-definite")
 

@@ -7,6 +7,7 @@ PLY has no text. Names and other text go into comments, one a fruit, which other
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -15,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
-from pomona.cloud.columns import NUMBERS, WHOLE, assemble, check_names, number, split
+from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.reading import parsed_json, require_file, shown, whole_number
 
 __all__ = ["read", "write"]
 
@@ -49,6 +51,7 @@ class Header:
 
 def read(path: Path) -> FruitCloud:
     """Read a cloud; see `FruitCloud.read`."""
+    require_file(path, "a fruit cloud in PLY")
     try:
         with path.open("rb") as file:
             header = _read_header(path, file)
@@ -132,15 +135,15 @@ def _read_header(path: Path, file: IO[bytes]) -> Header:
                 break
             case ["format", kind, *_] if kind in BYTE_ORDERS:
                 byte_order = BYTE_ORDERS[kind]
-            case ["element", name, count] if count.isdecimal():
-                elements.append((name, int(count)))
+            case ["element", name, count]:
+                elements.append((name, _count(where, count)))
             case ["property", kind, name] if kind in SCALARS and elements:
                 if elements[-1][0] == "vertex":
                     fields.append((name, SCALARS[kind]))
             case ["property", "list", *_] if elements and elements[-1][0] != "vertex":
                 pass  # faces and the like follow the points and are not read
-            case ["comment", "text", column, row, value] if row.isdecimal():
-                texts.setdefault(column, {})[int(row)] = _json_text(where, value)
+            case ["comment", "text", column, row, value] if column not in NUMBERS:
+                texts.setdefault(column, {})[_count(where, row)] = _json_text(where, value)
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:
@@ -151,13 +154,20 @@ def _read_header(path: Path, file: IO[bytes]) -> Header:
     return Header(byte_order, elements[0][1], fields, texts, line_number)
 
 
+def _count(where: str, text: str) -> int:
+    count = whole_number(where, text, "a count")
+    if count < 0:
+        raise PomonaError(f"{where}: found {count}, expected a count")
+    return count
+
+
 def _json_text(where: str, value: str) -> str:
     try:
-        text = json.loads(value)
-    except ValueError:
+        text = parsed_json(where, value, "a quoted text")
+    except PomonaError:
         text = None
     if not isinstance(text, str):
-        raise PomonaError(f"{where}: found {value[:60]!r}, expected a quoted text")
+        raise PomonaError(f"{where}: found {shown(value)}, expected a quoted text")
     return text
 
 
@@ -173,11 +183,10 @@ def _complete(path: Path, column: str, values: dict[int, str], header: Header) -
 def _read_binary(path: Path, file: IO[bytes], header: Header) -> NDArray[Any]:
     row = np.dtype([(name, header.byte_order + scalar) for name, scalar in header.fields])
     wanted = row.itemsize * header.n_vertices
+    there = os.fstat(file.fileno()).st_size - file.tell()
+    if there < wanted:
+        raise PomonaError(f"{path}: the file ends after {there // row.itemsize} vertices, expected {header.n_vertices}")
     content = file.read(wanted)
-    if len(content) < wanted:
-        raise PomonaError(
-            f"{path}: the file ends after {len(content) // row.itemsize} vertices, expected {header.n_vertices}"
-        )
     return np.frombuffer(content, dtype=row)
 
 
@@ -205,7 +214,7 @@ def _first_wrong_cell(path: Path, lines: list[bytes], header: Header) -> PomonaE
             try:
                 number("n_views" if scalar[0] in "iu" else name, cell)
             except ValueError as error:
-                return PomonaError(f"{where}, property {name}: found {cell!r}, {error}")
+                return PomonaError(f"{where}, property {name}: found {shown(cell)}, {error}")
     return PomonaError(f"{path}: the vertices cannot be read as numbers")
 
 
@@ -215,7 +224,7 @@ def _require_good(path: Path, name: str, values: NDArray[Any]) -> None:
     if name == "diameter_m":
         wrong, wanted = (values <= 0) | np.isinf(values), "a positive number or nan"
     elif name in WHOLE:
-        wrong, wanted = values != np.rint(values), "a whole number"
+        wrong, wanted = (values != np.rint(values)) | (np.abs(values) > MOST_WHOLE), "a whole number"
     else:
         wrong, wanted = ~np.isfinite(values), "a finite number"
     if wrong.any():

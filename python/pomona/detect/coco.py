@@ -7,15 +7,15 @@ fruit. COCO's pixels are ours. Groups (`iscrowd`) are no fruits and are left out
 
 from __future__ import annotations
 
-import json
 import re
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from pomona.detect.listed import ListedBox, number_in
+from pomona.detect.listed import ListedBox
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.reading import number_in, parsed_json, shown, whole_number
 from pomona.recording import Calibration
 
 __all__ = ["read_coco"]
@@ -31,10 +31,7 @@ def read_coco(path: Path, text: str, calibration: Calibration) -> Iterator[Liste
     PomonaError
         One line with the file, the entry and its field, what was found and what was expected.
     """
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise PomonaError(f"{path}: line {error.lineno}: not JSON ({error.msg}), expected {EXPECTED}") from None
+    content = parsed_json(str(path), text, EXPECTED)
     if isinstance(content, list):
         yield from (_box(path, f"[{row}]", entry, _result_frame(path, row, entry)) for row, entry in enumerate(content))
         return
@@ -44,7 +41,7 @@ def read_coco(path: Path, text: str, calibration: Calibration) -> Iterator[Liste
         where = f"annotations[{row}]"
         image = _key(path, where, entry, "image_id")
         if image not in frames:
-            raise PomonaError(f"{path}: {where}: image_id: found {image!r}, expected the id of one of the images")
+            raise PomonaError(f"{path}: {where}: image_id: found {shown(image)}, expected the id of one of the images")
         if entry.get("iscrowd"):
             groups += 1
         else:
@@ -61,11 +58,12 @@ def _frames(path: Path, images: list[Any], calibration: Calibration) -> dict[int
         key, name = _key(path, where, image, "id"), str(_field(path, where, image, "file_name"))
         number = _frame_number(path, where, name)
         if number in image_of:
-            found = f"file_name: found {name!r}, frame {number}, which is that of image {image_of[number]!r} too"
+            other = shown(image_of[number])
+            found = f"file_name: found {shown(name)}, frame {number}, which is that of image {other} too"
             raise PomonaError(f"{path}: {where}: {found}, expected each frame once")
         size_px = (image.get("width", calibration.width), image.get("height", calibration.height))
         if size_px != calibration.size_px:
-            found = f"{name}: found {size_px[0]}x{size_px[1]} pixels"
+            found = f"{shown(name)}: found {shown(size_px[0])}x{shown(size_px[1])} pixels"
             expected = f"{calibration.width}x{calibration.height} as the recording's pictures"
             raise PomonaError(f"{path}: {where}: {found}, expected {expected}")
         image_of[number] = key
@@ -77,9 +75,9 @@ def _frame_number(path: Path, where: str, name: str) -> int:
     # Roboflow appends the old suffix and a hash: 0007_png.rf.4f0c1e.jpg.
     digits = re.search(r"\d+$", re.sub(r"_(png|jpe?g)\.rf\.\w+$", "", stem, flags=re.IGNORECASE), flags=re.ASCII)
     if digits is None:
-        found = f"file_name: found {name!r}"
+        found = f"file_name: found {shown(name)}"
         raise PomonaError(f"{path}: {where}: {found}, expected a frame number at its end, as 0007.png")
-    return int(digits[0])
+    return whole_number(f"{path}: {where}: file_name", digits[0], "a frame number at its end")
 
 
 def _result_frame(path: Path, row: int, entry: Any) -> int:

@@ -7,8 +7,9 @@ import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from pomona.detect.listed import ListedBox, number_in
+from pomona.detect.listed import ListedBox
 from pomona.errors import PomonaError
+from pomona.reading import number_in
 
 __all__ = ["read_csv"]
 

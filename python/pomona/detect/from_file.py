@@ -13,6 +13,7 @@ from pomona.detect.detections import Detections
 from pomona.detect.listed import ListedBox, by_frame
 from pomona.detect.mot import is_mot, read_mot
 from pomona.errors import PomonaError
+from pomona.reading import read_text
 from pomona.recording import Calibration, Frame
 
 __all__ = ["FileDetector"]
@@ -93,11 +94,4 @@ def _boxes(path: Path, text: str, calibration: Calibration, numbers: Sequence[in
 def _text(path: Path) -> str:
     if path.suffix.lower() == ".onnx":
         raise PomonaError(f"{path}: found a model, expected {EXPECTED}; a model goes with --model")
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise PomonaError(f"{path}: not found, expected {EXPECTED}") from None
-    except OSError as error:
-        raise PomonaError(f"{path}: cannot be read: {error.strerror}, expected {EXPECTED}") from None
-    except UnicodeDecodeError as error:
-        raise PomonaError(f"{path}: not a text ({error.reason} at byte {error.start}), expected {EXPECTED}") from None
+    return read_text(path, EXPECTED)

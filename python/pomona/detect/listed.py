@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,10 @@ import numpy as np
 
 from pomona.detect.detections import Detections
 from pomona.errors import PomonaError
+from pomona.reading import shown
 from pomona.recording import Calibration
 
-__all__ = ["ListedBox", "by_frame", "number_in"]
+__all__ = ["ListedBox", "by_frame"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,18 +65,6 @@ def by_frame(
     return {number: _detections(path, number, found, calibration) for number, found in sorted(frames.items())}
 
 
-def number_in(where: str, field: str, cell: object) -> float:
-    """Give a finite number out of a cell of text or a JSON value."""
-    try:
-        value = math.nan if isinstance(cell, bool) else float(cell)  # type: ignore[arg-type] # what fails is caught
-    except (TypeError, ValueError):
-        value = math.nan
-    if not math.isfinite(value):
-        found = cell.strip() if isinstance(cell, str) else cell
-        raise PomonaError(f"{where}: {field}: found {found!r}, expected a number")
-    return value
-
-
 def _check(path: Path, box: ListedBox, calibration: Calibration) -> None:
     xmin, ymin, xmax, ymax = box.corners_px
     for axis, low, high in (("x", xmin, xmax), ("y", ymin, ymax)):
@@ -103,7 +91,7 @@ def _detections(path: Path, number: int, boxes: list[ListedBox], calibration: Ca
     for box in boxes:
         if box.id and (earlier := first.setdefault(box.id, box)) is not box:
             places = f"{earlier.where} and {box.where}"
-            raise PomonaError(f"{path}: {places}: id: found {box.id!r} twice in frame {number}, expected it once")
+            raise PomonaError(f"{path}: {places}: id: found {shown(box.id)} twice in frame {number}, expected it once")
     return Detections(
         boxes_px=np.clip([box.corners_px for box in boxes], 0.0, np.tile(np.array(calibration.size_px, float), 2)),
         scores=np.array([box.score for box in boxes]),

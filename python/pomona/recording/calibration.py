@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import MOST_NUMBER, parsed_json, read_text, shown
+from pomona.recording.picture_size import require_size
 
 __all__ = ["Calibration", "checked_baseline_m"]
 
@@ -124,12 +125,8 @@ def checked_baseline_m(where: str, baseline_m: float) -> float:
 
 
 def _read_object(path: Path) -> dict[str, Any]:
-    try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise PomonaError(f"{path}: not found, expected the camera's width, height, fx, fy, cx, cy") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise PomonaError(f"{path}: not JSON ({error})") from None
+    expected = "the camera's width, height, fx, fy, cx, cy in JSON"
+    fields = parsed_json(str(path), read_text(path, expected), expected)
     if not isinstance(fields, dict):
         raise PomonaError(
             f"{path}: found a JSON {type(fields).__name__}, expected an object with width, height, fx ..."
@@ -139,10 +136,11 @@ def _read_object(path: Path) -> dict[str, Any]:
 
 def _checked(fields: dict[str, Any]) -> Calibration:
     width, height = _whole(fields, "width"), _whole(fields, "height")
+    require_size("width, height", (width, height))
     shortest, longest = (factor * width for factor in FOCAL_RANGE_WIDTHS)
     focal_unit = f"pixels, for a picture {width} wide"
     if fields.get("rectified", True) is not True:
-        raise PomonaError(f"rectified: found {fields['rectified']!r}, expected true: rectify the pictures first")
+        raise PomonaError(f"rectified: found {shown(fields['rectified'])}, expected true: rectify the pictures first")
     if fields.get("baseline_m") is not None:
         _baseline_m(fields)
     if fields.get("depth_unit_m") is not None:
@@ -171,8 +169,8 @@ def _number(fields: dict[str, Any], name: str) -> float:
     if name not in fields:
         raise PomonaError(f"{name}: missing, expected a number")
     value = fields[name]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise PomonaError(f"{name}: found {value!r}, expected a number")
+    if type(value) not in (int, float) or not abs(value) <= MOST_NUMBER:
+        raise PomonaError(f"{name}: found {shown(value)}, expected a number")
     return float(value)
 
 

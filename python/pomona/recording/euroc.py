@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.reading import number_in, read_text, shown, whole_number
 from pomona.recording.listed import ListedRecording
+from pomona.recording.pictures import picture_inside
 from pomona.recording.poses import transforms
 from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectification import rectified
@@ -83,26 +86,25 @@ def _list(camera: Path) -> tuple[NDArray[np.int64], tuple[Path, ...]]:
     times_ns: list[int] = []
     files: list[Path] = []
     for number, cells in _rows(path):
-        if len(cells) < 2 or not cells[0].isdecimal():
-            raise PomonaError(f"{path}: line {number}: found {','.join(cells)[:40]!r}, expected nanoseconds,file")
-        if times_ns and int(cells[0]) <= times_ns[-1]:
-            raise PomonaError(f"{path}: line {number}: time {cells[0]} ns does not come after {times_ns[-1]} ns")
-        times_ns.append(int(cells[0]))
-        files.append(camera / "data" / cells[1])
+        where = f"{path}: line {number}"
+        time_ns = whole_number(where, cells[0], "nanoseconds,file")
+        if len(cells) < 2 or time_ns < 0:
+            raise PomonaError(f"{where}: found {shown(','.join(cells))}, expected nanoseconds,file")
+        if times_ns and time_ns <= times_ns[-1]:
+            raise PomonaError(f"{where}: time {time_ns} ns does not come after {times_ns[-1]} ns")
+        times_ns.append(time_ns)
+        files.append(picture_inside(where, camera / "data", cells[1]))
     return np.array(times_ns, np.int64), tuple(files)
 
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    rows = csv.reader(io.StringIO(read_text(path, "lines of nanoseconds,file"), newline=""))
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.reader(file)
-            for cells in rows:
-                if cells and not cells[0].startswith("#"):
-                    yield rows.line_num, [cell.strip() for cell in cells]
-    except FileNotFoundError:
-        raise PomonaError(f"{path}: not found, expected lines of nanoseconds,file") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise PomonaError(f"{path}: not a CSV text ({error})") from None
+        for cells in rows:
+            if cells and not cells[0].startswith("#"):
+                yield rows.line_num, [cell.strip() for cell in cells]
+    except csv.Error as error:
+        raise PomonaError(f"{path}: line {rows.line_num}: not a CSV text ({error})") from None
 
 
 def _simultaneous(root: Path, left_ns: NDArray[np.int64], right_ns: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -137,13 +139,11 @@ def _truth(path: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     times_ns: list[int] = []
     states: list[list[float]] = []
     for number, cells in _rows(path):
-        try:
-            times_ns.append(int(cells[0]))
-            states.append([float(cell) for cell in cells[1:8]])
-        except ValueError as error:
-            raise PomonaError(f"{path}: line {number}: {error}") from None
-        if len(states[-1]) != 7 or abs(np.linalg.norm(states[-1][3:]) - 1) > 1e-2:
-            raise PomonaError(f"{path}: line {number}: expected time, position x y z and unit quaternion w x y z")
+        where = f"{path}: line {number}"
+        times_ns.append(whole_number(where, cells[0], "nanoseconds"))
+        states.append([number_in(where, "state", cell) for cell in cells[1:8]])
+        if len(states[-1]) != 7 or not abs(np.linalg.norm(states[-1][3:]) - 1) <= 1e-2:
+            raise PomonaError(f"{where}: expected time, position x y z and unit quaternion w x y z")
     if not times_ns or (np.diff(times_ns) <= 0).any():
         raise PomonaError(f"{path}: found no poses or times that go back, expected ascending nanoseconds")
     state = np.array(states)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import functools
-import json
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import parsed_json, read_text, shown
 from pomona.recording.calibration import Calibration
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
@@ -26,6 +26,8 @@ from pomona.recording.rig_files import find_optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["FolderRecording"]
+
+ABOUT = "an object with name and date"
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +186,9 @@ def _about(folder: Path) -> dict[str, Any]:
     path = folder / "recording.json"
     if not path.is_file():
         return {}
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise PomonaError(f"{path}: not JSON ({error})") from None
+    about = parsed_json(str(path), read_text(path, ABOUT), ABOUT)
     if not isinstance(about, dict):
-        raise PomonaError(f"{path}: found a JSON {type(about).__name__}, expected an object with name and date")
+        raise PomonaError(f"{path}: found a JSON {type(about).__name__}, expected {ABOUT}")
     return about
 
 
@@ -201,7 +200,7 @@ def _date(folder: Path, about: dict[str, Any]) -> str | None:
         except ValueError:
             where = folder / "recording.json"
             raise PomonaError(
-                f"{where}: date: found {about['date']!r}, expected ISO 8601, as 2021-09-27T11:40:12"
+                f"{where}: date: found {shown(about['date'])}, expected ISO 8601, as 2021-09-27T11:40:12"
             ) from None
         return str(about["date"])
     return date_in_name(folder.resolve().name)

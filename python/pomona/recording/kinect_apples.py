@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import datetime
+import io
 import json
 import re
 import shutil
@@ -11,8 +12,10 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pomona.errors import PomonaError
+from pomona.reading import read_text, shown
 from pomona.recording.calibration import Calibration
 from pomona.recording.pictures import read_depth
 
@@ -100,18 +103,20 @@ def _moment(date: str, name: str) -> str:
 
 
 def _write_detections(boxes: Path, detections: Path) -> int:
-    if not boxes.is_file():
-        raise PomonaError(f"{boxes}: not found, expected id,xmin,ymin,xmax,ymax")
-    with (
-        boxes.open(newline="", encoding="utf-8-sig") as read,
-        detections.open("w", newline="", encoding="utf-8") as write,
-    ):
-        rows = csv.DictReader(read)
-        needed = {"id", "xmin", "ymin", "xmax", "ymax"}
-        if not needed <= set(rows.fieldnames or ()):
-            raise PomonaError(f"{boxes}: found {','.join(rows.fieldnames or ())}, expected id,xmin,ymin,xmax,ymax")
+    rows = csv.DictReader(io.StringIO(read_text(boxes, "id,xmin,ymin,xmax,ymax"), newline=""))
+    with detections.open("w", newline="", encoding="utf-8") as write:
+        found = _boxes(boxes, rows)
         writer = csv.DictWriter(write, DETECTION_COLUMNS, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
-        found = [{**row, "frame": 0, "score": 1} for row in rows]
         writer.writerows(found)
     return len(found)
+
+
+def _boxes(path: Path, rows: csv.DictReader[str]) -> list[dict[str, Any]]:
+    try:
+        found = ",".join(rows.fieldnames or ())
+        if not {"id", "xmin", "ymin", "xmax", "ymax"} <= set(rows.fieldnames or ()):
+            raise PomonaError(f"{path}: found {shown(found)}, expected id,xmin,ymin,xmax,ymax")
+        return [{**row, "frame": 0, "score": 1} for row in rows]
+    except csv.Error as error:
+        raise PomonaError(f"{path}: line {rows.line_num}: not a CSV text ({error})") from None

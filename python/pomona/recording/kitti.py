@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import number_in, read_text
 from pomona.recording.listed import ListedRecording
 from pomona.recording.pictures import numbered_pictures
 from pomona.recording.poses import read_kitti
@@ -76,7 +77,7 @@ def _projections(path: Path, sides: tuple[str, str]) -> tuple[NDArray[np.float64
     named = {name.strip(): cells for name, _, cells in lines if name}
     rows = [cells for name, _, cells in lines if not name]
     if named:
-        wanted = [f"P{int(side[-1])}" if side[-1].isdecimal() else f"P{row}" for row, side in enumerate(sides)]
+        wanted = [f"P{side[-1]}" if side[-1].isdecimal() else f"P{row}" for row, side in enumerate(sides)]
         missing = [name for name in wanted if name not in named]
         if missing:
             raise PomonaError(f"{path}: {missing[0]}: missing, expected a line of 12 numbers")
@@ -116,17 +117,11 @@ def _times_s(path: Path, n_frames: int) -> NDArray[np.float64] | None:
 
 
 def _numbers(path: Path, what: str, text: str, count: int) -> NDArray[np.float64]:
-    try:
-        numbers = np.array(text.split(), np.float64)
-    except ValueError as error:
-        raise PomonaError(f"{path}: {what}: {error}") from None
-    if len(numbers) != count or not np.isfinite(numbers).all():
+    numbers = [number_in(str(path), what, cell) for cell in text.split()]
+    if len(numbers) != count:
         raise PomonaError(f"{path}: {what}: found {len(numbers)} numbers, expected {count} finite ones")
-    return numbers
+    return np.array(numbers)
 
 
 def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise PomonaError(f"{path}: not text, expected lines of numbers") from None
+    return read_text(path, "lines of numbers")

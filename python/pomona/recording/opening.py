@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pomona.errors import PomonaError
+from pomona.reading import require_file
 from pomona.recording.frame import Recording
 
 if TYPE_CHECKING:
@@ -49,7 +50,10 @@ def open_recording(
         When there is no recording at `path`, or it is not complete.
     """
     place, given = Path(path), None if calibration is None else Path(calibration)
-    recording = _open(place, given, topics)
+    try:
+        recording = _open(place, given, topics)
+    except OSError as error:
+        raise PomonaError(f"{error.filename or place}: cannot be read: {error.strerror or error}") from None
     if poses is None:
         return recording
     from pomona.recording.posed import with_poses
@@ -58,8 +62,8 @@ def open_recording(
 
 
 def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> RectifiedRecording:
-    if not place.exists():
-        raise PomonaError(f"{place}: not found, expected {ACCEPTED}")
+    if not place.is_dir():
+        require_file(place, ACCEPTED)
     from pomona.recording import bags
     from pomona.recording.video import VIDEO_SUFFIXES, left_and_right, open_video
 

@@ -9,18 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import path_inside, require_file, whole_number
 from pomona.recording.calibration import Calibration
+from pomona.recording.picture_size import encoded_size, require_size
 
 __all__ = [
     "UnreadablePictureError",
     "decoded_picture",
     "numbered_pictures",
+    "picture_inside",
     "picture_size",
     "read_colour",
     "read_depth",
 ]
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+MOST_ENCODED_BYTES = 1 << 29
+"""512 MiB: `MOST_PIXELS` of four channels of 16 bits, not compressed."""
 
 PNG_BEGINS = b"\x89PNG\r\n\x1a\n"
 
@@ -37,10 +43,28 @@ def numbered_pictures(folder: Path) -> dict[int, Path]:
             continue
         if not (file.stem.isascii() and file.stem.isdecimal()):
             raise PomonaError(f"{file}: found the name {file.stem!r}, expected a frame number, for example 0007.png")
-        if int(file.stem) in found:
-            raise PomonaError(f"{file}: frame {int(file.stem)} is there twice, also as {found[int(file.stem)].name}")
-        found[int(file.stem)] = file
+        number = whole_number(str(file), file.stem, "a frame number")
+        if number in found:
+            raise PomonaError(f"{file}: frame {number} is there twice, also as {found[number].name}")
+        found[number] = _no_special(file)
     return dict(sorted(found.items()))
+
+
+def picture_inside(where: str, folder: Path, name: str) -> Path:
+    """Give the file of a picture that a list names; one that is not there costs its frame, later.
+
+    Raises
+    ------
+    PomonaError
+        One line that begins with `where`: the name leads out of the folder, or to a pipe or a device.
+    """
+    return _no_special(path_inside(where, folder, name))
+
+
+def _no_special(file: Path) -> Path:
+    if file.exists():
+        require_file(file, "a picture")
+    return file
 
 
 def picture_size(path: Path) -> tuple[int, int]:
@@ -55,7 +79,7 @@ def read_colour(path: Path, calibration: Calibration) -> NDArray[np.uint8]:
     """Read a colour picture as (H, W, 3) uint8, BGR."""
     import cv2
 
-    picture = _decode(path, cv2.IMREAD_COLOR)
+    picture = _decode(path, cv2.IMREAD_COLOR, calibration.size_px)
     _require_size(path, picture, calibration)
     return np.asarray(picture, np.uint8)
 
@@ -64,7 +88,7 @@ def read_depth(path: Path, calibration: Calibration) -> NDArray[np.float32]:
     """Read a 16-bit depth picture as (H, W) float32 metres along the optical axis, 0 where nothing was measured."""
     import cv2
 
-    picture = _decode(path, cv2.IMREAD_UNCHANGED)
+    picture = _decode(path, cv2.IMREAD_UNCHANGED, calibration.size_px)
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     if channels != 1:
         raise PomonaError(f"{path}: found {channels} channels, expected one: depth, 16 bit")
@@ -75,8 +99,27 @@ def read_depth(path: Path, calibration: Calibration) -> NDArray[np.float32]:
     return picture.astype(np.float32) * np.float32(calibration.depth_unit_m)
 
 
-def decoded_picture(where: str | Path, encoded: NDArray[np.uint8], flags: int) -> NDArray[Any]:
-    """Decode the bytes of a PNG or JPEG as `cv2.imdecode` does, but not one that is cut off.
+def decoded_picture(
+    where: str | Path,
+    encoded: NDArray[np.uint8],
+    flags: int,
+    size_px: tuple[int, int] | None = None,
+    size_of: str = "in the calibration",
+) -> NDArray[Any]:
+    """Decode the bytes of a picture as `cv2.imdecode` does, but not one that is cut off or of a wrong size.
+
+    Parameters
+    ----------
+    where : str or Path
+        For messages.
+    encoded : (N,) uint8
+        PNG or JPEG, or another kind whose size `encoded_size` can tell.
+    flags : int
+        Of OpenCV.
+    size_px : (width, height), optional
+        What it must be, told from the header, before memory is taken; else anything that somebody records.
+    size_of : str
+        Where that size is from, for messages.
 
     Raises
     ------
@@ -85,23 +128,47 @@ def decoded_picture(where: str | Path, encoded: NDArray[np.uint8], flags: int) -
     """
     import cv2
 
-    kind = _cut_off(encoded.tobytes())
+    content = encoded.tobytes()
+    kind = _cut_off(content)
     if kind is not None:
         raise UnreadablePictureError(f"{where}: the {kind} is cut off")
-    picture = cv2.imdecode(encoded, flags) if len(encoded) else None
+    found_px = encoded_size(content)
+    if found_px is not None:
+        _require_decodable(where, found_px, size_px, size_of)
+    try:
+        picture = cv2.imdecode(encoded, flags) if found_px is not None else None
+    except cv2.error:
+        picture = None
     if picture is None:
         raise UnreadablePictureError(f"{where}: not a picture, or a corrupt one")
     return np.asarray(picture)
 
 
-def _decode(path: Path, flags: int) -> NDArray[Any]:
+def _require_decodable(
+    where: str | Path, found_px: tuple[int, int], size_px: tuple[int, int] | None, size_of: str
+) -> None:
+    # A picture may be turned by what its camera noted, so width and height may change places.
+    if size_px is not None and sorted(found_px) != sorted(size_px):
+        found, expected = ("{}x{}".format(*each) for each in (found_px, size_px))
+        raise UnreadablePictureError(f"{where}: found {found} pixels, expected {expected} as {size_of}")
     try:
+        require_size(str(where), found_px)
+    except PomonaError as error:
+        raise UnreadablePictureError(str(error)) from None
+
+
+def _decode(path: Path, flags: int, size_px: tuple[int, int] | None = None) -> NDArray[Any]:
+    try:
+        if require_file(path, "a picture") > MOST_ENCODED_BYTES:
+            raise PomonaError(f"{path}: found more than {MOST_ENCODED_BYTES >> 20} MiB, expected a picture")
         encoded = np.fromfile(path, np.uint8)
+    except PomonaError as error:
+        raise UnreadablePictureError(str(error)) from None
     except OSError as error:
         raise UnreadablePictureError(f"{path}: cannot be read: {error.strerror}") from None
     if path.suffix.lower() == ".png" and encoded[:8].tobytes() != PNG_BEGINS:
         raise UnreadablePictureError(f"{path}: the PNG is cut off or not a PNG")
-    return decoded_picture(path, encoded, flags)
+    return decoded_picture(path, encoded, flags, size_px)
 
 
 def _cut_off(encoded: bytes) -> str | None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import number_in, read_text
 
 __all__ = ["is_kitti", "read_kitti", "read_tum", "transforms"]
 
@@ -69,12 +70,7 @@ def transforms(quaternions: NDArray[np.float64], positions: NDArray[np.float64])
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise PomonaError(f"{path}: not text, expected lines of poses: TUM or KITTI") from None
-    except OSError as error:
-        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
+    text = read_text(path, "lines of poses: TUM or KITTI")
     numbered = ((number, line.partition("#")[0].strip()) for number, line in enumerate(text.splitlines(), start=1))
     return [(number, line) for number, line in numbered if line]
 
@@ -90,13 +86,7 @@ def _row(path: Path, number: int, line: str) -> list[float]:
 
 
 def _cells(path: Path, number: int, line: str) -> list[float]:
-    try:
-        cells = [float(cell) for cell in line.split()]
-    except ValueError as error:
-        raise PomonaError(f"{path}: line {number}: {error}") from None
-    if not np.isfinite(cells).all():
-        raise PomonaError(f"{path}: line {number}: found NaN or infinity, expected finite numbers")
-    return cells
+    return [number_in(f"{path}: line {number}", "pose", cell) for cell in line.split()]
 
 
 def _rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -77,8 +77,19 @@ def rectified(rig: Rig, size_px: tuple[int, int], *, stereo: bool, depth_unit_m:
     Raises
     ------
     PomonaError
-        When the size differs, or a stereo recording has no baseline or one that is not in metres.
+        When the size differs, a stereo recording has no baseline or one that is not in metres, or OpenCV cannot.
     """
+    import cv2
+
+    try:
+        return _rectified(rig, size_px, stereo, depth_unit_m)
+    except cv2.error:
+        raise PomonaError(
+            f"{rig.where}: found cameras that cannot be rectified, expected those of a recording"
+        ) from None
+
+
+def _rectified(rig: Rig, size_px: tuple[int, int], stereo: bool, depth_unit_m: float) -> Optics:
     for camera in (rig.left, rig.right if stereo else None):
         if camera is not None and camera.size_px not in (None, size_px):
             found, expected = ("{}x{}".format(*size or ()) for size in (camera.size_px, size_px))
@@ -88,6 +99,8 @@ def rectified(rig: Rig, size_px: tuple[int, int], *, stereo: bool, depth_unit_m:
     if rig.right is None:
         raise PomonaError(f"{rig.where}: no baseline: found one camera, expected the right one and its distance too")
     left_rotation, left_projection, right_rotation, right_projection = _bouguet(rig, rig.right, size_px)
+    if not (np.isfinite([left_projection, right_projection]).all() and right_projection[0, 0] > 0):
+        raise PomonaError(f"{rig.where}: found cameras that cannot be rectified, expected those of a pair")
     if abs(right_projection[1, 3]) > abs(right_projection[0, 3]):
         raise PomonaError(f"{rig.where}: the cameras are one above the other, expected left and right")
     baseline_m = (left_projection[0, 3] - right_projection[0, 3]) / right_projection[0, 0]

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.bags.mcap_file import McapFile
+from pomona.recording.bags.message_file import counted
 from pomona.recording.dates import date_of_ns
+from pomona.recording.picture_size import MOST_PIXELS, require_size
 from pomona.recording.rig_files import find_optics
 from pomona.recording.video import VideoRecording
 from pomona.recording.video_file import missing_pyav
@@ -92,6 +94,7 @@ class Svo2Video:
         logged_ns, stamps_ns, keys, first, size_px = _listed(file, found[0])
         if first is None or size_px is None:
             raise PomonaError(f"{path}: {found[0]}: found no picture that is whole")
+        require_size(f"{path}: {found[0]}", size_px)
         stamps_ns = _stamps(path, logged_ns, stamps_ns)
         codec = _codec(path, first)
         created = date_of_ns(int(stamps_ns[0]))
@@ -105,7 +108,7 @@ class Svo2Video:
     def pictures(self, rows: Sequence[int] | None = None) -> Iterator[VideoPicture]:
         """Decode picture by picture, all or those of some rows; what cannot be decoded raises when it is read."""
         chosen = range(len(self.times_s)) if rows is None else rows
-        return wanted_pictures(chosen, self.keys, self._decoded, self._where)
+        return wanted_pictures(chosen, self.keys, self._decoded, self._where, self.size_px)
 
     def _decoded(self, rows: Sequence[int]) -> Iterator[tuple[int, VideoFrame]]:
         """Decode from the key picture of the first row on; give (row, picture) in ascending order."""
@@ -114,7 +117,7 @@ class Svo2Video:
         key = key_row(self.keys, rows[0])
         decoder: Any = av.CodecContext.create(self.codec, "r")
         # With threads, or without this option, damage is filled in silently and differently from run to run.
-        decoder.thread_count, decoder.options = 1, {"err_detect": "explode"}
+        decoder.thread_count, decoder.options = 1, {"err_detect": "explode", "max_pixels": str(MOST_PIXELS)}
         messages = self.file.messages({self.topic}, int(self.logged_ns[key]))
         first = int(np.searchsorted(self.logged_ns, self.logged_ns[key]))
         for row, message in enumerate(messages, start=first):
@@ -163,7 +166,7 @@ def _listed(
     keys: list[int] = []
     first: bytes | None = None
     size_px: tuple[int, int] | None = None
-    for row, message in enumerate(file.messages({topic})):
+    for row, message in enumerate(counted(file.path, file.messages({topic}))):
         unit = _unit(message.body)
         logged_ns.append(message.logged_ns)
         stamps_ns.append(0 if unit is None else unit[2])

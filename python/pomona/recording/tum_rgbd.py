@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.reading import read_text, shown
 from pomona.recording.listed import ListedRecording
 from pomona.recording.pairing import mutually_nearest
+from pomona.recording.pictures import picture_inside
 from pomona.recording.poses import read_tum
 from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectified_pictures import size_of_first
@@ -67,23 +69,19 @@ def _list(path: Path) -> tuple[NDArray[np.float64], tuple[Path, ...]]:
     """Read lines of `time file`; `#` starts a comment."""
     times_s: list[float] = []
     files: list[Path] = []
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError:
-        raise PomonaError(f"{path}: not text, expected lines of time and file") from None
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_text(path, "lines of time and file").splitlines(), start=1):
         words = line.partition("#")[0].split(maxsplit=1)
         if not words:
             continue
         try:
             time_s, file = float(words[0]), words[1].strip()
         except (ValueError, IndexError):
-            raise PomonaError(f"{path}: line {number}: found {line[:40]!r}, expected a time and a file") from None
+            raise PomonaError(f"{path}: line {number}: found {shown(line)}, expected a time and a file") from None
         if not np.isfinite(time_s) or (times_s and time_s <= times_s[-1]):
             before = f"{times_s[-1]:.6f} s" if times_s else "anything"
             raise PomonaError(f"{path}: line {number}: time {time_s:.6f} s does not come after {before}")
         times_s.append(time_s)
-        files.append(path.parent / file)
+        files.append(picture_inside(f"{path}: line {number}", path.parent, file))
     return np.array(times_s), tuple(files)
 
 

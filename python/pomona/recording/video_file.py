@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.picture_size import MOST_PIXELS, require_size
 from pomona.recording.video_runs import VideoPicture, key_row, wanted_pictures
 
 if TYPE_CHECKING:
@@ -21,8 +22,14 @@ if TYPE_CHECKING:
 
 __all__ = ["VideoFile", "missing_pyav"]
 
+MOST_FRAMES = 10_000_000
+"""A day at 100 Hz."""
+
 CUT_OFF_FRAMES = 2
 """A header may promise the length in rounded time: a video is cut off when more than this is missing."""
+
+ALONE = {"format_whitelist": "mov,mp4,m4a,matroska,webm,avi,mpegts,h264,hevc", "protocol_whitelist": "file"}
+"""Of a video's own: a file that is a playlist, whatever its suffix, would have FFmpeg open others, by the net too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +66,7 @@ class VideoFile:
         """
         with _opened(path) as container:
             stream = container.streams.video[0]
+            require_size(str(path), (stream.width, stream.height))
             stamps, keys = _stamps(path, container)
             seconds = float(stream.time_base or 0)
             times_s = np.array(stamps, np.float64) * seconds
@@ -74,7 +82,7 @@ class VideoFile:
             Which of `stamps`, ascending; all where not given. Long stretches that nobody wants are jumped over.
         """
         chosen = range(len(self.stamps)) if rows is None else rows
-        return wanted_pictures(chosen, self.keys, self._decoded, self._where)
+        return wanted_pictures(chosen, self.keys, self._decoded, self._where, self.size_px)
 
     def _decoded(self, rows: Sequence[int]) -> Iterator[tuple[int, VideoFrame]]:
         """Decode from the key picture of the first row on; give (row, picture) in ascending order."""
@@ -110,13 +118,13 @@ def _opened(path: Path) -> InputContainer:
     except ImportError:
         raise missing_pyav(path) from None
     try:
-        container = av.open(str(path))
+        container = av.open(str(path.absolute()), options=ALONE, metadata_errors="replace")
     except (av.error.FFmpegError, OSError) as error:
         what = getattr(error, "strerror", None) or str(error)
         raise PomonaError(f"{path}: not a video, or one that was cut off before its index ({what})") from None
-    if not container.streams.video:
+    if not container.streams.video or container.streams.video[0].codec_context is None:
         container.close()
-        raise PomonaError(f"{path}: found no pictures in it, expected a video")
+        raise PomonaError(f"{path}: found no pictures in it that can be decoded, expected a video")
     return container
 
 
@@ -136,6 +144,8 @@ def _stamps(path: Path, container: InputContainer) -> tuple[tuple[int, ...], tup
         if packet is None:
             break
         stamp = packet.pts if packet.pts is not None else packet.dts
+        if len(stamps) >= MOST_FRAMES:
+            raise PomonaError(f"{path}: found more than {MOST_FRAMES} frames, expected a video of a day at most")
         if packet.size and not packet.is_discard and stamp is not None:
             stamps.append(stamp)
             if packet.is_keyframe:
@@ -166,7 +176,7 @@ def _decoded(container: InputContainer, wanted: frozenset[int]) -> Iterator[Any]
     # With threads a damaged stream gives other pictures from run to run.
     stream.codec_context.thread_count = 1
     # Without it H.264 fills what is lost from other pictures, and does not say so.
-    stream.codec_context.options = {"err_detect": "explode"}
+    stream.codec_context.options = {"err_detect": "explode", "max_pixels": str(MOST_PIXELS)}
     alone = stream.codec_context.codec.intra_only
     packets = container.demux(stream)
     while True:

@@ -28,12 +28,17 @@ class VideoPicture:
 
     where: str
     frame: VideoFrame | None
+    size_px: tuple[int, int]
     _bgr: NDArray[np.uint8] | None = None
 
     def read(self) -> NDArray[np.uint8]:
         """Give (H, W, 3) uint8, BGR."""
         if self.frame is None:
             raise UnreadablePictureError(f"{self.where}: the picture is corrupt")
+        found_px = (self.frame.width, self.frame.height)
+        if found_px != self.size_px:
+            found, expected = ("{}x{}".format(*each) for each in (found_px, self.size_px))
+            raise UnreadablePictureError(f"{self.where}: found {found} pixels, expected {expected} as the header says")
         if self._bgr is None:
             self._bgr = np.asarray(self.frame.to_ndarray(format="bgr24"), np.uint8)
         return self._bgr
@@ -50,6 +55,7 @@ def wanted_pictures(
     keys: Sequence[int],
     decoded: Callable[[Sequence[int]], Iterable[tuple[int, VideoFrame]]],
     where: Callable[[int], str],
+    size_px: tuple[int, int],
 ) -> Iterator[VideoPicture]:
     """Give one picture for each row; those that were not decoded, or are corrupt, raise when they are read.
 
@@ -63,19 +69,21 @@ def wanted_pictures(
         Decodes from the key picture of the first of some rows on, (row, picture) in ascending order.
     where : callable
         Names the picture of a row.
+    size_px : (width, height)
+        What pictures must be.
     """
     for run in _runs(rows, keys):
         upcoming = 0
         for row, frame in decoded(run):
             while upcoming < len(run) and run[upcoming] < row:
-                yield VideoPicture(where(run[upcoming]), None)
+                yield VideoPicture(where(run[upcoming]), None, size_px)
                 upcoming += 1
             if upcoming < len(run) and run[upcoming] == row:
-                yield VideoPicture(where(row), None if frame.is_corrupt else frame)
+                yield VideoPicture(where(row), None if frame.is_corrupt else frame, size_px)
                 upcoming += 1
             if upcoming == len(run):
                 break
-        yield from (VideoPicture(where(missing), None) for missing in run[upcoming:])
+        yield from (VideoPicture(where(missing), None, size_px) for missing in run[upcoming:])
 
 
 def _runs(rows: Sequence[int], keys: Sequence[int]) -> Iterator[Sequence[int]]:

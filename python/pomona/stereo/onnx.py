@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.depth import FruitDepth
-from pomona.detect.onnx.network import open_session, reason_of
+from pomona.detect.onnx.network import input_size, open_session, reason_of
 from pomona.errors import PomonaError
+from pomona.reading import shown
 from pomona.recording.calibration import Calibration
 from pomona.stereo.pair import Picture, depth_of_disparity, focal_baseline_px_m, in_colour
 
@@ -83,7 +84,7 @@ class OnnxStereo:
         if "right" in inputs[0].name.lower():
             inputs = inputs[::-1]
         height, width = inputs[0].shape[2:]
-        size_px = (width, height) if isinstance(width, int) and isinstance(height, int) else None
+        size_px = input_size(path, width, height)
         names = (inputs[0].name, inputs[1].name)
         return cls(path, calibration, values, disparity_sigma_px, session, names, size_px)
 
@@ -92,10 +93,10 @@ class OnnxStereo:
         pair = [in_colour(one, self.calibration) for one in (left, right)]
         fed = dict(zip(self._inputs, map(self._prepared, pair), strict=True))
         try:
-            output = np.asarray(self._session.run(None, fed)[0], np.float32)
+            output = self._session.run(None, fed)[0]
         except Exception as error:  # ONNX Runtime's errors have no base of their own
             raise PomonaError(f"{self.path}: cannot be run: {reason_of(error)}") from None
-        disparity_px = self._disparity_px(output)
+        disparity_px = self._disparity_px(_numbers(self.path, output))
         sigma_px = np.full(len(boxes_px), self.disparity_sigma_px)
         return FruitDepth(depth_of_disparity(disparity_px, self.calibration), sigma_px)
 
@@ -115,9 +116,15 @@ class OnnxStereo:
         found = np.squeeze(output)
         if found.ndim != 2 or (self._size_px is None and (found.shape[0] < height or found.shape[1] < width)):
             raise PomonaError(f"{self.path}: output: found shape {output.shape}, expected (1, 1, {height}, {width})")
-        # Networks of optical flow give the motion to the left as negative.
-        found = np.abs(found)
+        # Networks of optical flow give the motion to the left as negative; what is no number is no disparity.
+        found = np.nan_to_num(np.abs(found), nan=0.0, posinf=0.0)
         if self._size_px is None:
             return np.ascontiguousarray(found[:height, :width])
         sized = np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
         return sized * np.float32(width / found.shape[1])
+
+
+def _numbers(path: Path, output: Any) -> NDArray[np.float32]:
+    if not isinstance(output, np.ndarray) or output.dtype.kind not in "fiu" or not output.size:
+        raise PomonaError(f"{path}: output: found {shown(output)}, expected disparities")
+    return np.asarray(output, np.float32)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -19,12 +20,24 @@ from pomona.atomic import whole_file
 from pomona.depth import Lifted, Refusal
 from pomona.detect import Detections
 from pomona.errors import PomonaError
+from pomona.reading import parsed_json, read_text, require_file, shown
 from pomona.recording import Frame
 from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]
 
 FORMAT = 1
+
+MOST_BYTES = 1 << 28
+"""256 MiB unpacked: a frame of ten thousand boxes is 4 MB."""
+
+MOST_REASON = 100
+"""Characters of what a library says that a message repeats."""
+
+UNREADABLE = (
+    *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError),  # of the archive
+    *(KeyError, ValueError, TypeError, AttributeError, MemoryError, PomonaError),  # of what is in it
+)
 
 LIFTED = ("rows", "centres_in_camera", "covariances", "diameters_m", "diameter_sigmas_m", "hidden", "support")
 
@@ -74,14 +87,16 @@ class Kept:
 
 
 def _require_same(note: Path, ours: str) -> None:
-    theirs = note.read_text(encoding="utf-8")
+    theirs = read_text(note, "what we keep")
     if theirs == ours:
         return
-    found, expected = json.loads(theirs), json.loads(ours)
-    odd = next(name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name))
-    raise PomonaError(
-        f"{note}: {odd}: found {found.get(odd)!r}, expected {expected.get(odd)!r}: remove the folder or take another"
-    )
+    found, expected = parsed_json(str(note), theirs, "what we keep"), json.loads(ours)
+    if not isinstance(found, dict):
+        raise PomonaError(f"{note}: found {shown(found)}, expected what we keep: remove the folder or take another")
+    odd = next((name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name)), None)
+    if odd is not None:
+        there, wanted = shown(found.get(odd)), shown(expected.get(odd))
+        raise PomonaError(f"{note}: {odd}: found {there}, expected {wanted}: remove the folder or take another")
 
 
 def _write(file: Path, look: Look) -> None:
@@ -96,8 +111,16 @@ def _write(file: Path, look: Look) -> None:
         np.savez(stream, **arrays)
 
 
+def _require_bounded(file: Path) -> None:
+    with zipfile.ZipFile(file) as archive:
+        if sum(member.file_size for member in archive.infolist()) > MOST_BYTES:
+            raise ValueError(f"more than {MOST_BYTES >> 20} MiB unpacked")
+
+
 def _read(file: Path, frame: int) -> Look:
     try:
+        require_file(file, "a kept frame")
+        _require_bounded(file)
         with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             ids = tuple(json.loads(str(arrays["ids"]))) if "ids" in arrays else None
             refused = json.loads(str(arrays["refused"]))
@@ -110,5 +133,5 @@ def _read(file: Path, frame: int) -> Look:
                 ),
                 arrays.get("colours"),
             )
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise PomonaError(f"{file}: not a kept frame ({error}): remove it") from None
+    except UNREADABLE as error:
+        raise PomonaError(f"{file}: not a kept frame ({str(error)[:MOST_REASON]}): remove it") from None

@@ -58,8 +58,9 @@ pub struct Rig {
 impl Rig {
     /// Disparities that are tried: the first, and one after the last.
     fn disparities(&self) -> (usize, usize) {
-        let first = (self.focal_baseline_px_m / FARTHEST_M).ceil().max(1.0) as usize;
-        let end = (self.focal_baseline_px_m / self.nearest_m).ceil() as usize + 1;
+        // No disparity is wider than the picture, whatever the baseline.
+        let first = ((self.focal_baseline_px_m / FARTHEST_M).ceil().max(1.0) as usize).min(self.camera.width.max(1));
+        let end = ((self.focal_baseline_px_m / self.nearest_m).ceil() as usize).saturating_add(1);
         (first, end.clamp(first + 2 * VALLEY_PX + 2, self.camera.width.max(first + 2 * VALLEY_PX + 2)))
     }
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from pomona.detect.onnx.preparation import Preparation
 from pomona.errors import PomonaError
+from pomona.reading import number_in, parsed_json, shown
 
 __all__ = ["OWN_KEY", "Claim", "claim_of"]
 
@@ -18,6 +18,12 @@ OWN_KEY = "pomona_detector"
 """Our own key: JSON with `version` 1, `family`, and where they differ from the family's `names` and `preparation`."""
 
 RFDETR_KEY = "rfdetr_inference"
+MISUNDERSTOOD = (
+    *(AttributeError, KeyError, IndexError, TypeError, ValueError),
+    *(OverflowError, RecursionError, MemoryError, SyntaxError),  # of `ast.literal_eval` too
+)
+"""What comes of metadata that is not what its key promises."""
+
 TASKS = ("detect", "segment")
 
 
@@ -66,20 +72,20 @@ def claim_of(path: Path, metadata: Mapping[str, str]) -> Claim:
         if key in metadata:
             try:
                 return read(f"{path}: metadata {key}", metadata)
-            except (AttributeError, KeyError, SyntaxError, TypeError, ValueError) as error:
-                found = " ".join(metadata[key][:60].split())
-                raise PomonaError(f"{path}: metadata {key}: cannot be read: found {found!r} ({error})") from None
+            except MISUNDERSTOOD as error:
+                found, reason = shown(" ".join(metadata[key].split())), " ".join(str(error).split())[:200]
+                raise PomonaError(f"{path}: metadata {key}: cannot be read: found {found} ({reason})") from None
     return Claim("its inputs and outputs")
 
 
 def _own(where: str, metadata: Mapping[str, str]) -> Claim:
-    content = json.loads(metadata[OWN_KEY])
+    content = parsed_json(where, metadata[OWN_KEY], "what we write")
     unknown = content.keys() - {"version", "family", "names", "preparation"}
     unknown |= content.get("preparation", {}).keys() - {known.name for known in fields(Preparation)}
     if unknown:
         raise PomonaError(f"{where}: found {', '.join(sorted(unknown))}, expected version, family, names, preparation")
     if content["version"] != 1:
-        raise PomonaError(f"{where}: version: found {content['version']!r}, expected 1")
+        raise PomonaError(f"{where}: version: found {shown(content['version'])}, expected 1")
     names = content.get("names")
     return Claim(
         source=f"its metadata {OWN_KEY}",
@@ -93,24 +99,28 @@ def _checked_preparation(where: str, given: dict[str, Any]) -> dict[str, Any]:
     accepted = {"fit": ("letterbox", "corner", "stretch"), "channels": ("RGB", "BGR")}
     for name, values in {**accepted, "resize": ("linear", "float", "smooth")}.items():
         if name in given and given[name] not in values:
-            raise PomonaError(f"{where}: {name}: found {given[name]!r}, expected one of {', '.join(values)}")
-    numbers: dict[str, Any] = {name: tuple(map(float, given[name])) for name in ("mean", "std") if name in given}
+            raise PomonaError(f"{where}: {name}: found {shown(given[name])}, expected one of {', '.join(values)}")
+    numbers: dict[str, Any] = {
+        name: tuple(number_in(where, name, value) for value in given[name]) for name in ("mean", "std") if name in given
+    }
     if any(len(values) != 3 for values in numbers.values()) or 0.0 in numbers.get("std", ()):
-        raise PomonaError(f"{where}: found mean or std {given}, expected three numbers each, no std of 0")
-    scale = {"divide_by": float(given["divide_by"])} if "divide_by" in given else {}
+        raise PomonaError(f"{where}: found mean or std {shown(given)}, expected three numbers each, no std of 0")
+    scale = {"divide_by": number_in(where, "divide_by", given["divide_by"])} if "divide_by" in given else {}
+    if 0.0 in scale.values():
+        raise PomonaError(f"{where}: divide_by: found 0, expected 255 or 1")
     return {**given, **numbers, **scale}
 
 
 def _rfdetr(where: str, metadata: Mapping[str, str]) -> Claim:
-    content = json.loads(metadata[RFDETR_KEY])
+    content = parsed_json(where, metadata[RFDETR_KEY], "what RF-DETR writes")
     if content["task"] not in TASKS:
-        raise PomonaError(f"{where}: task: found {content['task']!r}, expected {' or '.join(TASKS)}")
+        raise PomonaError(f"{where}: task: found {shown(content['task'])}, expected {' or '.join(TASKS)}")
     named = content.get("class_id_to_name") or dict(enumerate(content["class_names"]))
     return Claim(
         source=f"its metadata {RFDETR_KEY}",
         family="rfdetr",
         names={int(number): str(name) for number, name in named.items()},
-        preparation={"mean": tuple(content["means"]), "std": tuple(content["stds"])},
+        preparation=_checked_preparation(where, {"mean": content["means"], "std": content["stds"]}),
         outputs={role: str(name) for role, name in content["outputs"].items()},
     )
 
@@ -123,7 +133,7 @@ def _ultralytics(where: str, metadata: Mapping[str, str]) -> Claim:
     }
     task = metadata.get("task", "detect")
     if task not in TASKS:
-        raise PomonaError(f"{where.replace('names', 'task')}: found {task!r}, expected {' or '.join(TASKS)}")
+        raise PomonaError(f"{where.replace('names', 'task')}: found {shown(task)}, expected {' or '.join(TASKS)}")
     size = ast.literal_eval(metadata["imgsz"]) if "imgsz" in metadata else None
     return Claim(
         source="its metadata of Ultralytics",

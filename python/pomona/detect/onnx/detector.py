@@ -171,10 +171,13 @@ class OnnxDetector:
         """Boxes and scores of one tile, in the pixels of the picture."""
         part, size_px = picture[tile.ymin : tile.ymax, tile.xmin : tile.xmax], self.signature.size_px
         given, placement = prepare(part, size_px, self.signature.preparation)
-        candidates = self.signature.decoder(self.network.run(given), self.selection)
-        if FAMILIES[self.signature.family].overlapping:
-            candidates = suppress(candidates, self.iou, across_classes=self.class_agnostic)
-        boxes_px = placement.to_picture(tightened(candidates, size_px)) + np.tile((tile.xmin, tile.ymin), 2)
+        outputs = self.network.run(given)
+        # A network may give NaN and infinity; boxes of such numbers are left out at the end.
+        with np.errstate(all="ignore"):
+            candidates = self.signature.decoder(outputs, self.selection)
+            if FAMILIES[self.signature.family].overlapping:
+                candidates = suppress(candidates, self.iou, across_classes=self.class_agnostic)
+            boxes_px = placement.to_picture(tightened(candidates, size_px)) + np.tile((tile.xmin, tile.ymin), 2)
         return boxes_px, candidates.scores
 
     def _margin_px(self, tile: Tile) -> float:

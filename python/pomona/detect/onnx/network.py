@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import require_file
+from pomona.recording.picture_size import require_size
 
-__all__ = ["SIZES_INPUT", "Network", "Outputs", "open_session", "reason_of"]
+__all__ = ["SIZES_INPUT", "Network", "Outputs", "input_size", "open_session", "reason_of"]
 
 Outputs = dict[str, NDArray[Any]]
 """The outputs for one picture by name, their axis of the batch taken off."""
@@ -68,7 +70,7 @@ class Network:
         return cls(
             path=path,
             metadata=dict(session.get_modelmeta().custom_metadata_map),
-            size_px=(width, height) if isinstance(width, int) and isinstance(height, int) else None,
+            size_px=input_size(path, width, height),
             takes_sizes=takes_sizes,
             _session=session,
             _input=picture.name,
@@ -91,7 +93,25 @@ class Network:
         except Exception as error:  # ONNX Runtime's errors have no base of their own
             raise PomonaError(f"{self.path}: cannot be run: {reason_of(error)}") from None
         names = (tensor.name for tensor in self._session.get_outputs())
-        return {name: _of_one_picture(output) for name, output in zip(names, outputs, strict=True)}
+        arrays = {name: _of_one_picture(output) for name, output in zip(names, outputs, strict=True)}
+        odd = next((name for name, array in arrays.items() if array.dtype.kind not in "fiu"), None)
+        if odd is not None:
+            raise PomonaError(f"{self.path}: outputs: found {odd} of {arrays[odd].dtype}, expected numbers")
+        return arrays
+
+
+def input_size(path: Path, width: object, height: object) -> tuple[int, int] | None:
+    """Width and height of an input, None where any goes.
+
+    Raises
+    ------
+    PomonaError
+        When they are none of a picture's.
+    """
+    # An axis of any length has a name or None in place of a number, or a number below 0.
+    if not isinstance(width, int) or not isinstance(height, int) or min(width, height) < 0:
+        return None
+    return require_size(f"{path}: input", (width, height))
 
 
 def open_session(path: Path, threads: int | None = None) -> Any:
@@ -107,8 +127,7 @@ def open_session(path: Path, threads: int | None = None) -> Any:
     except ImportError:
         needed = "a model needs ONNX Runtime, which is not installed"
         raise PomonaError(f"{path}: {needed}: pip install 'pomona[onnx]'") from None
-    if not path.is_file():
-        raise PomonaError(f"{path}: not found, expected an ONNX model")
+    require_file(path, "an ONNX model")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads or _cores()
     options.inter_op_num_threads = 1
@@ -117,9 +136,18 @@ def open_session(path: Path, threads: int | None = None) -> Any:
     # Threads that spin while they wait take the cores from odometry and depth, which run between two pictures.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        _require_texts(session)
+        return session
     except Exception as error:  # ONNX Runtime's errors have no base of their own
         raise PomonaError(f"{path}: not a model that ONNX Runtime can load: {reason_of(error)}") from None
+
+
+def _require_texts(session: Any) -> None:
+    """Read all that the file says of itself: ONNX Runtime decodes it when it is asked for, and fails then."""
+    for tensor in (*session.get_inputs(), *session.get_outputs()):
+        repr((tensor.name, tensor.shape, tensor.type))
+    dict(session.get_modelmeta().custom_metadata_map)
 
 
 def _cores() -> int:
@@ -128,7 +156,6 @@ def _cores() -> int:
 
 
 def _is_picture(tensor: Any) -> bool:
-    # An axis of any length has a name or None in place of a number.
     fits = [not isinstance(side, int) or side == wanted for side, wanted in zip(tensor.shape, (1, 3), strict=False)]
     return len(tensor.shape) == 4 and all(fits) and tensor.type in DTYPES
 

@@ -15,6 +15,8 @@ from pomona.detect.onnx.families import FAMILIES, Decoder, Family, Layout
 from pomona.detect.onnx.network import Network, Outputs
 from pomona.detect.onnx.preparation import PADDING, Preparation, prepare
 from pomona.errors import PomonaError
+from pomona.reading import shown
+from pomona.recording.picture_size import require_size
 
 __all__ = ["ALIASES", "Signature", "identify"]
 
@@ -125,13 +127,13 @@ def _known(network: Network, name: str, source: str) -> str:
     key = ALIASES.get(name.lower(), name.lower())
     if key not in FAMILIES:
         expected = ", ".join([*FAMILIES, *ALIASES])
-        raise PomonaError(f"{network.path}: family: found {name!r} in {source}, expected one of {expected}")
+        raise PomonaError(f"{network.path}: family: found {shown(name)} in {source}, expected one of {expected}")
     return key
 
 
 def _size(network: Network, wanted_px: tuple[int, int] | None) -> tuple[int, int]:
     if network.size_px is None:
-        return wanted_px or (DEFAULT_SIDE_PX, DEFAULT_SIDE_PX)
+        return require_size(f"{network.path}: input", wanted_px or (DEFAULT_SIDE_PX, DEFAULT_SIDE_PX))
     return network.size_px
 
 

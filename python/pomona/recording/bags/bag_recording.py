@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.errors import PomonaError
 from pomona.recording.bags.contents import PictureTopic
 from pomona.recording.bags.message_file import Message, MessageFile, decoded
 from pomona.recording.bags.pictures import colour_of, depth_of
@@ -138,9 +139,7 @@ class BagRecording:
             raise UnreadablePictureError(f"{where}: no longer there")
         try:
             content = decoded(message)
-        except UnreadablePictureError:
-            raise
-        except Exception:
+        except PomonaError:
             raise UnreadablePictureError(f"{where}: the message is corrupt") from None
         if kind == "depth":
             depth_m = depth_of(where, content, pictures.size_px, self.calibration.depth_unit_m)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.recording.bags.message_file import Message, MessageFile, Topic, decoded, stamp_ns
+from pomona.reading import number_in
+from pomona.recording.bags.message_file import Message, MessageFile, Topic, counted, decoded, stamp_ns
 from pomona.recording.bags.pictures import is_depth, size_of
 from pomona.recording.bags.realsense import is_depth_unit, is_extrinsics, static_transform, stream_frame
 from pomona.recording.bags.topics import Roles
@@ -23,6 +24,10 @@ DEPTH_UNIT_M = 0.001
 
 AFTER_STAMP = 12
 """Bytes of sequence number or encapsulation and of the time, before what a camera_info says."""
+
+
+MOST_INFOS = 100
+"""Different camera_info of one topic that are kept; two are too many already."""
 
 
 @dataclass(eq=False)
@@ -105,20 +110,20 @@ def read_contents(file: MessageFile, roles: Roles) -> Contents:
     infos: dict[str, dict[bytes, Any]] = {name: {} for name in info_topics}
     found = Contents({}, {}, [])
     places = {name for name in file.topics if name == STATIC or is_extrinsics(name) or is_depth_unit(name)}
-    for message in file.messages({*seen, *infos, *places}):
+    for message in counted(file.path, file.messages({*seen, *infos, *places})):
         name = message.topic.name
         if name in seen:
             seen[name].add(message)
         elif name in infos:
             said = message.body[AFTER_STAMP:]
-            if said not in infos[name]:
+            if said not in infos[name] and len(infos[name]) < MOST_INFOS:
                 infos[name][said] = decoded(message)
         elif name == STATIC:
             found.static.extend(decoded(message).transforms)
         elif is_extrinsics(name):
             found.static.append(static_transform(name, decoded(message)))
         else:
-            found.depth_unit_m = float(decoded(message).data)
+            found.depth_unit_m = number_in(f"{file.path}: {name}", "data", decoded(message).data)
     found.pictures.update({kind: _listed(file, seen[topic]) for kind, topic in roles.pictures.items()})
     found.infos.update({name: list(each.values()) for name, each in infos.items()})
     return found

@@ -18,6 +18,8 @@ def recognises(place: Path) -> bool:
     """Whether a file or a folder is a bag."""
     if place.is_file():
         return place.suffix in BAG_SUFFIXES
+    if not place.is_dir():
+        return False
     return (place / "metadata.yaml").is_file() or bool(_parts(place))
 
 
@@ -29,13 +31,19 @@ def open_messages(path: Path) -> MessageFile:
     PomonaError
         When it is no bag.
     """
+    from pomona.recording.bags.compressed import CompressedBag, compression_mode, unpacked_files
     from pomona.recording.bags.joined import JoinedBags
     from pomona.recording.bags.sqlite_rest import is_cut_off
 
     parts = (path,) if path.is_file() else _parts(path)
     described = path.is_dir() and (path / "metadata.yaml").is_file()
-    own = all(part.suffix == ".db3" and not is_cut_off(part) for part in parts)
-    if described and (own or _is_compressed(path / "metadata.yaml")):
+    mode = compression_mode(path / "metadata.yaml") if described else ""
+    if mode == "file":
+        return unpacked_files(path, open_messages)
+    if mode == "message":
+        joined = JoinedBags(path, tuple(map(_open_part, parts)))
+        return CompressedBag(path, joined, joined.files, per_message=True)
+    if described and all(part.suffix == ".db3" and not is_cut_off(part) for part in parts):
         return _ros_bag(path, tuple(sorted(path.iterdir())))
     if not described and len({re.sub(r"_\d+$", "", part.stem) for part in parts}) > 1:
         found = ", ".join(part.name for part in parts)
@@ -75,12 +83,6 @@ def _open_part(file: Path) -> MessageFile:
     return _ros_bag(file, (file,))
 
 
-def _is_compressed(metadata: Path) -> bool:
-    """Whether the recorder compressed each message or file by itself; chunks of MCAP are another matter."""
-    mode = re.search(r"^\s*compression_mode:\s*[\"']?(\w+)", metadata.read_text(encoding="utf-8"), re.MULTILINE)
-    return mode is not None and mode[1].lower() in ("message", "file")
-
-
 def _ros_bag(path: Path, files: tuple[Path, ...]) -> MessageFile:
     from pomona.recording.bags.ros_bag import DamagedBagError, RosBag
 
@@ -95,4 +97,4 @@ def _ros_bag(path: Path, files: tuple[Path, ...]) -> MessageFile:
 def _parts(folder: Path) -> tuple[Path, ...]:
     """Files of a bag that was split, in the order of their numbers."""
     files = (file for file in folder.iterdir() if file.is_file() and file.suffix in (".mcap", ".db3"))
-    return tuple(sorted(files, key=lambda file: [int(digits) for digits in re.findall(r"\d+", file.stem)]))
+    return tuple(sorted(files, key=lambda file: [int(digits) for digits in re.findall(r"[0-9]{1,18}", file.stem)]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import warnings
+import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -11,7 +12,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.recording.bags.message_file import Message, Topic, missing_extra, ros2_name
+from pomona.recording.bags.message_file import LATEST_NS, Message, Topic, missing_extra, ros2_name
+from pomona.recording.bags.unpacked import unpacked
 
 __all__ = ["MAGIC", "McapFile"]
 
@@ -22,6 +24,12 @@ FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06
 
 RECORD_HEAD = struct.Struct("<BQ")
 """Operation code and length of what follows."""
+
+CHUNK_HEAD, MESSAGE_HEAD = struct.Struct("<QQ"), struct.Struct("<HIQQ")
+"""First and last time of a chunk; channel, sequence, time of logging and of publishing of a message."""
+
+DAMAGES = (ValueError, struct.error)
+"""What records, texts and chunks raise that are not what they say."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,10 @@ class McapFile:
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise PomonaError(f"{path}: not an MCAP file, or one without its beginning")
-            pieces, channels, whole = _walk(file)
+            try:
+                pieces, channels, whole = _walk(file)
+            except DAMAGES as error:
+                raise PomonaError(f"{path}: a damaged MCAP ({error})") from None
         opened = cls(path, tuple(pieces), {}, channels)
         if not whole:
             message = f"{path}: cut off: what is there is used"
@@ -103,48 +114,70 @@ class McapFile:
 
     def _inside(self, file: BinaryIO, piece: Piece) -> Iterator[tuple[int, int, bytes]]:
         """Give (time, channel, body) of the messages in a piece; a damaged one has none, and is told once."""
-        from mcap.records import Channel, Schema
-        from mcap.records import Message as McapMessage
-
         file.seek(piece.offset)
         content = file.read(piece.length)
         if piece.operation == MESSAGE:
-            channel, _, logged_ns, _ = struct.unpack_from("<HIQQ", content)
-            yield logged_ns, channel, content[22:]
+            channel, logged_ns = _head(content, 0)
+            yield logged_ns, channel, content[MESSAGE_HEAD.size :]
             return
-        schemas: dict[int, Any] = {}
-        records = self._records(piece, content)
-        channels = frozenset(record.channel_id for record in records if isinstance(record, McapMessage))
-        self._inhabitants.setdefault(piece.offset, channels)
-        for record in records:
-            if isinstance(record, McapMessage):
-                yield record.log_time, record.channel_id, record.data
-            elif isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel) and record.id not in self._channels:
-                self._channels[record.id] = _topic(record, schemas)
-
-    def _records(self, piece: Piece, content: bytes) -> list[Any]:
-        from mcap.data_stream import ReadDataStream
-        from mcap.records import Chunk
-        from mcap.stream_reader import breakup_chunk
-
         try:
-            return list(breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True))
-        except Exception as error:  # zstandard, lz4 and struct have each their own
-            if piece.offset not in self._damaged:
-                self._damaged.add(piece.offset)
-                reason = (str(error).splitlines() or [type(error).__name__])[0]
-                message = f"{self.path}: the chunk at byte {piece.offset} is damaged and left out ({reason})"
-                warnings.warn(message, PomonaWarning, stacklevel=2)
-            return []
+            plain = self._chunk(piece, content)
+        except DAMAGES as error:
+            self._tell(piece, error)
+            return
+        for operation, start, end in _records(plain):
+            if operation == MESSAGE:
+                channel, logged_ns = _head(plain, start)
+                yield logged_ns, channel, plain[start + MESSAGE_HEAD.size : end]
+
+    def _chunk(self, piece: Piece, content: bytes) -> bytes:
+        """Unpack a chunk that is whole; note the channels in it."""
+        chunk = _record("Chunk", content)
+        plain = unpacked(chunk.compression, chunk.data, chunk.uncompressed_size)
+        if chunk.uncompressed_crc not in (0, zlib.crc32(plain)):
+            raise ValueError("its checksum is another")
+        schemas: dict[int, Any] = {}
+        inhabitants: set[int] = set()
+        for operation, start, end in _records(plain):
+            if operation == MESSAGE:
+                inhabitants.add(_head(plain[start:end], 0)[0])
+            elif operation == SCHEMA:
+                schema = _record("Schema", plain[start:end])
+                schemas[schema.id] = schema
+            elif operation == CHANNEL:
+                channel = _record("Channel", plain[start:end])
+                self._channels.setdefault(channel.id, _topic(channel, schemas))
+        self._inhabitants.setdefault(piece.offset, frozenset(inhabitants))
+        return plain
+
+    def _tell(self, piece: Piece, error: Exception) -> None:
+        if piece.offset not in self._damaged:
+            self._damaged.add(piece.offset)
+            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            message = f"{self.path}: the chunk at byte {piece.offset} is damaged and left out ({reason})"
+            warnings.warn(message, PomonaWarning, stacklevel=2)
+
+
+def _records(plain: bytes) -> Iterator[tuple[int, int, int]]:
+    """Give operation, begin and end of each record of a chunk."""
+    at = 0
+    while at < len(plain):
+        operation, length = RECORD_HEAD.unpack_from(plain, at)
+        at += RECORD_HEAD.size
+        if at + length > len(plain):
+            raise ValueError("a record is longer than its chunk")
+        yield operation, at, at + length
+        at += length
+
+
+def _head(content: bytes, start: int) -> tuple[int, int]:
+    """Channel and time of logging of a message."""
+    channel, _, logged_ns, _ = MESSAGE_HEAD.unpack_from(content, start)
+    return channel, min(logged_ns, LATEST_NS)
 
 
 def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
     """Find the pieces, the channels outside of them, and whether the file goes on to its end."""
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Channel, Schema
-
     pieces: list[Piece] = []
     schemas: dict[int, Any] = {}
     channels: dict[int, Topic] = {}
@@ -157,14 +190,13 @@ def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
         if offset + length > size:
             break
         if operation in (CHUNK, MESSAGE):
-            head = file.read(16 if operation == CHUNK else 22)
-            first_ns, last_ns = struct.unpack("<QQ", head) if operation == CHUNK else (_logged_ns(head),) * 2
-            pieces.append(Piece(operation, offset, length, first_ns, last_ns))
+            piece = _piece(file, operation, offset, length)
+            pieces.extend([] if piece is None else [piece])
         elif operation == SCHEMA:
-            schema = Schema.read(ReadDataStream(BytesIO(file.read(length))))
+            schema = _record("Schema", file.read(length))
             schemas[schema.id] = schema
         elif operation == CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(file.read(length))))
+            channel = _record("Channel", file.read(length))
             channels[channel.id] = _topic(channel, schemas)
         ended = ended or operation == DATA_END
         if operation == FOOTER:
@@ -173,8 +205,26 @@ def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
     return pieces, channels, ended
 
 
-def _logged_ns(head: bytes) -> int:
-    return int(struct.unpack("<HIQQ", head)[2])
+def _piece(file: BinaryIO, operation: int, offset: int, length: int) -> Piece | None:
+    """Read the head of a chunk or a message; None for one that is too short to be any."""
+    head = CHUNK_HEAD if operation == CHUNK else MESSAGE_HEAD
+    if length < head.size:
+        return None
+    content = file.read(head.size)
+    first_ns, last_ns = head.unpack(content) if operation == CHUNK else (_head(content, 0)[1],) * 2
+    return Piece(operation, offset, length, first_ns, last_ns)
+
+
+def _record(kind: str, content: bytes) -> Any:
+    """Read a `Chunk`, a `Schema` or a `Channel`."""
+    from mcap import records
+    from mcap.data_stream import ReadDataStream
+    from mcap.exceptions import McapError
+
+    try:
+        return getattr(records, kind).read(ReadDataStream(BytesIO(content)))
+    except (McapError, struct.error, UnicodeDecodeError, OverflowError) as error:
+        raise ValueError(f"a {kind.lower()} that cannot be read: {error or type(error).__name__}") from None
 
 
 def _topic(channel: Any, schemas: dict[int, Any]) -> Topic:

@@ -11,10 +11,33 @@ from typing import Any, Protocol
 
 from pomona.errors import PomonaError
 
-__all__ = ["TREES", "Message", "MessageFile", "Topic", "decoded", "missing_extra", "ros2_name", "stamp_ns"]
+__all__ = [
+    "LATEST_NS",
+    "PICTURES",
+    "TREES",
+    "Message",
+    "MessageFile",
+    "Topic",
+    "counted",
+    "decoded",
+    "missing_extra",
+    "ros2_name",
+    "stamp_ns",
+]
 
 TREES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 """Types of the tree of transforms; the second one is from before 2013, and says the same."""
+
+LATEST_NS = (1 << 63) - 1
+"""Times are 64 bits with a sign from here on."""
+
+MOST_MESSAGES = 10_000_000
+"""Of the topics that are read at once: a day at 100 Hz."""
+
+PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
+MOST_SMALL_BYTES = 1 << 24
+"""16 MiB of a message that is no picture: a hundred thousand transforms."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +103,22 @@ class MessageFile(Protocol):
         """
 
 
+def counted(path: Path, messages: Iterator[Message]) -> Iterator[Message]:
+    """Give the messages on; what is noted of each must fit into memory.
+
+    Raises
+    ------
+    PomonaError
+        When there are more than `MOST_MESSAGES`.
+    """
+    for count, message in enumerate(messages):
+        if count >= MOST_MESSAGES:
+            raise PomonaError(
+                f"{path}: found more than {MOST_MESSAGES} messages, expected a recording of a day at most"
+            )
+        yield message
+
+
 def stamp_ns(message: Message) -> int:
     """Time in the message's header; only for types that begin with `std_msgs/Header`.
 
@@ -104,14 +143,14 @@ def decoded(message: Message) -> Any:
     PomonaError
         When the body is not what the type says.
     """
-    from rosbags.serde import SerdeError
-
+    if message.topic.type not in PICTURES and len(message.body) > MOST_SMALL_BYTES:
+        raise PomonaError(f"{message.topic.name}: found a message of {len(message.body)} bytes, expected a small one")
     ros1 = message.topic.encoding == "ros1"
     store = _definitions(ros1)
     decode = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     try:
         return decode(message.body, message.topic.type)
-    except (SerdeError, KeyError, IndexError, ValueError, struct.error) as error:
+    except Exception as error:  # code made for the type runs over bytes of any kind, and has errors of any kind
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise PomonaError(f"{message.topic.name}: not a {message.topic.type} ({reason})") from None
 

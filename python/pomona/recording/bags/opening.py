@@ -46,6 +46,7 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
         contents = read_contents(file, roles)
     except DamagedBagError:
         file = rest_of(path)
+        roles = chosen_topics(path, file.topics, topics)
         contents = read_contents(file, roles)
     _require_kinds(path, contents)
     optics = optics_of(path, roles, contents, calibration)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.recording.picture_size import require_size
 from pomona.recording.pictures import UnreadablePictureError, decoded_picture
 
 __all__ = ["ENCODINGS", "colour_of", "depth_of", "is_depth", "size_of"]
@@ -41,6 +42,8 @@ ENCODINGS: dict[str, tuple[str, int, str | None]] = {
 
 DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
 
+FIRST = "the first one"
+
 DEPTH_HEAD = struct.Struct("<i2f")
 """`compressedDepth` begins with a format, and A and B of the inverse depth p: z = A / (p - B)."""
 
@@ -55,7 +58,8 @@ def is_depth(message: Any) -> bool:
 def size_of(where: str, message: Any) -> tuple[int, int]:
     """Width and height."""
     if hasattr(message, "encoding"):
-        return int(message.width), int(message.height)
+        _pixels(where, message)
+        return require_size(where, (int(message.width), int(message.height)))
     picture = _depth_codes(where, message) if is_depth(message) else _decompressed(where, message)
     return picture.shape[1], picture.shape[0]
 
@@ -71,7 +75,7 @@ def colour_of(where: str, message: Any, size_px: tuple[int, int]) -> NDArray[np.
     import cv2
 
     if not hasattr(message, "encoding"):
-        picture = _decompressed(where, message)
+        picture = _decompressed(where, message, size_px)
     else:
         pixels = _pixels(where, message)
         conversion = ENCODINGS[message.encoding][2]
@@ -89,7 +93,7 @@ def depth_of(where: str, message: Any, size_px: tuple[int, int], unit_m: float) 
 
     Whole numbers are steps of `unit_m` (ROS: millimetres), floats are metres (REP 118).
     """
-    codes = _pixels(where, message) if hasattr(message, "encoding") else _depth_codes(where, message)
+    codes = _pixels(where, message) if hasattr(message, "encoding") else _depth_codes(where, message, size_px)
     if codes.ndim != 2 or codes.dtype.itemsize == 1:
         found = getattr(message, "encoding", None) or message.format
         raise PomonaError(f"{where}: found {found!r}, expected depth: 16UC1 or 32FC1")
@@ -116,15 +120,15 @@ def _pixels(where: str, message: Any) -> NDArray[Any]:
     return pixels if channels == 1 else pixels.reshape(height, -1, channels)
 
 
-def _decompressed(where: str, message: Any) -> NDArray[Any]:
+def _decompressed(where: str, message: Any, size_px: tuple[int, int] | None = None) -> NDArray[Any]:
     import cv2
 
     if is_depth(message):
         raise PomonaError(f"{where}: found {message.format!r}, expected colour or grey")
-    return decoded_picture(where, np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+    return decoded_picture(where, np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR, size_px, FIRST)
 
 
-def _depth_codes(where: str, message: Any) -> NDArray[Any]:
+def _depth_codes(where: str, message: Any, size_px: tuple[int, int] | None = None) -> NDArray[Any]:
     """Undo `compressed_depth_image_transport`: PNG of 16 bits, of inverse depth where the source was float."""
     import cv2
 
@@ -133,7 +137,7 @@ def _depth_codes(where: str, message: Any) -> NDArray[Any]:
         raise PomonaError(f"{where}: found {message.format!r}, expected compressedDepth in PNG")
     if len(body) <= DEPTH_HEAD.size:
         raise UnreadablePictureError(f"{where}: found {len(body)} bytes, expected a head of 12 and a PNG")
-    codes = decoded_picture(where, body[DEPTH_HEAD.size :], cv2.IMREAD_UNCHANGED)
+    codes = decoded_picture(where, body[DEPTH_HEAD.size :], cv2.IMREAD_UNCHANGED, size_px, FIRST)
     if not message.format.startswith("32FC1"):
         return codes
     _, a, b = DEPTH_HEAD.unpack(body[: DEPTH_HEAD.size].tobytes())
@@ -145,5 +149,5 @@ def _depth_codes(where: str, message: Any) -> NDArray[Any]:
 def _require_size(where: str, picture: NDArray[Any], size_px: tuple[int, int]) -> None:
     height, width = picture.shape[:2]
     if (width, height) != size_px:
-        expected = f"{size_px[0]}x{size_px[1]} as the first one"
+        expected = f"{size_px[0]}x{size_px[1]} as {FIRST}"
         raise UnreadablePictureError(f"{where}: found {width}x{height} pixels, expected {expected}")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.contents import Contents
 from pomona.recording.bags.frames_of_reference import bare_name, matrix_of, path_between
-from pomona.recording.bags.message_file import TREES, MessageFile, decoded, stamp_ns
+from pomona.recording.bags.message_file import TREES, MessageFile, counted, decoded, stamp_ns
 from pomona.recording.bags.topics import Roles
 
 __all__ = ["Known", "camera_poses"]
@@ -72,7 +72,7 @@ def _of_topic(path: Path, file: MessageFile, contents: Contents, camera: str, to
     times_ns: list[int] = []
     poses: list[NDArray[np.float64]] = []
     body = ""
-    for message in file.messages({topic}):
+    for message in counted(path, file.messages({topic})):
         content = decoded(message)
         pose = content.pose.pose if hasattr(content.pose, "pose") else content.pose
         times_ns.append(stamp_ns(message) or message.logged_ns)
@@ -127,7 +127,7 @@ def _of_tree(path: Path, file: MessageFile, contents: Contents, camera: str, top
 
 
 def _transforms(file: MessageFile, topic: str) -> Iterator[tuple[Any, int]]:
-    for message in file.messages({topic}):
+    for message in counted(file.path, file.messages({topic})):
         for each in decoded(message).transforms:
             stamp = each.header.stamp
             yield each, int(stamp.sec) * 10**9 + int(stamp.nanosec) or message.logged_ns

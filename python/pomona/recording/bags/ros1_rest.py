@@ -6,7 +6,6 @@ u32 length of the content, content; a header is fields of u32 length and `name=v
 
 from __future__ import annotations
 
-import bz2
 import struct
 import warnings
 from collections.abc import Collection, Iterator
@@ -16,6 +15,7 @@ from typing import BinaryIO
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.message_file import Message, Topic, ros2_name
+from pomona.recording.bags.unpacked import unpacked
 
 __all__ = ["Ros1Rest", "has_no_index"]
 
@@ -32,9 +32,11 @@ def has_no_index(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             return False
-        fields = _fields(file.read(int.from_bytes(file.read(4), "little")))
-    index = int.from_bytes(fields.get(b"index_pos", b""), "little")
-    return index == 0 or index >= path.stat().st_size
+        length = int.from_bytes(file.read(4), "little")
+        size = path.stat().st_size
+        fields = _fields(file.read(length)) if length < size else {}
+    index = int.from_bytes(fields.get(b"index_pos", b"")[:8], "little")
+    return index == 0 or index >= size
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,31 +88,26 @@ class Ros1Rest:
         with self.path.open("rb") as file:
             for offset, length, compression in self.chunks:
                 file.seek(offset)
-                for fields, body in self._inside(offset, compression, file.read(length)):
-                    number = int.from_bytes(fields[b"conn"], "little")
-                    if fields[b"op"][0] == CONNECTION:
-                        self._connections[number] = _topic(fields, body)
-                        continue
-                    seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
-                    logged_ns, topic = seconds * 10**9 + nanoseconds, self._connections.get(number)
+                for logged_ns, number, body in self._inside(offset, compression, file.read(length)):
+                    topic = self._connections.get(number)
                     if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
                         yield Message(topic, logged_ns, body)
 
-    def _inside(self, offset: int, compression: bytes, content: bytes) -> list[tuple[Fields, bytes]]:
-        """Give connections and messages of a chunk; a damaged one has none, and is told once."""
-        import lz4.frame
-
-        decompress = {b"none": bytes, b"bz2": bz2.decompress, b"lz4": lz4.frame.decompress}
+    def _inside(self, offset: int, compression: bytes, content: bytes) -> Iterator[tuple[int, int, bytes]]:
+        """Give (time, connection, body) of a chunk's messages; a damaged one has none, and is told once."""
         try:
-            plain = decompress[compression](content)
-            records = [(fields, plain[start:end]) for fields, start, end in _records(plain)]
-            return [(fields, body) for fields, body in records if fields[b"op"][0] in (MESSAGE, CONNECTION)]
-        except (KeyError, ValueError, OSError, RuntimeError, struct.error) as error:
+            plain = unpacked(compression.decode("ascii", "replace"), content)
+            connections = dict(_connections(plain))
+        except (KeyError, IndexError, ValueError, struct.error) as error:
             if offset not in self._damaged:
                 self._damaged.add(offset)
                 message = f"{self.path}: the chunk at byte {offset} is damaged and left out ({error})"
                 warnings.warn(message, PomonaWarning, stacklevel=3)
-            return []
+            return
+        self._connections.update(connections)
+        for fields, start, end in _records(plain):
+            if fields[b"op"][0] == MESSAGE:
+                yield _logged_ns(fields), _number(fields), plain[start:end]
 
 
 def _chunks(file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
@@ -130,6 +127,27 @@ def _chunks(file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
         if fields.get(b"op", b"\0")[0] == CHUNK:
             yield offset, length, fields.get(b"compression", b"none")
         offset += length
+
+
+def _connections(plain: bytes) -> Iterator[tuple[int, Topic]]:
+    """Give number and topic of each connection of a chunk, all of whose records are looked at."""
+    for fields, start, end in _records(plain):
+        operation = fields[b"op"][0]
+        if operation in (MESSAGE, CONNECTION):
+            number = _number(fields)
+            if operation == CONNECTION:
+                yield number, _topic(fields, plain[start:end])
+            else:
+                _logged_ns(fields)
+
+
+def _number(fields: Fields) -> int:
+    return int(struct.unpack("<I", fields[b"conn"])[0])
+
+
+def _logged_ns(fields: Fields) -> int:
+    seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
+    return int(seconds) * 10**9 + int(nanoseconds)
 
 
 def _records(content: bytes) -> Iterator[tuple[Fields, int, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import Message, Topic
+from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES, unpacked
 
 __all__ = ["DamagedBagError", "RosBag"]
 
@@ -61,7 +63,9 @@ class RosBag:
                     return
                 except Exception as error:
                     raise DamagedBagError(f"{self.path}: damaged ({_first_line(error)})") from None
-                yield Message(self.topics[connection.topic], logged_ns, bytes(body))
+                if not isinstance(logged_ns, int) or not isinstance(body, bytes):  # SQLite keeps what it is given
+                    raise DamagedBagError(f"{self.path}: damaged (a message is {type(body).__name__})")
+                yield Message(self.topics[connection.topic], logged_ns, body)
 
 
 def _opened(path: Path) -> Any:
@@ -79,12 +83,33 @@ class _Opened:
 
     def __enter__(self) -> Any:
         try:
-            return self.reader.__enter__()
+            reader = self.reader.__enter__()
+            _bound(reader)
+            return reader
         except Exception as error:  # its own errors, SQLite's, and those of what a damaged header makes it do
             raise DamagedBagError(f"{self.path}: not a bag, or a damaged one ({_first_line(error)})") from None
 
     def __exit__(self, *_: object) -> None:
         self.reader.close()
+
+
+def _bound(reader: Any) -> None:
+    """Bound what rosbags takes memory for: chunks of ROS 1, and values that SQLite may compute as it reads them."""
+    if hasattr(reader, "chunks"):
+        reader.chunks = {place: _bounded(chunk) for place, chunk in reader.chunks.items()}
+        return
+    import apsw
+
+    for storage in getattr(reader.storage, "storages", [reader.storage]):
+        storage.dbconn.limit(apsw.SQLITE_LIMIT_LENGTH, MOST_CHUNK_BYTES)
+
+
+def _bounded(chunk: Any) -> Any:
+    """Give a chunk of rosbags the decompressor of `unpacked`."""
+    from rosbags.rosbag1.reader import decompressors
+
+    name = next(name for name, decompressor in decompressors.items() if decompressor is chunk.decompressor)
+    return chunk._replace(decompressor=functools.partial(unpacked, name))
 
 
 def _first_line(error: Exception) -> str:

@@ -12,10 +12,13 @@ from urllib.parse import quote
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.message_file import Message, Topic
+from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES
 
 __all__ = ["SqliteRest", "is_cut_off"]
 
 HEADER_BYTES = 100
+
+ROWS = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
 
 
 def is_cut_off(path: Path) -> bool:
@@ -49,10 +52,12 @@ class SqliteRest:
         """
         try:
             with closing(_connected(path)) as database:
+                _require_tables(path, database)
                 rows = database.execute("SELECT name, type, serialization_format FROM topics").fetchall()
         except sqlite3.Error as error:
             raise PomonaError(f"{path}: not a ROS 2 bag, or one cut off before its first message ({error})") from None
-        return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in rows})
+        named = (tuple(map(str, row)) for row in rows)
+        return cls(path, {name: Topic(name, kind, encoding) for name, kind, encoding in named})
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -62,19 +67,21 @@ class SqliteRest:
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
         """Read in the order in which the recorder wrote; the index by time lies at the end and may be lost."""
         with closing(_connected(self.path)) as database:
-            names = dict(database.execute("SELECT id, name FROM topics"))
-            rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
-            while True:
-                try:
-                    row = rows.fetchone()
-                except sqlite3.DatabaseError as error:
-                    self._tell(error)
-                    return
-                if row is None:
-                    return
-                topic, logged_ns, body = self.topics.get(names.get(row[0], "")), row[1], row[2]
+            for row in self._rows(database):
+                topic, logged_ns, body = self.topics.get(str(row[0])), row[1], row[2]
+                if not isinstance(logged_ns, int) or not isinstance(body, bytes):  # SQLite keeps what it is given
+                    continue
                 if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
                     yield Message(topic, logged_ns, body)
+
+    def _rows(self, database: sqlite3.Connection) -> Iterator[tuple[object, object, object]]:
+        """Give topic, time and body of each message, up to the first that is lost."""
+        try:
+            names = dict(database.execute("SELECT id, name FROM topics"))
+            for number, logged_ns, body in database.execute(ROWS):
+                yield names.get(number, ""), logged_ns, body
+        except sqlite3.DatabaseError as error:
+            self._tell(error)
 
     def _tell(self, error: sqlite3.DatabaseError) -> None:
         """Say it once, not each time the rows are read."""
@@ -89,4 +96,14 @@ def _connected(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro", uri=True, check_same_thread=False)
     # Else SQLite refuses a file that is shorter than its header says.
     database.execute("PRAGMA writable_schema = ON")
+    database.execute("PRAGMA trusted_schema = OFF")
+    # A column may be computed, and then be of any size.
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_CHUNK_BYTES)
     return database
+
+
+def _require_tables(path: Path, database: sqlite3.Connection) -> None:
+    """Refuse views of these names, which may be without end."""
+    kinds = database.execute("SELECT type FROM sqlite_master WHERE name IN ('topics', 'messages')").fetchall()
+    if sorted(kinds) != [("table",), ("table",)]:
+        raise PomonaError(f"{path}: found no tables topics and messages, expected a ROS 2 bag")

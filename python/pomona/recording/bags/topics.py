@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pomona.errors import PomonaError
-from pomona.recording.bags.message_file import Topic
+from pomona.recording.bags.message_file import PICTURES, Topic
 
 __all__ = ["ROLES", "Roles", "chosen_topics", "image_topics", "parsed_topics"]
 
 ROLES = ("left", "right", "depth", "left_info", "right_info", "depth_info", "poses")
 """What a topic can be; `poses=none` leaves out those that are there."""
-
-IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 
 SIDES = (
     ("left", "right"),
@@ -91,7 +89,7 @@ def chosen_topics(path: Path, topics: Mapping[str, Topic], given: Mapping[str, s
         if not names:
             others = ", ".join(f"{name} ({topic.type})" for name, topic in sorted(topics.items())[:SHOWN])
             more = " ..." if len(topics) > SHOWN else ""
-            expected = " or ".join(IMAGE_TYPES)
+            expected = " or ".join(PICTURES)
             raise PomonaError(f"{path}: found no pictures, but {others or 'nothing'}{more}, expected {expected}")
         given = {**_found(path, names), **given}
     for kind in ("left", "right", "depth"):
@@ -103,7 +101,7 @@ def chosen_topics(path: Path, topics: Mapping[str, Topic], given: Mapping[str, s
 
 def image_topics(topics: Mapping[str, Topic]) -> list[str]:
     """Names of all topics of pictures; of those that are there raw and compressed, the raw ones."""
-    names = [name for name, topic in topics.items() if topic.type in IMAGE_TYPES and not NO_PICTURE.search(name)]
+    names = [name for name, topic in topics.items() if topic.type in PICTURES and not NO_PICTURE.search(name)]
     return sorted(name for name in names if _base(name) == name or _base(name) not in names)
 
 

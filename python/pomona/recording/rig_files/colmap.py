@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import number_in, read_text, shown
+from pomona.recording.picture_size import require_size
 from pomona.recording.poses import transforms
 from pomona.recording.rig import Camera, Rig, camera_matrix
 
@@ -41,15 +43,12 @@ def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
     where, words = next(_lines(rigs), (str(rigs), []))
     # RIG_ID NUM_SENSORS REF_TYPE REF_ID, then TYPE ID HAS_POSE QW QX QY QZ TX TY TZ
     if len(words) != 14 or words[1] != "2" or words[6] != "1" or not {words[3], words[5]} <= cameras.keys():
-        raise PomonaError(f"{where}: found {' '.join(words)[:60]!r}, expected a rig of two cameras with one pose")
+        raise PomonaError(f"{where}: found {shown(' '.join(words))}, expected a rig of two cameras with one pose")
     return Rig((path, rigs), cameras[words[3]], cameras[words[5]], _pose(where, words[7:]))
 
 
 def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise PomonaError(f"{path}: cannot be read as text ({error})") from None
+    text = read_text(path, "cameras of COLMAP")
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip() and not line.startswith("#"):
             yield f"{path}: line {number}", line.split()
@@ -58,9 +57,9 @@ def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
 def _camera(where: str, words: list[str]) -> Camera:
     model = words[1] if len(words) > 1 else "nothing"
     if model not in MODELS:
-        raise PomonaError(f"{where}: found the camera model {model}, expected one of {', '.join(MODELS)}")
+        raise PomonaError(f"{where}: found the camera model {shown(model)}, expected one of {', '.join(MODELS)}")
     names = MODELS[model]
-    numbers = _numbers(where, words[2:])
+    numbers = [number_in(where, "camera", word) for word in words[2:]]
     if len(numbers) != 2 + len(names):
         raise PomonaError(f"{where}: found {len(numbers)} numbers, expected width height {' '.join(names)}")
     value = dict(zip(names, numbers[2:], strict=True))
@@ -70,19 +69,12 @@ def _camera(where: str, words: list[str]) -> Camera:
     distortion = np.array([value.get(name, 0.0) for name in kept]) if "k1" in value else np.zeros(0)
     # COLMAP counts from the corner of the first pixel, as we do; a Camera counts from its centre.
     matrix = camera_matrix(fx, fy, value["cx"] - 0.5, value["cy"] - 0.5)
-    return Camera(matrix, distortion, fisheye, (int(numbers[0]), int(numbers[1])))
+    return Camera(matrix, distortion, fisheye, require_size(where, (int(numbers[0]), int(numbers[1]))))
 
 
 def _pose(where: str, words: list[str]) -> NDArray[np.float64]:
-    w, x, y, z, *translation = _numbers(where, words)
+    w, x, y, z, *translation = [number_in(where, "pose", word) for word in words]
     if not abs(np.linalg.norm([w, x, y, z]) - 1) < 1e-2:
         raise PomonaError(f"{where}: found a quaternion that is not of length 1, expected qw qx qy qz")
     pose: NDArray[np.float64] = transforms(np.array([[x, y, z, w]]), np.array([translation]))[0]
     return pose
-
-
-def _numbers(where: str, words: list[str]) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise PomonaError(f"{where}: {error}") from None

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.reading import MOST_NUMBER, shown
+from pomona.recording.picture_size import require_size
 
-__all__ = ["array_of", "distortion_of", "size_of"]
+__all__ = ["array_of", "checked_size", "distortion_of", "size_of"]
 
 DISTORTIONS = {
     "plumb_bob": False,
@@ -33,9 +35,9 @@ def array_of(where: str, fields: Mapping[str, Any], name: str, shape: tuple[int,
     try:
         array = np.array(cells, np.float64)
         array = array.reshape(shape)
-    except (TypeError, ValueError):
-        raise PomonaError(f"{where}: {name}: found {str(cells)[:40]}, expected {_numbers(shape)}") from None
-    if not np.isfinite(array).all():
+    except (TypeError, ValueError, OverflowError):
+        raise PomonaError(f"{where}: {name}: found {shown(cells)}, expected {_numbers(shape)}") from None
+    if not (np.abs(array) <= MOST_NUMBER).all():
         raise PomonaError(f"{where}: {name}: found NaN or infinity, expected {_numbers(shape)}")
     return array
 
@@ -46,14 +48,20 @@ def _numbers(shape: tuple[int, ...]) -> str:
 
 def size_of(where: str, fields: Mapping[str, Any], width: str, height: str) -> tuple[int, int]:
     """Width and height of the pictures from two fields."""
-    return int(array_of(where, fields, width, ())), int(array_of(where, fields, height, ()))
+    return checked_size(where, [float(array_of(where, fields, name, ())) for name in (width, height)])
+
+
+def checked_size(where: str, sides: Sequence[float]) -> tuple[int, int]:
+    """Width and height of pictures, when they are those of any."""
+    width, height = (int(side) for side in sides)
+    return require_size(where, (width, height))
 
 
 def distortion_of(where: str, model: object, coefficients: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
     """Check coefficients against the name of their model; tell whether it is the fisheye."""
     fisheye = DISTORTIONS.get(str(model or "none").lower())
     if fisheye is None:
-        raise PomonaError(f"{where}: found the distortion {model!r}, expected one of {', '.join(DISTORTIONS)}")
+        raise PomonaError(f"{where}: found the distortion {shown(model)}, expected one of {', '.join(DISTORTIONS)}")
     lengths = (4,) if fisheye else (0, 4, 5, 8, 12, 14)
     if len(coefficients) not in lengths:
         expected = " or ".join(map(str, lengths))

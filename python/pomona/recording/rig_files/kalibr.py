@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from pomona.errors import PomonaError
+from pomona.reading import shown
 from pomona.recording.rig import Camera, Rig, camera_matrix
-from pomona.recording.rig_files.fields import array_of, distortion_of
+from pomona.recording.rig_files.fields import array_of, checked_size, distortion_of
 from pomona.recording.rig_files.yaml_subset import read_documents
 
 __all__ = ["pinhole", "read", "recognises"]
@@ -37,10 +38,10 @@ def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
 def pinhole(where: str, fields: Mapping[str, Any], coefficients: str) -> Camera:
     """Read a pinhole as Kalibr and EuRoC write it: intrinsics fx fy cx cy, distortion, resolution."""
     if fields.get("camera_model", "pinhole") != "pinhole":
-        raise PomonaError(f"{where}: camera_model: found {fields['camera_model']!r}, expected 'pinhole'")
+        raise PomonaError(f"{where}: camera_model: found {shown(fields['camera_model'])}, expected 'pinhole'")
     fx, fy, cx, cy = array_of(where, fields, "intrinsics", (4,)).tolist()
     model = fields.get("distortion_model")
     values = array_of(where, fields, coefficients, (-1,)) if coefficients in fields else np.zeros(0)
     distortion, fisheye = distortion_of(where, model, values)
-    width, height = array_of(where, fields, "resolution", (2,)).astype(int).tolist()
-    return Camera(camera_matrix(fx, fy, cx, cy), distortion, fisheye, (width, height))
+    size_px = checked_size(where, array_of(where, fields, "resolution", (2,)).tolist())
+    return Camera(camera_matrix(fx, fy, cx, cy), distortion, fisheye, size_px)

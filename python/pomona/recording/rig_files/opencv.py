@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files.fields import array_of, size_of
+from pomona.recording.rig_files.fields import array_of, checked_size, distortion_of, size_of
 from pomona.recording.rig_files.yaml_subset import read_documents
 
 __all__ = ["read", "recognises"]
@@ -57,6 +57,7 @@ def _camera(where: str, fields: Mapping[str, Any], side: str, size_px: tuple[int
         for kind in (side, f"{side} distortion")
     )
     coefficients = array_of(where, fields, distortion, (-1,)) if distortion in fields else np.zeros(0)
+    coefficients, _ = distortion_of(where, None, coefficients)
     return Camera(array_of(where, fields, matrix, (3, 3)), coefficients, size_px=size_px)
 
 
@@ -66,6 +67,5 @@ def _size_px_of(where: str, fields: Mapping[str, Any]) -> tuple[int, int] | None
             return size_of(where, fields, width, height)
     for name in ("imageSize", "image_size", "size"):
         if name in fields:
-            columns, rows = array_of(where, fields, name, (2,)).astype(int).tolist()
-            return columns, rows
+            return checked_size(where, array_of(where, fields, name, (2,)).tolist())
     return None

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pomona.errors import PomonaError
+from pomona.reading import number_in, read_text
 from pomona.recording.rig import Camera, Rig, camera_matrix
 
 __all__ = ["read"]
@@ -50,8 +51,8 @@ def read(paths: tuple[Path, ...], size_px: tuple[int, int]) -> Rig:
 def _sections(path: Path) -> configparser.ConfigParser:
     sections = configparser.ConfigParser(strict=False, interpolation=None)
     try:
-        sections.read_string(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, configparser.Error) as error:
+        sections.read_string(read_text(path, "a calibration of a ZED"))
+    except configparser.Error as error:
         raise PomonaError(f"{path}: not a calibration of a ZED ({str(error).splitlines()[0]})") from None
     return sections
 
@@ -78,8 +79,4 @@ def _number(
         if default is not None:
             return default
         raise PomonaError(f"{path}: [{section}] {key}: missing, expected a number")
-    text = sections.get(section, key)
-    try:
-        return float(text)
-    except ValueError:
-        raise PomonaError(f"{path}: [{section}] {key}: found {text!r}, expected a number") from None
+    return number_in(f"{path}: [{section}]", key, sections.get(section, key))

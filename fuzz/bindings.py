@@ -1,0 +1,134 @@
+"""Functions of `pomona._core` called with arrays of anything; `matching` and `tracking` are targets of their own."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from fuzz.drawn import REFUSALS, Drawn
+from pomona import _core
+
+
+def seeds() -> list[bytes]:
+    """A byte for each function, and bytes to draw from."""
+    return [bytes([number, draw]) for number in range(len(_CALLS)) for draw in range(8)]
+
+
+def target(content: bytes) -> None:
+    """Call one function."""
+    call = _CALLS[content[0] % len(_CALLS)] if content else _default_config
+    with contextlib.suppress(*REFUSALS), np.errstate(all="ignore"):
+        call(Drawn(content))
+
+
+def _default_config(_: Drawn) -> None:
+    json.loads(_core.default_config())
+
+
+def _adjust(draw: Drawn) -> None:
+    k, p = draw.count() % 6, draw.count()
+    _core.adjust(
+        (500.0, 500.0 * draw.positive(), 320.0, 240.0, 0.12 * draw.positive()),
+        draw.poses(k),
+        draw.rows(k, 2).astype(bool),
+        draw.numbers(p, 3),
+        pictures=draw.choice(None, _seen(draw, k, p)),
+        places=draw.choice(None, _seen(draw, k, p)),
+        relative_poses=draw.choice(None, _between(draw, k)),
+        wanted=draw.choice([], [(0, 1)], [(0, 0)], [(5, 2**40)]),
+        max_steps=draw.choice(None, 0, 1, 3),
+        first_scale=draw.choice(None, draw.number()),
+    )
+
+
+def _seen(draw: Drawn, k: int, p: int) -> Any:
+    m = draw.count()
+    whitenings = draw.covariances(m)
+    return {"poses": draw.rows(m, k), "points": draw.rows(m, p), "values": draw.numbers(m, 3), "whitenings": whitenings}
+
+
+def _between(draw: Drawn, k: int) -> Any:
+    m = draw.count() % 5
+    information = np.tile(np.eye(6), (m, 1, 1)) * draw.positive()
+    rows = {"first": draw.rows(m, k), "second": draw.rows(m, k)}
+    return {**rows, "first_from_second": draw.poses(m), "information": information}
+
+
+def _locate(draw: Drawn) -> None:
+    n = draw.count()
+    expected = draw.poses(1)
+    _core.locate(
+        (500.0, 500.0, 320.0, 240.0, draw.positive()),
+        draw.numbers(n, 3) + np.array([0, 0, 3.0]),
+        draw.covariances(n),
+        300 + 50 * draw.numbers(n, 2),
+        expected[0].tolist() if expected.shape == (1, 4, 4) else [],
+        sigma_px=draw.positive(),
+    )
+
+
+def _search_rows(draw: Drawn) -> None:
+    shape = draw.choice((0, 0), (1, 1), (3, 40), (24, 32), (48, 64))
+    left, right = draw.bytes_of(*shape), draw.bytes_of(*shape)
+    points = draw.numbers(draw.count(), draw.choice(2, 2, 3, 0)) * 20
+    _core.search_rows(left, right, points, draw.choice(0, 1, 10, 2**40, -1))
+
+
+def _describe(draw: Drawn) -> None:
+    _core.describe(
+        draw.numbers(draw.count(), draw.choice(3, 3, 3, 0)),
+        draw.choice(4, 5, 6, 7, 0, 2**40),
+        draw.choice(5, 8, 0, 1, 2**40),
+    )
+
+
+def _fuse_centres(draw: Drawn) -> None:
+    n = draw.count()
+    _core.fuse_centres(draw.numbers(n, 3), draw.covariances(n), draw.numbers(n, 3))
+
+
+def _fuse_diameters(draw: Drawn) -> None:
+    n = draw.count()
+    _core.fuse_diameters(np.abs(draw.numbers(n)), np.abs(draw.numbers(n)), draw.numbers(n))
+
+
+def _camera(draw: Drawn, width: int, height: int) -> Any:
+    size = (draw.choice(width, width, width, 2**62, 0), draw.choice(height, height, height, -1))
+    fx, fy = 60.0 * draw.positive(), 60.0
+    return SimpleNamespace(width=size[0], height=size[1], fx=fx, fy=fy, cx=width / 2, cy=height / 2 + draw.number())
+
+
+def _boxes(draw: Drawn, n: int) -> Any:
+    corners = draw.numbers(n, 2) * 10 + 16
+    return np.hstack([corners, corners + draw.choice(12.0, 12.0, 0.0, -3.0, 1e9)]) if corners.ndim == 2 else corners
+
+
+def _lift(draw: Drawn) -> None:
+    height, width = draw.choice((48, 64), (1, 1), (0, 0), (24, 32))
+    depth = (1.5 + 0.01 * draw.numbers(height, width)).astype(np.float32) * draw.choice(1, 1, 0)
+    n = draw.count()
+    _core.lift(depth, _boxes(draw, n), np.abs(draw.numbers(n, 3)), _camera(draw, width, height))
+
+
+def _read_pair(draw: Drawn) -> None:
+    height, width = draw.choice((48, 64), (1, 1), (0, 0), (24, 32))
+    left = draw.bytes_of(height, width, 3)
+    right = np.roll(left, -draw.choice(5, 0), axis=1) if left.ndim == 3 else left
+    _core.read_pair(
+        np.ascontiguousarray(left),
+        right,
+        _boxes(draw, draw.count()),
+        _camera(draw, width, height),
+        focal_baseline_px_m=7.2 * draw.positive(),
+        nearest_m=draw.choice(0.3, draw.number()),
+    )
+
+
+_CALLS: tuple[Callable[[Drawn], None], ...] = (
+    *(_adjust, _locate, _search_rows, _describe, _fuse_centres, _fuse_diameters, _lift, _read_pair, _default_config),
+)

@@ -1,0 +1,56 @@
+"""Texts beside the pictures: settings in TOML, pairs of a match, boxes of every kind."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from fuzz.bundle import packed, unpacked
+from pomona import FruitCloud
+from pomona.detect.from_file import FileDetector
+from pomona.pairs import read_pairs
+from pomona.recording import Calibration
+from pomona.settings import Settings
+
+CAMERA = Calibration(640, 480, 600.0, 600.0, 320.0, 240.0)
+CLOUD = FruitCloud(np.eye(3), ids=("a", "b", "c"))
+
+TOML = b'[match]\nmethod = "verified"\nup = [[0, 0, 1], [0.0, -1, 0]]\nnoise_m = 0.01\n[tracking]\nmin_views = 3\n'
+BOXES = b"frame,xmin,ymin,xmax,ymax,score,id\n0,10,10,20.5,30,0.9,a\n1,11,10,21,30,0.8,a\n1,50,10,61,30,0.5,b\n"
+MOT = b"1,1,10,10,20,20,0.9,-1,-1,-1\n2,1,11,10,20,20,0.9,-1,-1,-1\n"
+PAIRS = b"query,map,probability,distance_m\na,b,0.9,0.01\nb,c,0.8,0.02\n"
+
+
+def seeds() -> list[bytes]:
+    """One of each kind."""
+    coco = {
+        "images": [
+            {"id": 7, "file_name": "left/0000.png", "width": 640, "height": 480},
+            {"id": 8, "file_name": "1.png"},
+        ],
+        "annotations": [
+            {"id": 1, "image_id": 7, "bbox": [10, 10, 20, 20], "track_id": 5, "iscrowd": 0},
+            {"id": 2, "image_id": 8, "bbox": [10.5, 10, 20, 2e1], "attributes": {"track_id": 6}, "score": 0.5},
+        ],
+    }
+    results = [{"image_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5, "category_id": 1}]
+    answer = {"status": "Found", "matches": [{"query": "a", "map": "b", "probability": 0.9}]}
+    boxes = [packed("boxes", {"boxes": each}) for each in (BOXES, MOT, *_dumped(coco, results))]
+    pairs = [packed("pairs", {"pairs": each}) for each in (PAIRS, *_dumped(answer))]
+    return [packed("settings", {"settings.toml": TOML}), *boxes, *pairs]
+
+
+def _dumped(*contents: object) -> list[bytes]:
+    return [json.dumps(content).encode() for content in contents]
+
+
+def target(content: bytes) -> None:
+    """Read each as the kind that it is called."""
+    with unpacked(content) as (_, folder):
+        if (folder / "settings.toml").is_file():
+            Settings.load(folder / "settings.toml", {}).as_toml()
+        if (folder / "boxes").is_file():
+            FileDetector.read(folder / "boxes", CAMERA, (0, 1, 2))
+        if (folder / "pairs").is_file():
+            read_pairs(folder / "pairs", CLOUD, CLOUD)
