@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 
 __all__ = ["Calibration", "checked_baseline_m"]
@@ -82,7 +83,8 @@ class Calibration:
             "rectified": True,
             "depth_unit_m": self.depth_unit_m,
         }
-        Path(path).write_text(json.dumps(fields, indent=1) + "\n", encoding="utf-8")
+        with whole_file(path) as partial:
+            partial.write_text(json.dumps(fields, indent=1) + "\n", encoding="utf-8")
 
     @property
     def size_px(self) -> tuple[int, int]:

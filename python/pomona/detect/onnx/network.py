@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.threads import capped_threads, cores
 
 __all__ = ["SIZES_INPUT", "Network", "Outputs", "open_session", "reason_of"]
 
@@ -110,7 +110,7 @@ def open_session(path: Path, threads: int | None = None) -> Any:
     if not path.is_file():
         raise PomonaError(f"{path}: not found, expected an ONNX model")
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads or _cores()
+    options.intra_op_num_threads = capped_threads(threads) or cores()
     options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
     options.log_severity_level = 3  # errors only: they come as exceptions too
@@ -120,11 +120,6 @@ def open_session(path: Path, threads: int | None = None) -> Any:
         return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime's errors have no base of their own
         raise PomonaError(f"{path}: not a model that ONNX Runtime can load: {reason_of(error)}") from None
-
-
-def _cores() -> int:
-    """Cores that this process may use, which in a container are fewer than there are; only Linux can tell."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _is_picture(tensor: Any) -> bool:
