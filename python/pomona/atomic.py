@@ -37,7 +37,6 @@ def whole_file(path: str | Path) -> Iterator[Path]:
                 send(partial, path)
             return
         refuse_database(path)
-        # Unlike `Path.resolve`, it takes links in a circle too, which then cannot be written and are told.
         target = Path(os.path.realpath(path))
         with partial_folder(target) as folder:
             partial = folder / target.name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,9 @@ VIDEO_MARK = "boxes drawn by pomona"
 
 PLY_MARK = "comment fruits written by pomona, metres"
 """Line in the header of the PLY files that are written here."""
+
+DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
+"""Names of the files of drawn visits."""
 
 TRUTH_KEYS = {"cell", "seed", "map_from_query"}
 """In the truth of drawn visits."""
@@ -148,11 +152,8 @@ def _is_kept(folder: Path) -> bool:
 
 def _has_drawn_visits(folder: Path) -> bool:
     """Tell a folder in which every file with one of our names belongs to a truth of ours."""
-    return all(
-        _is_truth(folder / f"truth{path.stem.removeprefix(name)}.json")
-        for name, suffix in (("query", ".csv"), ("map", ".csv"), ("truth", ".json"))
-        for path in folder.glob(f"{name}*{suffix}")
-    )
+    ours = filter(None, (DRAWN.fullmatch(path.name) for path in folder.iterdir()))
+    return all(_is_truth(folder / f"truth{name['seed']}.json") for name in ours)
 
 
 def _is_demo(folder: Path) -> bool:

@@ -73,8 +73,10 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     outputs = list(outputs)
     for read in inputs:
         for output in outputs:
-            if _are_same(output, read) or (output.is_dir() and _real(read).is_relative_to(_real(output))):
-                raise PomonaError(f"{output}: is the input {read} or holds it, expected another place to write")
+            if _are_same(output, read):
+                raise PomonaError(f"{output}: is the input {read}, expected another place to write")
+            if output.is_dir() and _real(read).is_relative_to(_real(output)):
+                raise PomonaError(f"{output}: is the folder of the input {read}, expected another place to write")
 
 
 def refuse_database(path: Path) -> None:
@@ -120,8 +122,10 @@ def _require_place(output: Output) -> None:
 
 
 def _are_same(one: Path, other: Path) -> bool:
+    if is_standard_output(one) and is_standard_output(other):
+        return True
     if is_device(one) or is_device(other):
-        return is_standard_output(one) and is_standard_output(other)
+        return False
     if _real(one) == _real(other):
         return True
     try:

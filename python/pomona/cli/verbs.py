@@ -15,7 +15,7 @@ from pomona.cli.terminal import result_elsewhere, tell
 from pomona.errors import PomonaError
 from pomona.likes import Like
 from pomona.outputs import Output, require_outputs
-from pomona.streams import is_standard_output
+from pomona.streams import STANDARD_OUTPUT, is_standard_output
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C ended, as shells have it."""
@@ -107,4 +107,7 @@ def _outputs(written: Mapping[str, Writes], given: Mapping[str, Any]) -> Iterato
 def _inputs(written: Mapping[str, Writes], given: Mapping[str, Any]) -> Iterator[Path]:
     for name, value in given.items():
         paths = value if isinstance(value, list | tuple) else [value]
-        yield from (path for path in paths if isinstance(path, Path) and name not in written)
+        # Among inputs, the name of the standard output is that of the standard input.
+        yield from (
+            path for path in paths if isinstance(path, Path) and name not in written and path != STANDARD_OUTPUT
+        )
