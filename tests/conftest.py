@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -69,7 +70,10 @@ def season(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with sqlite3.connect(folder / "other.sqlite") as connection:
         connection.execute("CREATE TABLE years_of_work (day TEXT)")
     connection.close()
-    make_recording(folder / "R", (0.0, 0.1, 0.2))
+    recording = make_recording(folder / "R", (0.0, 0.1, 0.2))
+    (recording / "left").mkdir()
+    for depth in (recording / "depth").iterdir():
+        cv2.imwrite(str(recording / "left" / depth.name), np.full((480, 640, 3), 99, np.uint8))
     return folder
 
 

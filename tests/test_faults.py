@@ -22,6 +22,7 @@ FAULTY = (
     "scan R --date 2024-08-09 -o disk/session.gpkg",
     "scan R --date 2024-08-09 -o disk/fruits.csv",
     "scan R --date 2024-08-09 -o fruits.csv --keep disk/kept",
+    "scan R --date 2024-08-09 -o fruits.csv --preview disk/seen.mp4",
     "synth clouds base -o disk/drawn",
     "demo -o disk/demo",
 )

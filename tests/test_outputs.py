@@ -120,6 +120,7 @@ def test_what_the_verb_would_not_have_made_stays(pomona: Pomona, here: Path, com
         "scan R -o new.gpkg",
         "scan R -o new.csv",
         "scan R -o new.ply --keep kept",
+        "scan R -o new.csv --preview seen.mp4",
         "export orchard.gpkg --to csv -o new.csv",
         "export orchard.gpkg --to ply -o new.ply",
         "export orchard.gpkg --to geojson -o new.json",
@@ -132,15 +133,6 @@ def test_its_like_is_replaced(pomona: Pomona, here: Path, command: str) -> None:
     for _ in range(2):
         code, _, told = pomona(*command.split())
         assert code == 0, told
-
-
-def test_a_preview_is_replaced_by_a_preview(pomona: Pomona, here: Path) -> None:
-    shutil.copytree("R/depth", "R/left")
-    for picture in Path("R/left").iterdir():
-        cv2.imwrite(str(picture), np.full((480, 640, 3), 99, np.uint8))
-    for _ in range(2):
-        assert pomona("scan", "R", "-o", "fruits.csv", "--preview", "seen.mp4")[0] == 0
-    assert Path("seen.mp4").stat().st_size > 1000
 
 
 def test_force_replaces_what_is_not_alike(pomona: Pomona, here: Path) -> None:
