@@ -15,7 +15,7 @@ POMONA = Path(sys.executable).with_name("pomona")
 def run(folder: Path, command: str) -> subprocess.CompletedProcess[str]:
     """Run a line of the shell; `pomona` is ours."""
     line = f'pomona() {{ "{POMONA}" "$@"; }}; {command}'
-    return subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True)
+    return subprocess.run(["timeout", "60", "bash", "-c", line], cwd=folder, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("name", ["-", "/dev/stdout", ">(cat)"])
