@@ -74,6 +74,12 @@ def test_a_full_standard_output_is_told(here: Path) -> None:
         assert done.stderr.count("\n") == 1
 
 
+def test_a_closed_standard_output_is_told_where_it_matters(here: Path) -> None:
+    done = run(here, "pomona export map.csv --to csv -o - >&-")
+    assert (done.returncode, done.stderr) == (2, "pomona: -: cannot be written: Bad file descriptor\n")
+    assert run(here, "pomona export map.csv --to csv -o fruits.csv >&-").returncode == 0
+
+
 def test_a_reader_that_has_enough_is_no_error(here: Path) -> None:
     done = run(here, "set -o pipefail; { pomona match query.csv map.csv --json; echo $? >&2; } | true")
     assert done.stderr == "141\n"

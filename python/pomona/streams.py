@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import stat
@@ -31,7 +32,7 @@ def is_standard_output(path: Path) -> bool:
         return True
     try:
         return os.path.samestat(path.stat(), os.fstat(sys.stdout.fileno()))
-    except (OSError, ValueError):  # a standard output that is closed, or is none of the system's
+    except (OSError, ValueError, AttributeError):  # a standard output that is closed, or is none of the system's
         return False
 
 
@@ -45,6 +46,8 @@ def send(file: Path, stream: Path) -> None:
     """
     with file.open("rb") as whole:
         if is_standard_output(stream):
+            if sys.stdout is None:
+                raise OSError(errno.EBADF, os.strerror(errno.EBADF))
             sys.stdout.flush()
             shutil.copyfileobj(whole, sys.stdout.buffer)
             sys.stdout.buffer.flush()

@@ -55,7 +55,9 @@ def result_elsewhere(elsewhere: bool) -> Iterator[None]:
         _result_is_elsewhere.reset(before)
 
 
-def _print(stream: TextIO, lines: tuple[str, ...]) -> None:
+def _print(stream: TextIO | None, lines: tuple[str, ...]) -> None:
+    if stream is None:  # closed by whoever started the program
+        return
     text = "".join(f"{shown(line)}\n" for line in lines)
     encoding = stream.encoding or "utf-8"
     try:
