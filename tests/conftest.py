@@ -1,15 +1,21 @@
 """What several tests need."""
 
 import os
+import shutil
+import sqlite3
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from pomona import FruitCloud, Views
 from pomona.cli import main
+from pomona.orchard import add_session, load_session, write_session
+from pomona.synth.clouds import scene_pair
+from recording_maker import make_recording
 
 
 @pytest.fixture(scope="session")
@@ -50,3 +56,30 @@ def pomona(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         return ended.value.code, printed.out, printed.err
 
     return run_main
+
+
+@pytest.fixture(scope="session")
+def season(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two visits as CSV, a session, a map, another database, and a recording with boxes."""
+    folder = tmp_path_factory.mktemp("season")
+    pair = scene_pair("base", seed=3)
+    pair.query.write(folder / "query.csv")
+    pair.map.write(folder / "map.csv")
+    write_session(folder / "session.gpkg", pair.map, name="august", date="2024-08-01", recording="test")
+    add_session(folder / "orchard.gpkg", load_session(folder / "session.gpkg"))
+    with sqlite3.connect(folder / "other.sqlite") as connection:
+        connection.execute("CREATE TABLE years_of_work (day TEXT)")
+    connection.close()
+    recording = make_recording(folder / "R", (0.0, 0.1, 0.2))
+    (recording / "left").mkdir()
+    for depth in (recording / "depth").iterdir():
+        cv2.imwrite(str(recording / "left" / depth.name), np.full((480, 640, 3), 99, np.uint8))
+    return folder
+
+
+@pytest.fixture
+def here(season: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it to work in, which is the working directory."""
+    folder = Path(shutil.copytree(season, tmp_path / "season"))
+    monkeypatch.chdir(folder)
+    return folder

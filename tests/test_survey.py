@@ -257,16 +257,19 @@ def test_stereo_pictures_and_boxes_are_enough(shared_data, tmp_path):
 
 
 def test_where_the_track_breaks_a_new_session_begins(pomona, shared_data, tmp_path):
-    stereo_row(shared_data, tmp_path / "2024-08-09", [*range(8), *range(28, 36)])
-    code, printed, _ = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "row.gpkg")
+    stereo_row(shared_data, tmp_path / "2024-08-09", [*range(6), *range(28, 36)])
+    code, printed, _ = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "row.gpkg", "--keep", tmp_path / "kept")
     assert code == 0
-    first, second = (load_session(tmp_path / name) for name in ("row.gpkg", "row-part2.gpkg"))
-    assert (first.name, second.name) == ("2024-08-09", "2024-08-09 part 2")
-    assert max(first.trajectory.frames) <= 7 < min(second.trajectory.frames)
+    first, second = (load_session(tmp_path / name) for name in ("row-part1.gpkg", "row.gpkg"))
+    assert (first.name, second.name) == ("2024-08-09 part 1", "2024-08-09")
+    assert max(first.trajectory.frames) <= 5 < min(second.trajectory.frames)
+    assert not (tmp_path / "row-part2.gpkg").exists()
+    assert {path.name for path in (tmp_path / "kept").glob("*.csv")} == {"tracks.csv", "tracks-part1.csv"}
     for session in (first, second):
         assert len(session.cloud) > 10
         np.testing.assert_allclose(session.trajectory.session_from_camera[0], np.eye(4), atol=1e-9)
-    assert "row-part2.gpkg: frames" in printed
+    assert f"row.gpkg: {len(second.cloud)} fruits in the longest of 2 parts" in printed
+    assert f"row-part1.gpkg: frames 0 to 5, {len(first.cloud)} fruits\n" in printed
 
 
 def test_depth_can_be_measured_otherwise(pomona, shared_data, tmp_path):

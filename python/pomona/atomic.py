@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files and folders that appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,42 +9,66 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pomona.errors import PomonaError
+from pomona.outputs import refuse_database
+from pomona.partial import partial_folder
+from pomona.streams import is_stream, send
 
-__all__ = ["whole_file"]
+__all__ = ["whole_file", "whole_folder"]
 
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path beside `path` to write to; it takes the place of `path` when the block ends well.
+    """Give a temporary path to write to; it takes the place of `path` when the block ends well.
 
-    The old file stays as it was until then, and for good when the block raises.
+    The old file stays as it was until then, and for good when the block raises. An orchard map is never replaced. What
+    is no regular file, a pipe, a device or the standard output ``-``, gets the bytes when they are all there.
 
     Raises
     ------
     PomonaError
-        When the folder is missing or the file cannot be written, for example on a full disk.
+        When the folder is missing, `path` is a map, or it cannot be written, for example on a full disk.
     """
-    target = Path(path).resolve()
+    path = Path(path)
+    with _told(path):
+        if is_stream(path):
+            with tempfile.TemporaryDirectory(prefix="pomona.") as folder:
+                partial = Path(folder) / "stream"
+                yield partial
+                send(partial, path)
+            return
+        refuse_database(path)
+        target = Path(os.path.realpath(path))
+        with partial_folder(target) as folder:
+            partial = folder / target.name
+            yield partial
+            with partial.open("rb") as written:
+                os.fsync(written.fileno())
+            refuse_database(path)  # a map may have come there meanwhile
+            partial.replace(target)
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Give a temporary path to make a folder at; it becomes `path`, where nothing is yet, when the block ends well.
+
+    Raises
+    ------
+    PomonaError
+        As `whole_file`, or when `path` is there already.
+    """
+    path = Path(path)
+    with _told(path):
+        target = Path(os.path.realpath(path))
+        with partial_folder(target) as folder:
+            yield folder / target.name
+            if target.exists():
+                raise PomonaError(f"{path}: is already there, expected a new folder")
+            (folder / target.name).rename(target)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent)
-        os.close(handle)
-    except OSError as error:
-        raise PomonaError(f"{path}: cannot be written: {error.strerror}") from None
-    partial = Path(name)
-    try:
-        yield partial
-        with partial.open("rb") as written:
-            os.fsync(written.fileno())
-        partial.chmod(0o666 & ~_umask())
-        partial.replace(target)
+        yield
     except OSError as error:
         raise PomonaError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    # The process's umask can only be read by setting it.
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pomona import _core
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.threads import capped_threads
 
 Method: TypeAlias = Literal["paper", "verified"]
 Scale: TypeAlias = Literal["metric", "free"]
@@ -95,7 +96,8 @@ class Index:
     config
         Values of the core's tables that differ from `default_config()`; unknown keys are errors.
     threads
-        Threads of the search; None takes all. The answer does not depend on it.
+        Threads of the search, from 1, of which no more than there are cores are used; None takes all. The answer does
+        not depend on it.
 
     Raises
     ------
@@ -113,6 +115,7 @@ class Index:
         threads: int | None = None,
     ) -> None:
         self._map = _as_cloud(map)
+        threads = capped_threads(threads)
         overrides = json.dumps(dict(config or {}))
         try:
             self._core = _core.MapIndex(
@@ -211,7 +214,7 @@ def match(
     config
         Values of the core's tables that differ from `default_config()`; unknown keys are errors.
     threads
-        Threads of the search; None takes all. The answer does not depend on it.
+        Threads of the search, as for `Index`.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pomona.errors import PomonaError
 from pomona.reading import read_text, shown
+from pomona.threads import require_threads
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -60,6 +61,8 @@ class Settings:
             from_file[name] = _checked(path, name, value)
         _refuse_wrong_values(path, tables)
         given = {name: value for name, value in flags.items() if value is not None}
+        if "threads" in given:
+            require_threads(given["threads"], "--threads")
         return cls(call={**call, **from_file, **given}, overrides=tables)
 
     def match(self, query: FruitCloud, map: FruitCloud) -> Match:
@@ -115,7 +118,7 @@ def _checked(path: Path | None, name: str, value: Any) -> Any:
         case "noise_m":
             expected, fits = "a positive number of metres", is_number and value > 0
         case "threads":
-            expected, fits = "a whole number from 1", is_number and isinstance(value, int) and value >= 1
+            return require_threads(value, f"{path}: {_CALL_TABLE}.{name}")
         case "per_frame":
             expected, fits = "true or false", isinstance(value, bool)
         case _:

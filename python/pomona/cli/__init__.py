@@ -8,9 +8,11 @@ import typer
 
 from pomona import __version__
 from pomona.cli import config, demo, evaluate, export, import_, info, map, match, scan, synth
+from pomona.cli.terminal import say, tell
+from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
 
-app = typer.Typer(
+app = Verbs(
     name="pomona",
     help="Finds the same fruits again.",
     no_args_is_help=True,
@@ -24,7 +26,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(__version__)
+        say(__version__)
         raise typer.Exit
 
 
@@ -67,7 +69,7 @@ def main() -> None:
 
 
 def _refuse(line: str) -> NoReturn:
-    sys.stderr.write(f"pomona: {line}\n")
+    tell(f"pomona: {line}")
     sys.exit(2)
 
 
@@ -82,4 +84,4 @@ def _usage_line(error: Exception) -> str:
 
 def _warn(message: Warning | str, *_about: object, **_more: object) -> None:
     """Show a warning as one line on stderr."""
-    sys.stderr.write(f"pomona: warning: {message}\n")
+    tell(f"pomona: warning: {message}")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
-
 from pomona.cli.match_options import (
     Method,
     Scale,
@@ -18,6 +16,7 @@ from pomona.cli.match_options import (
     threads_option,
     up_option,
 )
+from pomona.cli.terminal import say
 
 
 def config(
@@ -32,4 +31,4 @@ def config(
     """Print the settings that a match would run with, as TOML: flags beat the file, the file beats the defaults."""
     from pomona.settings import Settings
 
-    typer.echo(Settings.load(config, call_flags(method, scale, noise_m, up, per_frame, threads)).as_toml())
+    say(*Settings.load(config, call_flags(method, scale, noise_m, up, per_frame, threads)).as_toml().split("\n"))

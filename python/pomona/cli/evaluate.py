@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Verbs
+
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.evaluate import PairScore
 
-app = typer.Typer(help="Compare results with the truth.", no_args_is_help=True)
+app = Verbs(help="Compare results with the truth.", no_args_is_help=True)
 
 
 @app.callback()
@@ -38,7 +41,10 @@ def evaluate_match(
     in_query, in_map = FruitCloud.read(query, unit="free"), FruitCloud.read(map, unit="free")
     truth = _true_ids(query, in_query), _true_ids(map, in_map)
     score = score_pairs(read_pairs(pairs, in_query, in_map), *truth)
-    typer.echo(_as_json(score) if json else _as_text(score))
+    if json:
+        say_json(_as_json(score))
+    else:
+        say(*_as_lines(score))
 
 
 def _true_ids(path: Path, cloud: FruitCloud) -> tuple[str, ...]:
@@ -49,23 +55,19 @@ def _true_ids(path: Path, cloud: FruitCloud) -> tuple[str, ...]:
     return cloud.ids
 
 
-def _as_json(score: PairScore) -> str:
-    import json
-
-    return json.dumps(
-        {
-            "precision": score.precision,
-            "recall": score.recall,
-            "true": score.true,
-            "false": score.false,
-            "missed": score.missed,
-            "common": score.common,
-            "unjudged": score.unjudged,
-        }
-    )
+def _as_json(score: PairScore) -> dict[str, float | None]:
+    return {
+        "precision": score.precision,
+        "recall": score.recall,
+        "true": score.true,
+        "false": score.false,
+        "missed": score.missed,
+        "common": score.common,
+        "unjudged": score.unjudged,
+    }
 
 
-def _as_text(score: PairScore) -> str:
+def _as_lines(score: PairScore) -> list[str]:
     def share(value: float | None) -> str:
         return "-" if value is None else f"{value:.3f}"
 
@@ -81,4 +83,4 @@ def _as_text(score: PairScore) -> str:
         columns["unjudged"] = str(score.unjudged)
     widths = [max(len(title), len(value)) for title, value in columns.items()]
     rows = (columns.keys(), columns.values())
-    return "\n".join("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return ["  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from pomona.cli.match_options import Unit
+from pomona.cli.terminal import say
+from pomona.cli.verbs import Writes
+from pomona.likes import EXPORTS
 
 
 class Format(StrEnum):
@@ -23,7 +27,9 @@ def export(
         metavar="SESSION_OR_MAP", help="A session or a map (.gpkg), or a cloud (.csv, .ply)."
     ),
     to: Format = typer.Option(..., help="Format of the file to write."),
-    output: Path = typer.Option(..., "-o", "--output", help="The file to write."),
+    output: Annotated[Path, Writes(lambda given: EXPORTS[given["to"]])] = typer.Option(
+        ..., "-o", "--output", help="The file to write; - is the standard output."
+    ),
     unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
 ) -> None:
     """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen."""
@@ -32,4 +38,4 @@ def export(
 
     cloud = FruitCloud.read(source, unit=unit.value)
     export_cloud(cloud, output, to.value)
-    typer.echo(f"{output}: {len(cloud)} fruits")
+    say(f"{output}: {len(cloud)} fruits")

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import typer
 
-app = typer.Typer(help="Make recording folders out of published data sets.", no_args_is_help=True)
+from pomona.cli.terminal import say
+from pomona.cli.verbs import Verbs
+
+app = Verbs(help="Make recording folders out of published data sets.", no_args_is_help=True)
 
 
 @app.callback()
@@ -28,4 +31,4 @@ def import_kinect_apples(
 
     for capture in import_captures(source, output, date or DATE):
         colour = "depth and colour" if capture.has_colour else "depth only, no colour picture in the data set"
-        typer.echo(f"{capture.folder}: {capture.boxes} boxes, {colour}")
+        say(f"{capture.folder}: {capture.boxes} boxes, {colour}")

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from pomona.cli.terminal import say, say_json
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pomona.recording import Recording
     from pomona.recording.check import Checked
 
@@ -45,36 +49,39 @@ def info(
     if faults is not None:
         for name, frames in (("unreadable", faults.unreadable), ("blank", faults.blank)):
             found[name] = [{"frame": frame, "reason": reason} for frame, reason in frames.items()]
-    typer.echo(_dumps(found) if json else _as_text(found))
+    if json:
+        say_json(found)
+    else:
+        say(*_as_lines(found))
     if faults is not None and faults.unreadable:
         raise typer.Exit(1)
 
 
 def _checked(recording: Recording) -> Checked:
     """Decode everything; swapped sides are an error, because then nothing in the recording is right."""
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from pomona.cli.progress import counting
     from pomona.recording.check import checked
     from pomona.recording.swapped import check_sides
 
     check_sides(recording)
-    with Progress(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
-        task = bar.add_task("reading", total=len(recording))
-        return checked(recording, lambda done, _total: bar.update(task, completed=done))
+    with counting("reading", len(recording)) as progress:
+        return checked(recording, progress)
 
 
-def _dumps(value: object) -> str:
-    import json
-
-    return json.dumps(value)
-
-
-def _as_text(found: dict[str, object]) -> str:
-    return "\n".join(f"{name:14} {_shown(name, value)}" for name, value in found.items())
+def _as_lines(found: dict[str, object]) -> Iterator[str]:
+    for name, value in found.items():
+        first, *others = _shown(name, value)
+        yield f"{name:14} {first}"
+        yield from others
 
 
-def _shown(name: str, value: object) -> str:
+def _shown(name: str, value: object) -> list[str]:
+    if isinstance(value, list):
+        return [str(len(value)), *(f"  {entry['reason']}" for entry in value)]
+    return [_in_words(name, value)]
+
+
+def _in_words(name: str, value: object) -> str:
     if name == "depth_error_m" and isinstance(value, float):
         from pomona.recording.description import DEPTH_M, DISPARITY_ERROR_PX
 
@@ -83,8 +90,6 @@ def _shown(name: str, value: object) -> str:
         return "yes" if value else "no"
     if isinstance(value, dict):
         return ", ".join(f"{count} {kind}" for kind, count in value.items())
-    if isinstance(value, list):
-        return "\n".join([str(len(value)), *(f"  {entry['reason']}" for entry in value)])
     if isinstance(value, float):
         return f"{value:g}"
     return "-" if value is None else str(value)

@@ -20,13 +20,15 @@ from pomona.cli.match_options import (
     threads_option,
     up_option,
 )
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Verbs
 
 if TYPE_CHECKING:
     from typing import Any
 
     from pomona.orchard import Added, OrchardMap, Session
 
-app = typer.Typer(help="Keep an orchard map: one identity for each fruit over all visits.", no_args_is_help=True)
+app = Verbs(help="Keep an orchard map: one identity for each fruit over all visits.", no_args_is_help=True)
 
 orchard_argument = typer.Argument(metavar="ORCHARD", help="The map (.gpkg).")
 
@@ -67,7 +69,10 @@ def map_add(
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {len(visit.cloud)} fruits to {orchard.name}"):
         added = add_session(orchard, visit, settings=settings)
-    typer.echo(_dumps(_added_as_json(visit, added)) if json else _added_as_text(visit, added))
+    if json:
+        say_json(_added_as_json(visit, added))
+    else:
+        say(_added_as_text(visit, added))
     if not added.is_added:
         raise typer.Exit(1)
 
@@ -78,7 +83,10 @@ def map_info(orchard: Path = orchard_argument, json: bool = typer.Option(False, 
     from pomona.orchard import OrchardMap
 
     info = _info(OrchardMap(orchard))
-    typer.echo(_dumps(info) if json else _info_as_text(info))
+    if json:
+        say_json(info)
+    else:
+        say(*_info_as_lines(info))
 
 
 @app.command("check")
@@ -89,15 +97,12 @@ def map_check(orchard: Path = orchard_argument, json: bool = typer.Option(False,
 
     with working(f"checking {orchard.name}"):
         found = problems(orchard)
-    typer.echo(_dumps({"problems": found}) if json else "\n".join(found) or "ok")
+    if json:
+        say_json({"problems": found})
+    else:
+        say(*(found or ["ok"]))
     if found:
         raise typer.Exit(1)
-
-
-def _dumps(value: Any) -> str:
-    import json
-
-    return json.dumps(value)
 
 
 def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
@@ -162,7 +167,7 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
     }
 
 
-def _info_as_text(info: dict[str, Any]) -> str:
+def _info_as_lines(info: dict[str, Any]) -> list[str]:
     states = ", ".join(f"{count} {state}" for state, count in info["states"].items())
     header = ("session", "date", "fruits", "matched", "new", "method", "noise")
     rows = [
@@ -179,11 +184,9 @@ def _info_as_text(info: dict[str, Any]) -> str:
     ]
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (header, *rows)]
-    return "\n".join(
-        [
-            f"{info['path']}: {info['kind']}, format {info['format_version']}",
-            f"{info['n_fruits']} fruits ({states}), {info['n_observations']} observations in {len(rows)} sessions",
-            "",
-            *(line.rstrip() for line in table),
-        ]
-    )
+    return [
+        f"{info['path']}: {info['kind']}, format {info['format_version']}",
+        f"{info['n_fruits']} fruits ({states}), {info['n_observations']} observations in {len(rows)} sessions",
+        "",
+        *(line.rstrip() for line in table),
+    ]

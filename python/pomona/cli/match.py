@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from pomona.cli.match_options import (
     threads_option,
     up_option,
 )
+from pomona.cli.terminal import say, say_json, tell
+from pomona.cli.verbs import Writes
+from pomona.likes import PAIRS, PICTURE
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
@@ -39,8 +42,10 @@ def match(
     per_frame: bool | None = per_frame_option,
     threads: int | None = threads_option,
     unit: Unit | None = typer.Option(None, help="Unit of the coordinates in the files; m, or free with --scale free."),
-    output: Path | None = typer.Option(None, "-o", "--output", help="Write the pairs here as CSV."),
-    plot: Path | None = typer.Option(None, help="Draw the match here: .png, .svg or .pdf."),
+    output: Annotated[Path | None, Writes(PAIRS)] = typer.Option(
+        None, "-o", "--output", help="Write the pairs here as CSV; - is the standard output."
+    ),
+    plot: Annotated[Path | None, Writes(PICTURE)] = typer.Option(None, help="Draw the match here: .png, .svg or .pdf."),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
     explain: bool = typer.Option(False, "--explain", help="Print what happened, stage by stage, with counts."),
 ) -> None:
@@ -79,14 +84,12 @@ def _draw(path: Path, query: FruitCloud, map: FruitCloud, answer: Match, up: lis
 
 
 def _print(answer: Match, query: FruitCloud, map: FruitCloud, *, json: bool, explain: bool) -> None:
-    from pomona.cli.match_output import as_json, as_stages, as_text
+    from pomona.cli.match_output import as_json, as_lines, as_stages
 
     if json:
-        import json as json_format
-
-        typer.echo(json_format.dumps(as_json(answer, query, map), allow_nan=False))
+        say_json(as_json(answer, query, map))
     else:
-        typer.echo(as_text(answer))
+        say(*as_lines(answer))
     if explain:
         # With --json the standard output belongs to the program that reads it.
-        typer.echo(as_stages(answer), err=json)
+        (tell if json else say)(*as_stages(answer))

@@ -47,7 +47,9 @@ config_option = typer.Option(None, help="Settings as TOML; `pomona config` print
 per_frame_option = typer.Option(
     None, "--per-frame/--whole", help="One transform for each frame of the query, pairs merged; or one for the cloud."
 )
-threads_option = typer.Option(None, min=1, help="How many threads to use; the answer is the same for any number.")
+threads_option = typer.Option(
+    None, help="How many threads to use, at most one a core; the answer is the same for any number."
+)
 
 
 def call_flags(

@@ -45,7 +45,7 @@ def as_json(match: Match, query: FruitCloud, map: FruitCloud) -> dict[str, Any]:
     }
 
 
-def as_text(match: Match) -> str:
+def as_lines(match: Match) -> list[str]:
     """Return the answer for people: the verdict first, then the transform and the pairs."""
     lines = [f"{match.status.value}: {_MEANINGS[match.status.value]}"]
     if match.map_from_query is not None:
@@ -58,14 +58,14 @@ def as_text(match: Match) -> str:
     lines.append(_line("time", f"{match.elapsed_s:.3f} s"))
     for number, alternative in enumerate(match.alternatives, start=1):
         lines += [f"or, as good ({number} of {len(match.alternatives)})", *_describe_transform(alternative)]
-    return "\n".join(lines)
+    return lines
 
 
-def as_stages(match: Match) -> str:
+def as_stages(match: Match) -> list[str]:
     """Return what happened, a stage and its count a line."""
     width = max((len(name) for name, _ in match.stages), default=0)
     lines = (f"  {name:<{width}}  {_count(count)}" for name, count in match.stages)
-    return "\n".join(["stages", *lines])
+    return ["stages", *lines]
 
 
 def _count(count: float) -> str:

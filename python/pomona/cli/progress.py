@@ -3,17 +3,20 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from pomona.cli.terminal import shown
+
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
     """Show what is going on while the block runs; nothing where the standard error is no terminal."""
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield
         return
-    with console.status(f"{what} ..."):
+    with console.status(Text(shown(f"{what} ..."))):
         yield
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import INTERRUPTED, Writes
+from pomona.likes import KEPT, SCANNED, VIDEO
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from typing import Any
 
     from pomona.recording import Recording
@@ -15,15 +20,20 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".gpkg", ".csv", ".ply")
 
-INTERRUPTED = 130
-"""Exit code of what Ctrl-C ended, as shells have it."""
+
+def _parts_there(output: Path) -> Iterable[Path]:
+    from pomona.survey.part_files import parts_there
+
+    return parts_there(output)
 
 
 def scan(
     recording: Path = typer.Argument(
         metavar="RECORDING", help="Stereo or depth recording, whatever `pomona info` reads."
     ),
-    output: Path = typer.Option(..., "-o", "--output", help="Session to write: .gpkg, or its fruits as .csv or .ply."),
+    output: Annotated[Path, Writes(SCANNED, also=_parts_there)] = typer.Option(
+        ..., "-o", "--output", help="Session to write: .gpkg, or its fruits as .csv or .ply; - is the standard output."
+    ),
     detections: Path | None = typer.Option(
         None, metavar="FILE", help="Boxes: our CSV, MOTChallenge text or COCO json; else detections.csv in the folder."
     ),
@@ -50,8 +60,12 @@ def scan(
     every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
     first: int | None = typer.Option(None, "--from", metavar="FRAME", help="First frame to take, by its number."),
     last: int | None = typer.Option(None, "--to", metavar="FRAME", help="Last frame to take."),
-    keep: Path | None = typer.Option(None, metavar="DIR", help="Keep stage results here, and go on from them."),
-    preview: Path | None = typer.Option(None, metavar="MP4", help="Draw boxes, ids and depths on the video."),
+    keep: Annotated[Path | None, Writes(KEPT)] = typer.Option(
+        None, metavar="DIR", help="Keep stage results here, and go on from them."
+    ),
+    preview: Annotated[Path | None, Writes(VIDEO)] = typer.Option(
+        None, metavar="MP4", help="Draw boxes, ids and depths on the video."
+    ),
     name: str | None = typer.Option(None, help="Name of the session; else the recording's."),
     date: str | None = typer.Option(
         None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; else the recording's."
@@ -66,6 +80,7 @@ def scan(
     from pomona.cli import scan_output
     from pomona.cli.progress import first_interrupt
     from pomona.detect.opening import open_detector
+    from pomona.outputs import refuse_inputs
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
     from pomona.recording.selected import selected
@@ -82,6 +97,7 @@ def scan(
     detector = open_detector(
         detections, model, whole, family=family, min_score=min_score, classes=_classes(classes), tiles=tiles
     )
+    refuse_inputs([path for path in (output, keep, preview) if path], [*whole.inputs(), detector.path])
     opened = selected(whole, every=every, first=first, last=last)
     looks = {"detector": detector.configuration, "depth": depth}
     kept = None if keep is None else _kept(keep, opened, detector.path, looks)
@@ -98,7 +114,10 @@ def scan(
     written = _write(output, survey, opened, name, date, configuration, detector.path)
     _write_extras(keep, preview, opened, survey)
     found = scan_output.summary(opened, survey, written)
-    typer.echo(_dumps(found) if json else scan_output.as_text(found))
+    if json:
+        say_json(found)
+    else:
+        say(*scan_output.as_lines(found))
     if survey.stopped is not None:
         raise typer.Exit(INTERRUPTED)
 
@@ -125,7 +144,7 @@ def _write(
     date: str | None,
     configuration: dict[str, Any],
     detector: Path,
-) -> list[Path]:
+) -> dict[int, Path]:
     from pomona.survey import write_survey
 
     return write_survey(
@@ -153,7 +172,10 @@ def _write_extras(keep: Path | None, preview: Path | None, recording: Recording,
 
 def _require_writable(output: Path, preview: Path | None) -> None:
     """Refuse before the work, not after it."""
-    _require_suffix(output, SUFFIXES)
+    from pomona.streams import is_stream
+
+    if output.suffix or not is_stream(output):
+        _require_suffix(output, SUFFIXES)
     if preview is not None:
         _require_suffix(preview, (".mp4",))
 
@@ -170,8 +192,6 @@ def _require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
 
     if path.suffix.lower() not in suffixes:
         raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected {', '.join(suffixes)}")
-    if not path.resolve().parent.is_dir():
-        raise PomonaError(f"{path}: the folder {path.parent} is not there")
 
 
 def _require_date(date: str | None) -> None:
@@ -200,9 +220,3 @@ def _date(recording: Recording) -> str:
     message = f"{recording.path}: no date noted, took {day} from the age of its files; --date says it better"
     warnings.warn(message, PomonaWarning, stacklevel=2)
     return day
-
-
-def _dumps(value: Any) -> str:
-    import json
-
-    return json.dumps(value)

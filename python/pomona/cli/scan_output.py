@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pomona.cli.terminal import tell
+
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
     from typing import Any
 
     from pomona.recording import Recording
@@ -20,9 +23,9 @@ def scanning(recording: Recording, boxes: str, *, told: bool) -> Iterator[Progre
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True, soft_wrap=True)
+    console = Console(stderr=True)
     if told or console.is_terminal:
-        console.print(boxes, style="dim", highlight=False)
+        tell(boxes)
     if not console.is_terminal:
         yield None
         return
@@ -43,13 +46,14 @@ def scanning(recording: Recording, boxes: str, *, told: bool) -> Iterator[Progre
         yield show
 
 
-def summary(recording: Recording, survey: Survey, written: list[Path]) -> dict[str, Any]:
+def summary(recording: Recording, survey: Survey, written: Mapping[int, Path]) -> dict[str, Any]:
     """Put in numbers what was found and where it was written."""
     import numpy as np
 
     diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
     return {
-        "output": [str(path) for path in written],
+        "output": [str(written[survey.longest])]
+        + [str(path) for number, path in written.items() if number != survey.longest],
         "recording": str(recording.path),
         "n_frames": len(recording),
         "n_skipped_frames": len(survey.skipped),
@@ -57,15 +61,15 @@ def summary(recording: Recording, survey: Survey, written: list[Path]) -> dict[s
         "n_boxes": survey.detections,
         "n_refused": {reason.value: count for reason, count in sorted(survey.refused.items())},
         "n_fruits": sum(len(part.cloud) for part in survey.parts),
-        "parts": [_of_part(part, path) for part, path in zip(survey.parts, written, strict=True)],
+        "parts": [_of_part(part, written.get(number)) for number, part in enumerate(survey.parts)],
         "median_diameter_mm": float(1000 * np.median(diameters_m)) if len(diameters_m) else None,
     }
 
 
-def _of_part(part: Part, path: Path) -> dict[str, Any]:
+def _of_part(part: Part, path: Path | None) -> dict[str, Any]:
     frames = part.trajectory.frames.tolist()
     return {
-        "output": str(path),
+        "output": None if path is None else str(path),
         "first_frame": min(frames, default=None),
         "last_frame": max(frames, default=None),
         "n_fruits": len(part.cloud),
@@ -73,18 +77,28 @@ def _of_part(part: Part, path: Path) -> dict[str, Any]:
     }
 
 
-def as_text(found: dict[str, Any]) -> str:
+def as_lines(found: dict[str, Any]) -> list[str]:
     """Say the same in words."""
-    size = found["median_diameter_mm"]
-    fruits = f"{found['n_fruits']} fruits" + ("" if size is None else f", median diameter {size:.1f} mm")
-    lines = [f"{found['output'][0]}: {fruits}, from {found['n_boxes']} boxes in {found['n_frames']} frames"]
+    lines = [f"{found['output'][0]}: {_fruits(found)}, from {found['n_boxes']} boxes in {found['n_frames']} frames"]
     lines += [f"  {count} boxes without a place: {reason}" for reason, count in found["n_refused"].items()]
     if found["stopped_after_frame"] is not None:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
-        lines += [
-            f"  {part['output']}: frames {part['first_frame']} to {part['last_frame']}, {part['n_fruits']} fruits"
-            + (f": {part['began']}" if part["began"] else "")
-            for part in found["parts"]
-        ]
-    return "\n".join(lines)
+        lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
+    return lines
+
+
+def _fruits(found: dict[str, Any]) -> str:
+    n_parts = len(found["parts"])
+    counts = [part["n_fruits"] for part in found["parts"] if part["output"] == found["output"][0]]
+    fruits = f"{counts[0]} fruits"
+    if n_parts > 1:
+        fruits += f" in the longest of {n_parts} parts, {found['n_fruits']} in all"
+    size = found["median_diameter_mm"]
+    return fruits if size is None else f"{fruits}, median diameter {size:.1f} mm"
+
+
+def _part_in_words(part: dict[str, Any]) -> str:
+    where = part["output"] or "not written"
+    began = f": {part['began']}" if part["began"] else ""
+    return f"{where}: frames {part['first_frame']} to {part['last_frame']}, {part['n_fruits']} fruits{began}"

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from pomona.cli.verbs import Verbs, Writes
+from pomona.likes import VISITS
 
 if TYPE_CHECKING:
     from pomona.synth.clouds import ScenePair
 
-app = typer.Typer(help="Draw seeded orchards with known truth.", no_args_is_help=True)
+app = Verbs(help="Draw seeded orchards with known truth.", no_args_is_help=True)
 
 
 @app.callback()
@@ -21,7 +24,9 @@ def _synth() -> None:
 @app.command("clouds")
 def synth_clouds(
     cell: str = typer.Argument(help="Test cell, for example base, part45, noov; an unknown name lists them all."),
-    output: Path = typer.Option(..., "-o", "--output", help="Folder to write to; made where it does not exist."),
+    output: Annotated[Path, Writes(VISITS)] = typer.Option(
+        ..., "-o", "--output", help="Folder to write to; made where it does not exist."
+    ),
     seed: int = typer.Option(0, help="Which pair of visits to draw."),
     seeds: str = typer.Option("", help="FIRST:END instead draws many pairs; END is not drawn.", metavar="FIRST:END"),
 ) -> None:

@@ -19,6 +19,7 @@ from pomona.atomic import whole_file
 from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.likes import PLY_MARK
 from pomona.reading import parsed_json, require_file, shown, whole_number
 
 __all__ = ["read", "write"]
@@ -87,7 +88,7 @@ def write(path: Path, cloud: FruitCloud) -> None:
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        "comment fruits written by pomona, metres",
+        PLY_MARK,
         *comments,
         f"element vertex {len(table)}",
         *(f"property {'int' if array.dtype.kind == 'i' else 'double'} {name}" for name, array in arrays.items()),

@@ -53,7 +53,7 @@ def write_session(
     Parameters
     ----------
     path : str or Path
-        The .gpkg file; an existing one is replaced.
+        The .gpkg file; a session that is there is replaced, a map never.
     cloud : FruitCloud
         Fruits in the session's frame, metres; ids are the session's own names of the fruits.
     name : str

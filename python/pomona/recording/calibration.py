@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.reading import MOST_NUMBER, parsed_json, read_text, shown
 from pomona.recording.picture_size import require_size
@@ -83,7 +84,8 @@ class Calibration:
             "rectified": True,
             "depth_unit_m": self.depth_unit_m,
         }
-        Path(path).write_text(json.dumps(fields, indent=1) + "\n", encoding="utf-8")
+        with whole_file(path) as partial:
+            partial.write_text(json.dumps(fields, indent=1) + "\n", encoding="utf-8")
 
     @property
     def size_px(self) -> tuple[int, int]:

@@ -8,12 +8,12 @@ import io
 import json
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pomona.atomic import whole_folder
 from pomona.errors import PomonaError
 from pomona.reading import read_text, shown
 from pomona.recording.calibration import Calibration
@@ -66,10 +66,8 @@ def import_captures(source: Path, output: Path, date: str = DATE) -> Iterator[Ca
         raise PomonaError(f"{taken[0]}: is already there, expected a new folder")
     output.mkdir(parents=True, exist_ok=True)
     for name in names:
-        with tempfile.TemporaryDirectory(prefix=f".{name}.", dir=output) as partial:
-            folder = Path(partial) / name
-            boxes, has_colour = _write(source, name, folder, date)
-            folder.rename(output / name)
+        with whole_folder(output / name) as partial:
+            boxes, has_colour = _write(source, name, partial, date)
         yield Capture(output / name, boxes, has_colour)
 
 

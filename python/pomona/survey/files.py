@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from pomona.atomic import whole_file
+from pomona.cloud import FruitCloud
+from pomona.export import export_cloud
 from pomona.orchard import write_session
 from pomona.recording import Recording
 from pomona.survey.part import Part
+from pomona.survey.part_files import part_files, tell_others
 from pomona.survey.story import Survey
 
-__all__ = ["identity", "part_path", "write_stages", "write_survey"]
+__all__ = ["identity", "write_stages", "write_survey"]
 
 CHUNK_BYTES = 1 << 20
 
@@ -28,13 +31,14 @@ def write_survey(
     date: str,
     configuration: Mapping[str, Any],
     inputs: Iterable[Path],
-) -> list[Path]:
-    """Write each part as a session of its own: a part has its own frame of reference.
+) -> dict[int, Path]:
+    """Write each part with fruits as a session of its own: a part has its own frame of reference.
 
     Parameters
     ----------
     output : Path
-        .gpkg for sessions; .csv or .ply for their fruits alone. Further parts are `NAME-part2.gpkg` and so on.
+        .gpkg for sessions; .csv or .ply for their fruits alone; a stream without a suffix gets CSV. It holds the
+        longest part; the others are named as `part_files` says.
     survey : Survey
         At least one part.
     recording : Recording
@@ -48,46 +52,54 @@ def write_survey(
 
     Returns
     -------
-    list of Path
-        The files, in order of the parts.
+    dict of int to Path
+        The file of each part that was written, by its number.
     """
-    paths = [part_path(output, number) for number in range(len(survey.parts))]
+    files = part_files(output, survey)
+    tell_others(output, files.values())
     if output.suffix.lower() != ".gpkg":
-        for path, part in zip(paths, survey.parts, strict=True):
-            part.cloud.write(path)
-        return paths
+        for number, path in files.items():
+            _write_cloud(path, survey.parts[number].cloud)
+        return files
     hashes = {_shown(file, recording): _sha256(file) for file in dict.fromkeys([*recording.inputs(), *inputs])}
-    for number, (path, part) in enumerate(zip(paths, survey.parts, strict=True)):
+    for number, path in files.items():
+        part = survey.parts[number]
         write_session(
             path,
             part.cloud,
-            name=name if number == 0 else f"{name} part {number + 1}",
+            name=name if number == survey.longest else f"{name} part {number + 1}",
             date=date,
             recording=str(recording.path.resolve()),
             trajectory=part.trajectory,
             configuration=configuration,
             input_hashes=hashes,
         )
-    return paths
+    return files
 
 
-def part_path(path: Path, number: int) -> Path:
-    """Give the file of a part; the first has the name that was asked for."""
-    return path if number == 0 else path.with_stem(f"{path.stem}-part{number + 1}")
+def _write_cloud(path: Path, cloud: FruitCloud) -> None:
+    export_cloud(cloud, path, "ply" if path.suffix.lower() == ".ply" else "csv")
 
 
 def write_stages(folder: Path, survey: Survey) -> None:
-    """Write poses and tracks of each part in formats that `pomona scan` reads: poses_tum.txt, tracks.csv."""
-    for number, part in enumerate(survey.parts):
-        with whole_file(part_path(folder / "poses_tum.txt", number)) as partial:
-            partial.write_text(_tum(part), encoding="utf-8")
-        with (
-            whole_file(part_path(folder / "tracks.csv", number)) as partial,
-            partial.open("w", newline="", encoding="utf-8") as file,
-        ):
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
-            writer.writerows(_tracks(part))
+    """Write poses and tracks of the parts in formats that `pomona scan` reads: poses_tum.txt, tracks.csv."""
+    for name, write in {"poses_tum.txt": _write_tum, "tracks.csv": _write_tracks}.items():
+        files = part_files(folder / name, survey)
+        tell_others(folder / name, files.values())
+        for number, path in files.items():
+            with whole_file(path) as partial:
+                write(partial, survey.parts[number])
+
+
+def _write_tum(path: Path, part: Part) -> None:
+    path.write_text(_tum(part), encoding="utf-8")
+
+
+def _write_tracks(path: Path, part: Part) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
+        writer.writerows(_tracks(part))
 
 
 def _tum(part: Part) -> str:

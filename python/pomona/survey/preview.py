@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
+from pomona.likes import VIDEO_MARK
 from pomona.recording import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Part
@@ -103,6 +104,7 @@ def _video(path: Path, size_px: tuple[int, int], rate: Fraction) -> Iterator[Cal
     import av
 
     with av.open(str(path), "w", format="mp4") as container:
+        container.metadata["comment"] = VIDEO_MARK
         stream = container.add_stream("libx264", rate=rate, options={"crf": "20", "preset": "veryfast"})
         # The common pixel format halves colour along both axes, which takes even sides.
         stream.width, stream.height = (side // 2 * 2 for side in size_px)

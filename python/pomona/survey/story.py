@@ -61,18 +61,20 @@ class Survey:
     stopped: int | None = None
 
     @property
+    def longest(self) -> int:
+        """Number of the part with the most frames, from 0: of those with fruits, if any has; then of most fruits."""
+        sizes = [(len(part.cloud) > 0, len(part.trajectory), len(part.cloud)) for part in self.parts]
+        return sizes.index(max(sizes))
+
+    @property
     def cloud(self) -> FruitCloud:
         """Fruits of the longest part."""
-        return self._longest.cloud
+        return self.parts[self.longest].cloud
 
     @property
     def trajectory(self) -> Trajectory:
         """Poses of the longest part."""
-        return self._longest.trajectory
-
-    @property
-    def _longest(self) -> Part:
-        return max(self.parts, key=lambda part: len(part.trajectory))
+        return self.parts[self.longest].trajectory
 
 
 def scan(

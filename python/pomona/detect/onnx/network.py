@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.reading import require_file
 from pomona.recording.picture_size import require_size
+from pomona.threads import capped_threads, cores
 
 __all__ = ["SIZES_INPUT", "Network", "Outputs", "input_size", "open_session", "reason_of"]
 
@@ -129,7 +129,7 @@ def open_session(path: Path, threads: int | None = None) -> Any:
         raise PomonaError(f"{path}: {needed}: pip install 'pomona[onnx]'") from None
     require_file(path, "an ONNX model")
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads or _cores()
+    options.intra_op_num_threads = capped_threads(threads) or cores()
     options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
     options.log_severity_level = 3  # errors only: they come as exceptions too
@@ -148,11 +148,6 @@ def _require_texts(session: Any) -> None:
     for tensor in (*session.get_inputs(), *session.get_outputs()):
         repr((tensor.name, tensor.shape, tensor.type))
     dict(session.get_modelmeta().custom_metadata_map)
-
-
-def _cores() -> int:
-    """Cores that this process may use, which in a container are fewer than there are; only Linux can tell."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _is_picture(tensor: Any) -> bool:

@@ -1,0 +1,181 @@
+"""What the files are that Pomona makes, told by what is in them: only its like may be replaced by an output."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+__all__ = [
+    "DEMO",
+    "EXPORTS",
+    "KEPT",
+    "PAIRS",
+    "PICTURE",
+    "SCANNED",
+    "VIDEO",
+    "VISITS",
+    "Database",
+    "Like",
+    "database_of",
+    "is_like",
+]
+
+HEAD_BYTES = 4096
+"""Of the beginning or the end of a file, where it says what it is."""
+
+SQLITE = b"SQLite format 3\0"
+
+VIDEO_MARK = "boxes drawn by pomona"
+"""Comment in the videos of `--preview`, by which they are told from recordings."""
+
+PLY_MARK = "comment fruits written by pomona, metres"
+"""Line in the header of the PLY files that are written here."""
+
+DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
+"""Names of the files of drawn visits."""
+
+TRUTH_KEYS = {"cell", "seed", "map_from_query"}
+"""In the truth of drawn visits."""
+
+Database = Literal["session", "map", "other"]
+
+
+@dataclass(frozen=True)
+class Like:
+    """A kind of file or folder that a verb makes.
+
+    Attributes
+    ----------
+    name : str
+        What it is called, with its article.
+    tells : callable
+        Whether an existing file, or folder, is one. It may raise `OSError`, `ValueError` or `LookupError` for no.
+    is_folder : bool
+        Whether it is a folder with files of fixed names.
+    """
+
+    name: str
+    tells: Callable[[Path], bool]
+    is_folder: bool = False
+
+
+def is_like(like: Like, path: Path) -> bool:
+    """Tell whether an existing path may give its place to a new one; a file in which there is nothing may."""
+    try:
+        if path.is_dir() or like.is_folder:
+            return path.is_dir() == like.is_folder and like.tells(path)
+        return path.stat().st_size == 0 or like.tells(path)
+    except (OSError, ValueError, LookupError, csv.Error):
+        return False
+
+
+def database_of(path: Path) -> Database | None:
+    """Tell which database a file is: a session or a map of ours, or another, also one that cannot be read now."""
+    from pomona.errors import PomonaError
+
+    try:
+        if not _is_sqlite(path):
+            # Of a map in its first transaction there is an empty file, and a journal.
+            begun = path.stat().st_size == 0 and Path(f"{path}-journal").exists()
+            return "other" if begun else None
+    except OSError:
+        return None
+    from pomona.orchard import schema
+
+    try:
+        with schema.snapshot(path) as (_, kind):
+            return kind
+    except PomonaError:
+        return "other"
+
+
+def _is_sqlite(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(SQLITE)) == SQLITE
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(HEAD_BYTES)
+
+
+def _tail(path: Path) -> bytes:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - HEAD_BYTES))
+        return file.read()
+
+
+def _has_columns(*names: str) -> Callable[[Path], bool]:
+    def tells(path: Path) -> bool:
+        first = _head(path).decode("utf-8-sig").splitlines()[0]
+        return set(names) <= set(next(csv.reader([first])))
+
+    return tells
+
+
+def _is_ply(path: Path) -> bool:
+    return _head(path).startswith(b"ply\n") and PLY_MARK.encode() in _head(path)
+
+
+def _is_geojson(path: Path) -> bool:
+    return _head(path).startswith(b'{"type": "FeatureCollection"') and b"LOCAL_CS" in _head(path)
+
+
+def _is_session(path: Path) -> bool:
+    return database_of(path) == "session"
+
+
+def _is_scanned(path: Path) -> bool:
+    tells = {".gpkg": _is_session, ".ply": _is_ply}
+    # A CSV with the sizes' sigmas is one of a scan; the true fruits of a recording have none.
+    return tells.get(path.suffix.lower(), _has_columns("x", "y", "z", "diameter_sigma_m"))(path)
+
+
+def _is_picture(path: Path) -> bool:
+    """Tell a plot from a photograph: Matplotlib signs at the beginning, in PDF in front of the last table."""
+    starts = (b"\x89PNG", b"%PDF", b"<?xml")
+    return _head(path).startswith(starts) and b"Matplotlib" in _head(path) + _tail(path)
+
+
+def _is_video(path: Path) -> bool:
+    return _head(path)[4:8] == b"ftyp" and VIDEO_MARK.encode() in _tail(path)
+
+
+def _is_kept(folder: Path) -> bool:
+    return (folder / "made_from.json").is_file() or not any(folder.iterdir())
+
+
+def _has_drawn_visits(folder: Path) -> bool:
+    """Tell a folder in which every file with one of our names belongs to a truth of ours."""
+    ours = filter(None, (DRAWN.fullmatch(path.name) for path in folder.iterdir()))
+    return all(_is_truth(folder / f"truth{name['seed']}.json") for name in ours)
+
+
+def _is_demo(folder: Path) -> bool:
+    from pomona.demo import is_made_here
+
+    return is_made_here(folder)
+
+
+def _is_truth(path: Path) -> bool:
+    found = json.loads(path.read_text(encoding="utf-8"))
+    return isinstance(found, dict) and found.keys() >= TRUTH_KEYS
+
+
+SCANNED = Like("what a scan writes", _is_scanned)
+PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "distance_m"))
+PICTURE = Like("a plot", _is_picture)
+VIDEO = Like("a preview", _is_video)
+KEPT = Like("a folder that a scan keeps", _is_kept, is_folder=True)
+VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
+DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
+EXPORTS = {
+    "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),
+    "ply": Like("a PLY of fruits", _is_ply),
+    "geojson": Like("a GeoJSON of fruits", _is_geojson),
+}
