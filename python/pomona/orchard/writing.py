@@ -15,11 +15,20 @@ from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
 from pomona.orchard import schema
+from pomona.orchard.opening import blank
 from pomona.orchard.session import Session
 from pomona.settings import Settings
 from pomona.trajectory import Trajectory
 
-__all__ = ["Placement", "insert_fruits", "insert_observations", "insert_session", "update_layers", "write_session"]
+__all__ = [
+    "Placement",
+    "insert_fruits",
+    "insert_observations",
+    "insert_session",
+    "nullable",
+    "update_layers",
+    "write_session",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +84,7 @@ def write_session(
         When the date is not one, the configuration is not JSON or the file cannot be written.
     """
     session = Session(name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {})
-    with (
-        whole_file(path) as partial,
-        schema.opened(partial, create=True, shown=Path(path)) as connection,
-        schema.transaction(connection),
-    ):
+    with whole_file(path) as partial, blank(partial, Path(path)) as connection:
         schema.create(connection, "session")
         session_id = insert_session(connection, session)
         fruit_ids = insert_fruits(connection, session_id, session.date, cloud)
@@ -156,10 +161,10 @@ def insert_observations(
         fruit_ids.tolist(),
         cloud_in_map.ids or [None] * n,
         _diameters(cloud_in_map),
-        *(_nullable(column) for column in cells.T),
+        *(nullable(column) for column in cells.T),
         [None] * n if cloud_in_map.n_views is None else cloud_in_map.n_views.tolist(),
-        _nullable(blank if probabilities is None else probabilities),
-        _nullable(blank if distances_m is None else distances_m),
+        nullable(blank if probabilities is None else probabilities),
+        nullable(blank if distances_m is None else distances_m),
         _other_columns(cloud_in_map),
         strict=True,
     )
@@ -213,12 +218,13 @@ def _insert_poses(
     )
 
 
-def _nullable(column: NDArray[np.float64]) -> list[float | None]:
+def nullable(column: NDArray[np.float64]) -> list[float | None]:
+    """Return numbers for a column, null where they are NaN."""
     return [None if value != value else value for value in column.tolist()]
 
 
 def _diameters(cloud: FruitCloud) -> list[float | None]:
-    return [None] * len(cloud) if cloud.diameters_m is None else _nullable(cloud.diameters_m)
+    return [None] * len(cloud) if cloud.diameters_m is None else nullable(cloud.diameters_m)
 
 
 def _other_columns(cloud: FruitCloud) -> list[str | None]:
