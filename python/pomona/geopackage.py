@@ -8,6 +8,7 @@ Source: OGC 12-128r17, GeoPackage Encoding Standard 1.3; annexes F.1-F.3 for the
 
 from __future__ import annotations
 
+import math
 import sqlite3
 import struct
 from collections.abc import Sequence
@@ -49,6 +50,9 @@ POINT_Z = np.dtype(
     ]
 )
 """The whole geometry of one point, section 2.1.3; packed, 37 bytes."""
+
+POINT_HEAD = b"GP\0\x01" + struct.pack("<BI", LITTLE_ENDIAN, WKB_POINT_Z)
+"""What every point begins with, but for the number of the reference system."""
 
 CORE_TABLES = """
 CREATE TABLE gpkg_spatial_ref_sys (
@@ -214,7 +218,8 @@ def are_points(blobs: Sequence[bytes]) -> bool:
 
 def _bounds(point: object) -> tuple[float, float, float, float] | tuple[None, None, None, None]:
     """Return min x, max x, min y, max y of a point as this module writes it; None for anything else."""
-    if not isinstance(point, bytes) or not are_points([point]):
-        return None, None, None, None
-    x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
-    return x, x, y, y
+    if isinstance(point, bytes) and len(point) == POINT_Z.itemsize and point[:4] + point[8:13] == POINT_HEAD:
+        x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
+        if math.isfinite(x) and math.isfinite(y):
+            return x, x, y, y
+    return None, None, None, None

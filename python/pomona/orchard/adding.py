@@ -16,6 +16,7 @@ from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.orchard import schema
 from pomona.orchard.failures import WrongContentError
+from pomona.orchard.numbering import last_ids
 from pomona.orchard.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.orchard.reading import fruits_in_map
 from pomona.orchard.replay import in_view_unseen
@@ -132,6 +133,7 @@ def _add(
     with writing(path, "map", create=create, timeout_s=timeout_s, waiting=waiting) as (connection, is_blank):
         if is_blank:
             return _start(connection, session)
+        last_ids(connection)
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
         known = fruits_in_map(connection)
@@ -181,6 +183,8 @@ def _join(
 def _require_new(connection: sqlite3.Connection, session: Session) -> None:
     """Refuse a session that is in the map: by its name, by what it saw or by what it was made from."""
     columns = columns_of(connection, "sessions", ("name", "content_sha256", "input_hashes"))
+    if not columns[0]:
+        raise WrongContentError("has no session, expected at least one")
     for name, content_sha256, input_hashes in zip(*columns, strict=True):
         if name == session.name:
             raise WrongContentError(f"session {name} is in the map already")

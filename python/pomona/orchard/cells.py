@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.errors import PomonaError
-from pomona.orchard.session import iso_date
+from pomona.orchard.session import FARTHEST_M, iso_date
 
 __all__ = ["COLUMNS", "Kind", "finite_json", "similarity"]
 
@@ -115,7 +115,12 @@ def similarity(rows: Any) -> NDArray[np.float64] | None:
         axes = transform[:3, :3]
         scale = np.cbrt(np.linalg.det(axes)) if np.isfinite(transform).all() else np.nan
         is_similarity = scale > 0 and np.abs(axes @ axes.T / scale**2 - np.eye(3)).max() < RIGID_TOLERANCE
+    is_similarity = bool(is_similarity and np.abs(transform).max() <= FARTHEST_M)
     return transform if is_similarity and (transform[3] == (0, 0, 0, 1)).all() else None
+
+
+def _are_places(blobs: Sequence[bytes]) -> bool:
+    return geopackage.are_points(blobs) and bool(np.abs(geopackage.points_of(blobs)).max() <= FARTHEST_M)
 
 
 def _texts_by_name(value: object) -> bool:
@@ -131,11 +136,12 @@ DATE = _text("ISO 8601 local time as 2021-09-27 or 2021-09-27T11:40:12", _is_dat
 OBJECT = _json("a JSON object", lambda value: isinstance(value, dict))
 HASHES = _json("a JSON object of texts", _texts_by_name)
 TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
-POINT = Kind("a little-endian POINT Z with finite coordinates", bytes, geopackage.are_points)
+POINT = Kind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
 FINITE = _number("a finite number", -np.finfo(float).max, np.finfo(float).max)
+SQUARE = _number("square metres", -(FARTHEST_M**2), FARTHEST_M**2)
 NUMBER = _number("a number", -np.inf, np.inf)
-LENGTH = _number("metres from 0", 0.0, np.finfo(float).max)
-DIAMETER = _number("metres above 0", np.finfo(float).tiny, np.finfo(float).max)
+LENGTH = _number("metres from 0", 0.0, FARTHEST_M)
+DIAMETER = _number("metres above 0", np.finfo(float).tiny, FARTHEST_M)
 SHARE = _number("a number from 0 to 1", 0.0, 1.0)
 UNIT = _number("a number from -1 to 1", -1.0 - RIGID_TOLERANCE, 1.0 + RIGID_TOLERANCE)
 
@@ -173,7 +179,7 @@ COLUMNS: Mapping[str, Mapping[str, Kind]] = {
         "fruit_id": ID,
         "label": _or_null(TEXT),
         "diameter_m": _or_null(DIAMETER),
-        **dict.fromkeys(("cxx", "cxy", "cxz", "cyy", "cyz", "czz"), _or_null(FINITE)),
+        **dict.fromkeys(("cxx", "cxy", "cxz", "cyy", "cyz", "czz"), _or_null(SQUARE)),
         "n_views": _or_null(WHOLE),
         "match_probability": _or_null(SHARE),
         "match_distance_m": _or_null(LENGTH),

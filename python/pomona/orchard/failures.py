@@ -45,6 +45,9 @@ def told(path: Path) -> Iterator[None]:
         yield
     except WrongContentError as error:
         raise PomonaError(f"{path}: {error}") from None
+    except UnicodeDecodeError:
+        # sqlite3 cannot tell an error of SQLite that quotes a damaged schema.
+        raise PomonaError(f"{path}: {DAMAGED}") from None
     except sqlite3.Error as error:
         name = getattr(error, "sqlite_errorname", "") or ""
         reason = next((text for code, text in REASONS.items() if name.startswith(code)), None)

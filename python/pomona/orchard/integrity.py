@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from pomona.orchard.cells import COLUMNS
+from pomona.orchard.failures import WrongContentError
+from pomona.orchard.numbering import misnumbered
 from pomona.orchard.opening import snapshot
 from pomona.orchard.replay import replayed, sighted
 from pomona.orchard.rows import columns_of, misfits
@@ -47,14 +49,20 @@ def problems(path: str | Path) -> list[str]:
     """
     with snapshot(Path(path)) as (connection, _):
         damage = [line for (line,) in connection.execute("PRAGMA integrity_check") if line != "ok"]
-        if damage:
-            # What such pages say of the rest is worth nothing.
+        try:
+            return damage + _contradictions(connection)
+        except (sqlite3.Error, UnicodeDecodeError, WrongContentError):
+            # Damaged pages need not give more to ask.
+            if not damage:
+                raise
             return damage
-        wrong = [line for table in COLUMNS for line in misfits(connection, table)]
-        dangling = list(_dangling(connection))
-        broken = [line for query in INVARIANTS for (line,) in connection.execute(query) if line is not None]
-        found = wrong + dangling + broken
-        return found or list(_miscounted(connection))
+
+
+def _contradictions(connection: sqlite3.Connection) -> list[str]:
+    wrong = [line for table in COLUMNS for line in misfits(connection, table)]
+    broken = [line for query in INVARIANTS for (line,) in connection.execute(query) if line is not None]
+    found = wrong + list(_dangling(connection)) + broken + misnumbered(connection)
+    return found or list(_miscounted(connection))
 
 
 def _dangling(connection: sqlite3.Connection) -> Iterator[str]:

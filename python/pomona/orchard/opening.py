@@ -11,7 +11,7 @@ from pathlib import Path
 from pomona import geopackage
 from pomona.errors import PomonaError
 from pomona.orchard import recovery, shape
-from pomona.orchard.failures import WrongContentError, told
+from pomona.orchard.failures import DAMAGED, WrongContentError, told
 from pomona.orchard.guard import guard, release, trust
 from pomona.orchard.rows import columns_of
 from pomona.orchard.schema import FORMAT_VERSION, Kind
@@ -55,6 +55,7 @@ def writing(
     with told(path), _connection(path, create=create, timeout_s=timeout_s) as connection:
         _begin_to_write(connection, timeout_s, waiting)
         with _transaction(connection):
+            _load_schema(connection)
             if create and _is_blank(connection):
                 release(connection)
                 yield connection, True
@@ -106,9 +107,17 @@ def _begun(path: Path) -> Iterator[sqlite3.Connection]:
 
 def _begin_to_read(connection: sqlite3.Connection) -> None:
     connection.execute("BEGIN")
-    # The transaction begins when something is read.
-    connection.execute("PRAGMA application_id").fetchone()
-    connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    _load_schema(connection)
+
+
+def _load_schema(connection: sqlite3.Connection) -> None:
+    """Read the schema, with which a transaction begins to see the file; what SQLite cannot make of it is damage."""
+    try:
+        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorname == "SQLITE_ERROR":
+            raise WrongContentError(DAMAGED) from None
+        raise
 
 
 def _begin_to_write(connection: sqlite3.Connection, timeout_s: float, waiting: Waiting | None) -> None:

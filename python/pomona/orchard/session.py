@@ -8,12 +8,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
+import numpy as np
+
 from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.trajectory import Trajectory
 
-__all__ = ["GUESSED", "Session", "iso_date"]
+__all__ = ["FARTHEST_M", "GUESSED", "Session", "iso_date"]
+
+FARTHEST_M = 1e12
+"""Nothing that grows is farther from anything than the planets; squares of such numbers can still be added."""
 
 GUESSED = "guessed from the age of the files"
 """What `configuration["scan"]["date"]` of a session says when nobody noted the day of the visit."""
@@ -57,6 +62,8 @@ class Session:
             raise PomonaError("session: found an empty name, expected one that is used once in a map")
         object.__setattr__(self, "date", iso_date(self.date))
         _json("configuration", self.configuration)
+        if len(self.cloud) and np.abs(self.cloud.positions).max() > FARTHEST_M:
+            raise PomonaError(f"session {self.name}: found a fruit beyond {FARTHEST_M:g} m")
         _require_unicode((self.name, self.recording, *(self.cloud.ids or ())))
         for column in self.cloud.extras.values():
             _require_unicode(column)

@@ -132,9 +132,7 @@ def _require_at_rest(item: Item) -> None:
         raise WrongContentError(f"{item}: found SQL that makes something else ({shown(f'{kind} {name}')})")
     touched = _touched(item, words, rest)
     if touched:
-        raise WrongContentError(
-            f"{item}: touches {touched}; expected nothing of others to act on Pomona's tables: drop it"
-        )
+        raise WrongContentError(f"{item}: touches {touched}, expected nothing of others to act on Pomona's tables")
     if words[1] == "virtual" and rest[:2] != ("using", "rtree"):
         raise WrongContentError(f"{item}: is a virtual table, expected none but spatial indexes (rtree)")
 
@@ -151,9 +149,9 @@ def _touched(item: Item, words: tuple[str, ...], rest: tuple[str, ...]) -> str:
     elif item.kind == "table":
         named = names_in(tuple(after for word, after in itertools.pairwise(words) if word == "references"))
     elif item.kind == "index":
-        on, table, *columns = (*rest, "", "")
-        plain = words[1] == "index" and columns[:1] == ["("] and is_column_list((",", *columns[1:-3]))
-        named = set() if plain and on == "on" else {table.strip("'").lower(), item.table}
+        on, table, opening, *columns, closing = rest if len(rest) > 4 else [""] * 5
+        plain = (words[1], on, opening, closing) == ("index", "on", "(", ")") and is_column_list((",", *columns))
+        named = set() if plain else {table.strip("'").lower(), item.table}
     else:
         named = set()
     return min(named & ours, default="")

@@ -35,10 +35,11 @@ def words_of(sql: str) -> tuple[str, ...]:
 
 def made(words: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]]:
     """Return what a CREATE statement makes, its name, and the words that follow; blanks where it is none."""
-    _, *rest = (*words, "", "")
-    is_special = rest[0] in ("unique", "virtual")
-    kind, name, *more = (*rest[is_special:], "", "")
-    return (kind, name, tuple(more)) if words[:1] == ("create",) else ("", "", ())
+    if words[:1] != ("create",):
+        return "", "", ()
+    first = 2 if words[1:2] in (("unique",), ("virtual",)) else 1
+    kind, name = (*words[first : first + 2], "", "")[:2]
+    return kind, name, words[first + 2 :]
 
 
 def names_in(words: tuple[str, ...]) -> set[str]:

@@ -15,6 +15,7 @@ from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
 from pomona.orchard import schema
+from pomona.orchard.numbering import last_ids
 from pomona.orchard.opening import blank
 from pomona.orchard.session import Session
 from pomona.settings import Settings
@@ -123,7 +124,7 @@ def insert_fruits(
     """Give new fruits their ids, (N,), in order of rows."""
     if not len(cloud_in_map):
         return np.empty(0, np.int64)
-    (last,) = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'fruits'").fetchone()
+    last = last_ids(connection).get("fruits", 0)
     ids = np.arange(last + 1, last + 1 + len(cloud_in_map))
     connection.executemany(
         """INSERT INTO fruits (id, geom, state, last_seen, last_session_id, n_sessions, diameter_m)
@@ -148,9 +149,7 @@ def insert_observations(
 ) -> None:
     """Add what the session saw of each fruit, one row of the cloud each; NaN where nothing was matched."""
     n = len(cloud_in_map)
-    (last,) = connection.execute(
-        "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'observations'"
-    ).fetchone()
+    last = last_ids(connection).get("observations", 0)
     cells = np.full((n, 6), np.nan)
     if cloud_in_map.covariances is not None:
         cells = cloud_in_map.covariances.reshape(n, 9)[:, [0, 4, 8, 1, 2, 5]]
