@@ -75,7 +75,9 @@ def _partial(path: str | Path) -> Iterator[tuple[Path, Path]]:
     except OSError as error:
         raise PomonaError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
-        partial.unlink(missing_ok=True)
+        # What is done is done, even where the disk does not let go of what is left over.
+        with contextlib.suppress(OSError):
+            partial.unlink()
 
 
 def _finish(partial: Path) -> None:
