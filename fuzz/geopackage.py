@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import sqlite3
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -212,8 +211,3 @@ def _columns(data: bytes, table: str) -> list[str]:
         names = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
         connection.close()
         return names
-
-
-if __name__ == "__main__":
-    for number, seed in enumerate(seeds()):
-        Path(sys.argv[1], f"{number}.gpkg").write_bytes(seed)

@@ -67,7 +67,7 @@ def _number(expected: str, least: float, most: float) -> Kind:
 
 
 def _text(expected: str, is_right: Callable[[str], bool] = bool) -> Kind:
-    return Kind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, cells)))
+    return Kind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, set(cells))))
 
 
 def _json(expected: str, is_right: Callable[[Any], bool]) -> Kind:

@@ -69,11 +69,19 @@ def _fetched(connection: sqlite3.Connection, table: str, names: Sequence[str], w
     while rows := cursor.fetchmany(ROWS_AT_ONCE):
         for column, cells in zip(columns, zip(*rows, strict=True), strict=True):
             column.extend(cells)
-            left -= sum(len(cell) for cell in cells if isinstance(cell, str | bytes))
+            left -= _length(cells)
         left -= LEAST_ROW_BYTES * len(rows)
         if left < 0:
             raise WrongContentError(f"{table}: gives more rows than the file can hold: it is damaged, or was made to")
     return columns
+
+
+def _length(cells: Sequence[Any]) -> int:
+    """Return how many characters and bytes there are in texts and blobs; numbers have none."""
+    types = set(map(type, cells))
+    if types.isdisjoint((str, bytes)):
+        return 0
+    return sum(map(len, cells if types <= {str, bytes} else [cell for cell in cells if type(cell) in (str, bytes)]))
 
 
 def _size_bytes(connection: sqlite3.Connection) -> int:
