@@ -104,6 +104,8 @@ def _third_visit() -> Session:
     return Session("c", "2024-10-01", "r", cloud)
 
 
+TABLES = ("pomona_format", "sessions", "fruits", "observations", "sightings", "poses")
+
 VALUES = (
     *("NULL", "'text'", "''", "x'00ff'", "zeroblob(37)", "x'00' || geom", "CAST(x'fffe41' AS TEXT)"),
     *("0", "1", "2", "-1", "9223372036854775807", "-9223372036854775808", "0.5", "3.0", "1e300", "1e-300"),
@@ -162,16 +164,18 @@ SCHEMAS = (
 """What a map that came by mail may do, or have lost."""
 
 
-def cell_edits(data: bytes) -> Iterator[tuple[str, bytes]]:
-    """Give a file with one cell edited, for every column and every odd value."""
-    columns = [(table, name) for table in _tables(data) for name in _columns(data, table)]
-    for table, name in columns:
-        for value in VALUES:
-            for row in ("1", "max(id)"):
-                where = f"WHERE id = (SELECT {row} FROM {table})" if row != "1" else "WHERE id = 1"
-                statement = f"UPDATE {table} SET {name} = {value} {where}"
-                if (changed := edited(data, statement)) is not None:
-                    yield statement, changed
+def cell_edits(data: bytes, every: int = 1) -> Iterator[tuple[str, bytes]]:
+    """Give a file with one cell edited, for every column, odd value, and first and last row; or one of so many."""
+    statements = [
+        f"UPDATE {table} SET {name} = {value} WHERE id = (SELECT {row}(id) FROM {table})"
+        for table in TABLES
+        for name in _columns(data, table)
+        for value in VALUES
+        for row in ("min", "max")
+    ]
+    for statement in statements[::every]:
+        if (changed := edited(data, statement)) is not None:
+            yield statement, changed
 
 
 def schema_edits(data: bytes) -> Iterator[tuple[str, bytes]]:
@@ -197,10 +201,6 @@ def edited(data: bytes, script: str) -> bytes | None:
         finally:
             connection.close()
         return path.read_bytes()
-
-
-def _tables(data: bytes) -> tuple[str, ...]:
-    return ("pomona_format", "sessions", "fruits", "observations", "sightings", "poses") if data else ()
 
 
 def _columns(data: bytes, table: str) -> list[str]:
