@@ -69,6 +69,11 @@ class Drawn:
         with np.errstate(all="ignore"):
             return np.asarray(1e-3 * half @ half.transpose(0, 2, 1) + 1e-6 * np.eye(3))
 
+    def pose(self) -> list[list[float]]:
+        """A rigid transform, mostly; always 4 x 4."""
+        poses = self.poses(1)
+        return (poses[0] if poses.shape == (1, 4, 4) else np.eye(4)).tolist()
+
     def poses(self, n: int) -> NDArray[np.float64]:
         """Rigid transforms (n, 4, 4), mostly."""
         from scipy.spatial.transform import Rotation

@@ -44,7 +44,7 @@ def _search(draw: Drawn) -> None:
     )
     query, noise_m = _cloud(draw), draw.choice(None, None, draw.positive())
     if draw.choice(False, False, True):
-        found = index.pairs_under(query, map_from_query=draw.poses(1)[0].tolist(), noise_m=noise_m)
+        found = index.pairs_under(query, map_from_query=draw.pose(), noise_m=noise_m)
     else:
         up = draw.choice(None, ([0.0, 0.0, 1.0], draw.numbers(3).tolist()))
         found = index.search(query, noise_m=noise_m, up=up, per_frame=draw.choice(False, False, True))

@@ -1,9 +1,11 @@
 """`pomona map` as a user meets it: exit code, stdout and stderr of a process of its own."""
 
 import json
+import shutil
 import sqlite3
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,8 @@ import pytest
 
 from pomona import FruitCloud
 from pomona.cli import main
+from pomona.orchard import write_session
+from pomona.orchard.session import GUESSED
 from pomona.synth.clouds import scene_pair
 
 POMONA = Path(sys.executable).with_name("pomona")
@@ -94,7 +98,7 @@ def test_a_session_that_is_elsewhere_is_a_result(orchard: Path, visits: Path) ->
         (("add", "orchard.gpkg", "august.csv"), "--date YYYY-MM-DD"),
         (("add", "orchard.gpkg", "august.csv", "--date", "yesterday"), "found the date 'yesterday'"),
         (("add", "orchard.gpkg", "absent.csv", "--date", "2024-08-01"), "absent.csv: cannot be read: No such file"),
-        (("add", "absent/orchard.gpkg", "august.csv", "--date", "2024-08-01"), "cannot be opened"),
+        (("add", "absent/orchard.gpkg", "august.csv", "--date", "2024-08-01"), "cannot be written: No such file"),
         (("info", "august.csv"), "august.csv: is not a GeoPackage"),
         (("check", "absent.gpkg"), "absent.gpkg: is not there"),
     ],
@@ -121,12 +125,60 @@ def test_wrong_input_is_one_line(
     assert {path: path.read_bytes() for path in orchard.parent.iterdir()} == before
 
 
-def test_millimetres_are_warned_of_and_converted(visits: Path, tmp_path: Path) -> None:
+def test_millimetres_go_into_a_map_only_where_that_is_said(visits: Path, tmp_path: Path) -> None:
     cloud = FruitCloud.read(visits / "august.csv")
     FruitCloud(1000.0 * cloud.positions, ids=cloud.ids).write(tmp_path / "mm.csv")
-    done = run("add", tmp_path / "wrong.gpkg", tmp_path / "mm.csv", "--date", "2024-08-01")
-    assert done.returncode == 0
-    assert done.stderr.startswith("pomona: warning: ")
+    doubtful = ("add", tmp_path / "wrong.gpkg", tmp_path / "mm.csv", "--date", "2024-08-01")
+    done = run(*doubtful)
+    assert (done.returncode, done.stdout) == (2, "")
     assert "--unit mm" in done.stderr
+    assert done.stderr.endswith("; a map takes it as it is with --unit m\n")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "wrong.gpkg").exists()
+    assert run(*doubtful, "--unit", "m").returncode == 0
     assert run("add", tmp_path / "right.gpkg", tmp_path / "mm.csv", "--date", "2024-08-01", "--unit", "mm").stderr == ""
     np.testing.assert_allclose(FruitCloud.read(tmp_path / "right.gpkg").positions, cloud.positions, atol=1e-12)
+
+
+def test_doubtful_sessions_go_into_a_map_only_where_that_is_said(visits: Path, tmp_path: Path) -> None:
+    cloud = FruitCloud.read(visits / "august.csv")
+    wide = replace(cloud, diameters_m=np.full(len(cloud), 70.0))
+    doubts = {
+        "far": (FruitCloud(1000.0 * cloud.positions), {}, ("--unit", "m"), "neighbouring fruits are"),
+        "wide": (wide, {}, ("--unit", "m"), "the median diameter is 70 m"),
+        "undated": (cloud, {"scan": {"date": GUESSED}}, ("--date", "2024-08-02"), "was guessed from the age of files"),
+    }
+    for name, (doubtful, configuration, flags, words) in doubts.items():
+        session, orchard = tmp_path / f"{name}.gpkg", tmp_path / f"{name}-map.gpkg"
+        about = {"name": name, "date": "2024-08-01", "recording": "test", "configuration": configuration}
+        write_session(session, doubtful, **about)  # type: ignore[arg-type]
+        done = run("add", orchard, session)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert words in done.stderr
+        assert flags[0] in done.stderr
+        assert not orchard.exists()
+        assert run("add", orchard, session, *flags).returncode == 0
+    done = run("add", tmp_path / "x.gpkg", tmp_path / "far.gpkg", "--unit", "mm")
+    assert done.returncode == 2
+    assert "a session is in metres" in done.stderr
+
+
+def test_remove_undoes_add(orchard: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(orchard, tmp_path))
+    before = path.read_bytes()
+    told = run("remove", path, "september")
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.endswith("1 sessions stay; nothing is removed without --yes\n")
+    assert path.read_bytes() == before
+    done = run("remove", path, "october", "--yes", "--json")
+    assert (done.returncode, json.loads(done.stdout)) == (1, {"session": "october", "removed": False})
+    assert path.read_bytes() == before
+    done = run("remove", path, "september", "--yes", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    answer = json.loads(done.stdout)
+    assert (answer["removed"], answer["n_left"]) == (True, 1)
+    assert [visit["name"] for visit in json.loads(run("info", path, "--json").stdout)["sessions"]] == ["august"]
+    assert run("check", path).stdout == "ok\n"
+    done = run("remove", path, "august", "--yes")
+    assert done.returncode == 2
+    assert "august is its only session, and a map has at least one: delete the file instead" in done.stderr

@@ -14,19 +14,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs limits of
 SECONDS = 2.0
 """For each target; its start takes as long again."""
 
-PENDING = {
-    "matching": "coordinates of 1e300 and more: index.rs, and searches without end",
-    "tracking": "landmarks at infinity: ranges of a BTreeMap",
-}
-"""Targets that are known to fail; when one does not any more, its line goes."""
 
-
-def _targets() -> list[object]:
-    marks = {name: (pytest.mark.xfail(reason=reason),) for name, reason in PENDING.items()}
-    return [pytest.param(name, marks=marks.get(name, ())) for name in target_names()]
-
-
-@pytest.mark.parametrize("name", _targets())
+@pytest.mark.parametrize("name", target_names())
 def test_nothing_but_our_error_leaves_a_reader_or_a_binding(name, tmp_path):
     outcome = run_target(name, SECONDS, 0, tmp_path)
     assert not outcome.failures, "\n".join(outcome.failures)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pomona import PomonaError, geopackage
+from pomona import geopackage
+from pomona.orchard.failures import told
 
 
 @pytest.fixture
@@ -36,11 +37,14 @@ def test_points_read_back_the_same(positions: np.ndarray) -> None:
     np.testing.assert_array_equal(geopackage.points_of(blobs), positions.reshape(-1, 3))
 
 
-@pytest.mark.parametrize("damaged", [b"", b"GP", b"XX" + bytes(35), None])
-def test_another_geometry_is_refused(damaged: bytes) -> None:
+@pytest.mark.parametrize("damaged", [b"", b"GP", b"XX" + bytes(35), *geopackage.points([[np.nan, 0, 0]])])
+def test_another_geometry_is_told_apart(layer: sqlite3.Connection, damaged: bytes) -> None:
     good = geopackage.points([[1, 2, 3]])
-    with pytest.raises(PomonaError, match="geometry 1 in order of id is not a little-endian POINT Z"):
-        geopackage.points_of([*good, damaged])
+    assert geopackage.are_points(good)
+    assert not geopackage.are_points([*good, damaged])
+    # Nor does it come into the index, or stop the statement.
+    layer.execute("UPDATE stones SET geom = ? WHERE id = 2", (damaged,))
+    assert [fruit_id for fruit_id, *_ in indexed(layer)] == [1, 3]
 
 
 def test_the_index_follows_every_change(layer: sqlite3.Connection) -> None:
@@ -71,5 +75,5 @@ def test_contents_know_extent_and_time(layer: sqlite3.Connection) -> None:
 
 
 def test_a_bug_is_not_told_as_wrong_input(layer: sqlite3.Connection) -> None:
-    with pytest.raises(sqlite3.OperationalError, match="no such table"), geopackage.told(Path("a.gpkg")):
+    with pytest.raises(sqlite3.OperationalError, match="no such table"), told(Path("a.gpkg")):
         layer.execute("SELECT * FROM pebbles")

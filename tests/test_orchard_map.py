@@ -243,7 +243,10 @@ def test_nothing_is_left_of_a_map_that_could_not_be_started(
             "fruit 7 is not where session",
         ),
         ("UPDATE sessions SET date = '2025-01-01' WHERE id = 1", "was last seen on 2024-"),
-        ("UPDATE observations SET match_probability = 1.5 WHERE id = 1", "observation 1 has the match probability 1.5"),
+        (
+            "UPDATE observations SET match_probability = 1.5 WHERE id = 1",
+            "observations 1: match_probability: found 1.5, expected",
+        ),
         ("DELETE FROM rtree_fruits_geom WHERE id = 7", "fruit 7 is not in the spatial index"),
         ("DELETE FROM sessions WHERE id = 1", "points to a row of sessions that is not there"),
         ("UPDATE pomona_format SET kind = 'session'", "the file of a session holds 2 sessions"),

@@ -182,7 +182,7 @@ def test_a_newer_format_is_refused(session_file: Path) -> None:
     assert refusal(session_file) == "has format 2, this program reads up to 1: update pomona"
 
 
-@pytest.mark.parametrize("wrong", ["format_version = 0", "format_version = 'one'", "kind = 'tree'"])
+@pytest.mark.parametrize("wrong", ["format_version = 0", "kind = 'tree'"])
 def test_a_format_that_never_was_is_refused(session_file: Path, wrong: str) -> None:
     change(session_file, f"UPDATE pomona_format SET {wrong}")
     assert "expected 1 and 'session' or 'map'" in refusal(session_file)
@@ -194,7 +194,7 @@ def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
     path.write_text("x,y,z\n" * 100)
     assert refusal(path) == "is not a GeoPackage"
     path.write_bytes(b"")
-    assert refusal(path) == "is not a GeoPackage: application id 0x0, expected 'GPKG'"
+    assert refusal(path) == "is empty: a map that another program is making just now, or never finished; try again"
     change(path, "CREATE TABLE fruits (id INTEGER PRIMARY KEY)")
     assert refusal(path) == "is not a GeoPackage: application id 0x0, expected 'GPKG'"
     path.unlink()
@@ -215,7 +215,10 @@ def test_a_geometry_of_another_kind_is_refused(session_file: Path) -> None:
     connection = geopackage.connect(session_file)
     connection.execute("UPDATE observations SET geom = CAST(geom || x'00' AS BLOB) WHERE id = 3")
     connection.close()
-    with pytest.raises(PomonaError, match="geometry 2 in order of id is not a little-endian POINT Z"):
+    with pytest.raises(
+        PomonaError,
+        match=r"observations 3: geom: found b'GP.*, expected a little-endian POINT Z",
+    ):
         FruitCloud.read(session_file)
 
 

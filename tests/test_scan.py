@@ -155,6 +155,12 @@ def test_an_unknown_date_is_said(pomona, tmp_path):
     done = pomona("scan", folder, "-o", tmp_path / "session.gpkg")
     assert done.returncode == 0
     assert "no date noted" in done.stderr
+    # And asked again before it goes into a map.
+    orchard = tmp_path / "orchard.gpkg"
+    asked = pomona("map", "add", orchard, tmp_path / "session.gpkg")
+    assert asked.returncode == 2
+    assert "was guessed from the age of files, say the day of the visit: --date YYYY-MM-DD" in asked.stderr
+    assert not orchard.exists()
     assert "--date" in done.stderr
 
 

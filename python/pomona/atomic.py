@@ -13,7 +13,7 @@ from pomona.outputs import refuse_database
 from pomona.partial import partial_folder
 from pomona.streams import is_stream, send
 
-__all__ = ["whole_file", "whole_folder"]
+__all__ = ["NoLinksError", "new_file", "whole_file", "whole_folder"]
 
 
 @contextlib.contextmanager
@@ -41,10 +41,41 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         with partial_folder(target) as folder:
             partial = folder / target.name
             yield partial
-            with partial.open("rb") as written:
-                os.fsync(written.fileno())
+            _flush(partial)
             refuse_database(path)  # a map may have come there meanwhile
             partial.replace(target)
+
+
+@contextlib.contextmanager
+def new_file(path: str | Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; it becomes `path` when the block ends well and nobody was faster.
+
+    Raises
+    ------
+    FileExistsError
+        When `path` is there by then; it stays as it is.
+    NoLinksError
+        Where the file system knows no hard links: no other way takes a name only when it is free.
+    PomonaError
+        When the folder is missing or the file cannot be written.
+    """
+    path = Path(path)
+    with _told(path):
+        target = Path(os.path.realpath(path))
+        with partial_folder(target) as folder:
+            partial = folder / target.name
+            yield partial
+            _flush(partial)
+            try:
+                os.link(partial, target)
+            except FileExistsError:
+                raise
+            except OSError as error:
+                raise NoLinksError(f"{path}: {error.strerror}") from None
+
+
+class NoLinksError(Exception):
+    """The file system cannot give a file a second name."""
 
 
 @contextlib.contextmanager
@@ -70,5 +101,13 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 def _told(path: Path) -> Iterator[None]:
     try:
         yield
+    except FileExistsError:
+        raise
     except OSError as error:
         raise PomonaError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _flush(partial: Path) -> None:
+    """Bring the file to the disk before its name shows it."""
+    with partial.open("rb") as written:
+        os.fsync(written.fileno())

@@ -8,19 +8,28 @@ Source: OGC 12-128r17, GeoPackage Encoding Standard 1.3; annexes F.1-F.3 for the
 
 from __future__ import annotations
 
+import math
 import sqlite3
 import struct
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pomona.errors import PomonaError
-
-__all__ = ["APPLICATION_ID", "USER_VERSION", "add_table", "connect", "create", "points", "points_of", "told", "touch"]
+__all__ = [
+    "APPLICATION_ID",
+    "USER_VERSION",
+    "add_functions",
+    "add_table",
+    "are_points",
+    "connect",
+    "create",
+    "points",
+    "points_of",
+    "touch",
+]
 
 APPLICATION_ID = 0x47504B47  # "GPKG"
 USER_VERSION = 10300
@@ -41,6 +50,9 @@ POINT_Z = np.dtype(
     ]
 )
 """The whole geometry of one point, section 2.1.3; packed, 37 bytes."""
+
+POINT_HEAD = b"GP\0\x01" + struct.pack("<BI", LITTLE_ENDIAN, WKB_POINT_Z)
+"""What every point begins with, but for the number of the reference system."""
 
 CORE_TABLES = """
 CREATE TABLE gpkg_spatial_ref_sys (
@@ -100,33 +112,18 @@ def connect(path: Path, *, create: bool = False, timeout_s: float = 10.0) -> sql
     """
     uri = f"file:{quote(str(path.resolve()))}?mode={'rwc' if create else 'rw'}"
     connection = sqlite3.connect(uri, uri=True, timeout=timeout_s, isolation_level=None)
+    # Bytes that are not UTF-8 come as lone surrogates, for whoever reads the cell to refuse.
+    connection.text_factory = lambda raw: raw.decode("utf-8", "surrogateescape")
     connection.execute("PRAGMA foreign_keys = ON")
-    for name, corner in {"ST_MinX": 0, "ST_MaxX": 1, "ST_MinY": 2, "ST_MaxY": 3}.items():
-        connection.create_function(name, 1, lambda blob, corner=corner: _bounds(blob)[corner], deterministic=True)
-    connection.create_function("ST_IsEmpty", 1, lambda blob: bool(blob[3] & 0x10), deterministic=True)
+    add_functions(connection)
     return connection
 
 
-@contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Turn the errors of SQLite into one line that names the file and the reason."""
-    try:
-        yield
-    except sqlite3.Error as error:
-        name = getattr(error, "sqlite_errorname", "") or ""
-        reasons = {
-            "SQLITE_BUSY": "another program is using it, try again when it is done",
-            "SQLITE_FULL": "the disk is full; the file is as it was before",
-            "SQLITE_IOERR": f"the disk does not take or give what it should ({name}); the file is as it was before",
-            "SQLITE_READONLY": "cannot be written: the file or its folder is read-only",
-            "SQLITE_CANTOPEN": "cannot be opened: is it there, and may it be read?",
-            "SQLITE_NOTADB": "is not a GeoPackage",
-            "SQLITE_CORRUPT": "is damaged; restore it from a copy",
-        }
-        reason = next((text for code, text in reasons.items() if name.startswith(code)), None)
-        if reason is None:
-            raise
-        raise PomonaError(f"{path}: {reason}") from None
+def add_functions(connection: sqlite3.Connection) -> None:
+    """Add the functions that the triggers of the spatial index call; a geometry that is no point has no bounds."""
+    for name, corner in {"ST_MinX": 0, "ST_MaxX": 1, "ST_MinY": 2, "ST_MaxY": 3}.items():
+        connection.create_function(name, 1, lambda blob, corner=corner: _bounds(blob)[corner], deterministic=True)
+    connection.create_function("ST_IsEmpty", 1, lambda blob: _bounds(blob)[0] is None, deterministic=True)
 
 
 def create(connection: sqlite3.Connection) -> None:
@@ -205,24 +202,24 @@ def points(positions: ArrayLike) -> list[bytes]:
 
 
 def points_of(blobs: Sequence[bytes]) -> NDArray[np.float64]:
-    """Decode points to (N, 3) coordinates; the inverse of `points`.
-
-    Raises
-    ------
-    PomonaError
-        When a geometry is something else, as another program may have written.
-    """
-    row = next((row for row, blob in enumerate(blobs) if len(blob or b"") != POINT_Z.itemsize), None)
-    if row is None:
-        decoded = np.frombuffer(b"".join(blobs), dtype=POINT_Z)
-        ours = (decoded["magic"] == b"GP") & (decoded["flags"] == LITTLE_ENDIAN) & (decoded["wkb_type"] == WKB_POINT_Z)
-        if ours.all():
-            return decoded["xyz"].astype(np.float64)
-        row = int(np.argmin(ours))
-    raise PomonaError(f"geometry {row} in order of id is not a little-endian POINT Z")
+    """Decode points to (N, 3) coordinates; the inverse of `points`. All must be points, see `are_points`."""
+    return np.frombuffer(b"".join(blobs), dtype=POINT_Z)["xyz"].astype(np.float64)
 
 
-def _bounds(point: bytes) -> tuple[float, float, float, float]:
-    """Return min x, max x, min y, max y of a point as this module writes it."""
-    x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
-    return x, x, y, y
+def are_points(blobs: Sequence[bytes]) -> bool:
+    """Tell whether all geometries are points as `points` encodes them, with finite coordinates."""
+    if any(size != POINT_Z.itemsize for size in set(map(len, blobs))):
+        return False
+    decoded = np.frombuffer(b"".join(blobs), dtype=POINT_Z)
+    ours = (decoded["magic"] == b"GP") & (decoded["flags"] == LITTLE_ENDIAN) & (decoded["wkb_type"] == WKB_POINT_Z)
+    ours &= decoded["wkb_order"] == LITTLE_ENDIAN
+    return bool(ours.all() and np.isfinite(decoded["xyz"]).all())
+
+
+def _bounds(point: object) -> tuple[float, float, float, float] | tuple[None, None, None, None]:
+    """Return min x, max x, min y, max y of a point as this module writes it; None for anything else."""
+    if isinstance(point, bytes) and len(point) == POINT_Z.itemsize and point[:4] + point[8:13] == POINT_HEAD:
+        x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
+        if math.isfinite(x) and math.isfinite(y):
+            return x, x, y, y
+    return None, None, None, None

@@ -85,10 +85,10 @@ def database_of(path: Path) -> Database | None:
             return "other" if begun else None
     except OSError:
         return None
-    from pomona.orchard import schema
+    from pomona.orchard.opening import snapshot
 
     try:
-        with schema.snapshot(path) as (_, kind):
+        with snapshot(path) as (_, kind):
             return kind
     except PomonaError:
         return "other"

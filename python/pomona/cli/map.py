@@ -20,13 +20,14 @@ from pomona.cli.match_options import (
     threads_option,
     up_option,
 )
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Verbs
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Any
 
-    from pomona.orchard import Added, OrchardMap, Session
+    from pomona.orchard import Added, OrchardMap, Removed, Session
 
 app = Verbs(help="Keep an orchard map: one identity for each fruit over all visits.", no_args_is_help=True)
 
@@ -52,7 +53,9 @@ def map_add(
     config: Path | None = config_option,
     per_frame: bool | None = per_frame_option,
     threads: int | None = threads_option,
-    unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
+    unit: Unit | None = typer.Option(
+        None, help="Unit of the coordinates of a .csv or .ply; m also says that odd distances or diameters are right."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Recognise the fruits of SESSION in ORCHARD and add it.
@@ -64,16 +67,42 @@ def map_add(
     from pomona.orchard import add_session, load_session
     from pomona.settings import Settings
 
-    visit = load_session(session, date=date, unit=unit.value)
+    visit = load_session(session, date=date, unit=None if unit is None else unit.value)
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {len(visit.cloud)} fruits to {orchard.name}"):
-        added = add_session(orchard, visit, settings=settings)
+        added = add_session(orchard, visit, settings=settings, waiting=_waiting(orchard))
     if json:
         say_json(_added_as_json(visit, added))
     else:
         say(_added_as_text(visit, added))
     if not added.is_added:
+        raise typer.Exit(1)
+
+
+@app.command("remove")
+def map_remove(
+    orchard: Path = orchard_argument,
+    session: str = typer.Argument(metavar="SESSION", help="Name of the session, as `pomona map info` gives it."),
+    yes: bool = typer.Option(False, "--yes", help="Do it; without, only say what would go."),
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Undo `map add`: take SESSION and what only it saw out of ORCHARD.
+
+    The other fruits fall back to where the last of the remaining sessions saw them. Exit code 0: removed. 1: ORCHARD
+    has no such session. 2: wrong input, or no --yes; the map stays as it was.
+    """
+    from pomona.errors import PomonaError
+    from pomona.orchard import remove_session
+
+    removed = remove_session(orchard, session, waiting=_waiting(orchard), dry=not yes)
+    if removed is not None and not yes:
+        raise PomonaError(f"{orchard}: {_removed_as_text(session, removed)}; nothing is removed without --yes")
+    if json:
+        say_json(_removed_as_json(session, removed))
+    else:
+        say(_removed_as_text(session, removed))
+    if removed is None:
         raise typer.Exit(1)
 
 
@@ -103,6 +132,28 @@ def map_check(orchard: Path = orchard_argument, json: bool = typer.Option(False,
         say(*(found or ["ok"]))
     if found:
         raise typer.Exit(1)
+
+
+def _waiting(orchard: Path) -> Callable[[], None]:
+    """Say on the standard error why nothing happens."""
+    from pomona.orchard.opening import TIMEOUT_S
+
+    return lambda: tell(f"pomona: {orchard}: another program is writing to it, waiting up to {TIMEOUT_S:g} s")
+
+
+def _removed_as_json(session: str, removed: Removed | None) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {"session": session, "removed": removed is not None, **({} if removed is None else asdict(removed))}
+
+
+def _removed_as_text(session: str, removed: Removed | None) -> str:
+    if removed is None:
+        return f"{session}: no session of that name in the map, which stays as it was"
+    return (
+        f"{session}: {removed.n_observations} observations go, {removed.n_gone} fruits that nobody else saw with them, "
+        f"{removed.n_changed} fall back; {removed.n_left} sessions stay"
+    )
 
 
 def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:

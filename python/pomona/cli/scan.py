@@ -145,14 +145,19 @@ def _write(
     configuration: dict[str, Any],
     detector: Path,
 ) -> dict[int, Path]:
+    from pomona.orchard.session import GUESSED
     from pomona.survey import write_survey
 
+    day = date or recording.date
+    if day is None:
+        # A map takes no guessed date by accident: `map add` asks for --date where the session says so.
+        configuration = {**configuration, "scan": {**configuration["scan"], "date": GUESSED}}
     return write_survey(
         output,
         survey,
         recording,
         name=name or recording.name,
-        date=date or _date(recording),
+        date=day or _guessed_date(recording),
         configuration=configuration,
         inputs=[detector],
     )
@@ -206,15 +211,13 @@ def _require_date(date: str | None) -> None:
         raise PomonaError(f"--date: found {date!r}, expected ISO 8601, for example 2024-08-09") from None
 
 
-def _date(recording: Recording) -> str:
-    """Take the date that was recorded; else the day of the newest file, and say so."""
+def _guessed_date(recording: Recording) -> str:
+    """Take the day of the newest file, and say so."""
     import datetime
     import warnings
 
     from pomona.errors import PomonaWarning
 
-    if recording.date is not None:
-        return recording.date
     newest_s = max(file.stat().st_mtime for file in recording.inputs())
     day = datetime.datetime.fromtimestamp(newest_s).date().isoformat()
     message = f"{recording.path}: no date noted, took {day} from the age of its files; --date says it better"

@@ -14,7 +14,7 @@ from pomona.cloud import csv_file, ply_file
 from pomona.cloud.fruit_cloud import FruitCloud, Unit
 from pomona.errors import PomonaError, PomonaWarning
 
-__all__ = ["check_spacing", "read_cloud", "write_cloud"]
+__all__ = ["PLAUSIBLE_DIAMETER_M", "check_spacing", "read_cloud", "write_cloud"]
 
 METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "free": 1.0}
 
@@ -23,6 +23,9 @@ MIN_SPACING_M = 0.005
 
 MAX_SPACING_M = 5.0
 """A fruit has a neighbour on its tree, and trees are under 5 m; fruits 6 cm apart are 60 away in mm, 6 in cm."""
+
+PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
+"""From the smallest berry to the largest melon: a median outside speaks of a wrong unit."""
 
 MIN_FRUITS = 5
 """Fewer have no median to speak of."""

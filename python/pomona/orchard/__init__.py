@@ -2,8 +2,10 @@
 
 from pomona.orchard.adding import Added, add_session
 from pomona.orchard.integrity import problems
+from pomona.orchard.loading import load_session
 from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
-from pomona.orchard.reading import load_session, read_cloud, read_session
+from pomona.orchard.reading import read_cloud, read_session
+from pomona.orchard.removing import Removed, remove_session
 from pomona.orchard.schema import FORMAT_VERSION
 from pomona.orchard.session import Session
 from pomona.orchard.writing import write_session
@@ -13,6 +15,7 @@ __all__ = [
     "Added",
     "Observations",
     "OrchardMap",
+    "Removed",
     "Session",
     "Visit",
     "add_session",
@@ -20,5 +23,6 @@ __all__ = [
     "problems",
     "read_cloud",
     "read_session",
+    "remove_session",
     "write_session",
 ]

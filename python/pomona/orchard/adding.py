@@ -11,10 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
+from pomona.atomic import NoLinksError, new_file
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.orchard import schema
+from pomona.orchard.failures import WrongContentError
+from pomona.orchard.numbering import last_ids
+from pomona.orchard.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.orchard.reading import fruits_in_map
+from pomona.orchard.replay import in_view_unseen
+from pomona.orchard.rows import columns_of
 from pomona.orchard.session import Session
 from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
 from pomona.settings import Settings
@@ -23,9 +29,6 @@ if TYPE_CHECKING:
     from pomona.matching import Match
 
 __all__ = ["Added", "add_session"]
-
-NEIGHBOURS = 5
-"""A fruit was in view when most of its five nearest fruits were seen: as many as make a constellation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +59,18 @@ class Added:
 
 
 def add_session(
-    path: str | Path, session: Session, *, settings: Settings | None = None, timeout_s: float = 10.0
+    path: str | Path,
+    session: Session,
+    *,
+    settings: Settings | None = None,
+    timeout_s: float = TIMEOUT_S,
+    waiting: Waiting | None = None,
 ) -> Added:
     """Recognise a session's fruits in the map and add it; the first session starts the map.
 
     All of it happens in one transaction: a crash, a full disk or a kill leaves the map as it was. When the session is
-    not found in the map, nothing is written.
+    not found in the map, nothing is written. A new map appears whole; when two programs start it at once, the second
+    finds its session in the map of the first.
 
     Parameters
     ----------
@@ -73,6 +82,8 @@ def add_session(
         How to match; the defaults of `pomona.match` otherwise.
     timeout_s : float
         How long to wait for another program that is writing to the map.
+    waiting : callable, optional
+        Called once when it has to wait.
 
     Raises
     ------
@@ -84,37 +95,57 @@ def add_session(
         raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected .gpkg for a map")
     if not len(session.cloud):
         raise PomonaError(f"session {session.name}: has no fruits, expected at least one")
-    was_there = path.exists()
+    if not path.exists():
+        try:
+            with new_file(path) as partial, blank(partial, path) as connection:
+                return _start(connection, session)
+        except FileExistsError:
+            pass
+        except NoLinksError:
+            return _start_in_place(path, session, settings, timeout_s, waiting)
+    return _add(path, session, settings, timeout_s, waiting)
+
+
+def _start_in_place(
+    path: Path, session: Session, settings: Settings | None, timeout_s: float, waiting: Waiting | None
+) -> Added:
+    """Start a map where it cannot appear whole: readers are told that it is empty until it is not."""
     try:
-        with (
-            schema.opened(path, create=True, timeout_s=timeout_s) as connection,
-            schema.transaction(connection),
-        ):
-            return _add(connection, path, session, settings)
+        return _add(path, session, settings, timeout_s, waiting, create=True)
     except BaseException:
         # SQLite makes the file before the first commit; a map that never was shall leave none.
-        if not was_there and path.exists() and path.stat().st_size == 0:
+        if path.exists() and path.stat().st_size == 0:
             path.unlink()
         raise
 
 
-def _add(connection: sqlite3.Connection, path: Path, session: Session, settings: Settings | None) -> Added:
-    if schema.is_blank(connection):
-        schema.create(connection, "map")
-        return _start(connection, session)
-    if schema.kind_of(connection, path) != "map":
-        raise PomonaError(f"{path}: is the file of one session, expected a map; `map add` makes one from it")
-    _require_new(connection, path, session)
-    settings = settings or Settings.load(None, {})
-    known = fruits_in_map(connection)
-    found = settings.match(session.cloud, known)
-    if found.status.value != "Found":
-        return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
-    return _join(connection, session, known, found, settings)
+def _add(
+    path: Path,
+    session: Session,
+    settings: Settings | None,
+    timeout_s: float,
+    waiting: Waiting | None,
+    *,
+    create: bool = False,
+) -> Added:
+    # A file of no bytes is what a killed start leaves where a map cannot appear whole.
+    create = create or path.stat().st_size == 0
+    with writing(path, "map", create=create, timeout_s=timeout_s, waiting=waiting) as (connection, is_blank):
+        if is_blank:
+            return _start(connection, session)
+        last_ids(connection)
+        _require_new(connection, session)
+        settings = settings or Settings.load(None, {})
+        known = fruits_in_map(connection)
+        found = settings.match(session.cloud, known)
+        if found.status.value != "Found":
+            return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
+        return _join(connection, session, known, found, settings)
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:
     """Make the session's frame the map's, and each of its fruits a new one."""
+    schema.create(connection, "map")
     session_id = insert_session(connection, session)
     fruit_ids = insert_fruits(connection, session_id, session.date, session.cloud)
     insert_observations(connection, session_id, fruit_ids, session.cloud)
@@ -143,23 +174,24 @@ def _join(
     insert_observations(connection, session_id, fruit_ids, cloud_in_map, probabilities, distances_m)
 
     _move_fruits(connection, session_id, session.date, cloud_in_map.select(rows), fruit_ids[rows])
-    missed = _missed(known, known_rows)
+    missed = in_view_unseen(known.positions, np.isin(np.arange(len(known)), known_rows))
     _count_misses(connection, known_ids[missed], is_newest=is_newest)
     update_layers(connection)
     return Added(fruit_ids, len(rows), int(is_new.sum()), len(missed), found)
 
 
-def _require_new(connection: sqlite3.Connection, path: Path, session: Session) -> None:
+def _require_new(connection: sqlite3.Connection, session: Session) -> None:
     """Refuse a session that is in the map: by its name, by what it saw or by what it was made from."""
-    for name, content_sha256, input_hashes in connection.execute(
-        "SELECT name, content_sha256, input_hashes FROM sessions ORDER BY id"
-    ):
+    columns = columns_of(connection, "sessions", ("name", "content_sha256", "input_hashes"))
+    if not columns[0]:
+        raise WrongContentError("has no session, expected at least one")
+    for name, content_sha256, input_hashes in zip(*columns, strict=True):
         if name == session.name:
-            raise PomonaError(f"{path}: session {name} is in the map already")
+            raise WrongContentError(f"session {name} is in the map already")
         if content_sha256 == session.content_sha256:
-            raise PomonaError(f"{path}: session {session.name} is in the map already, as {name}: the same fruits")
+            raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same fruits")
         if session.input_hashes and input_hashes == session.input_hashes_json:
-            raise PomonaError(f"{path}: session {session.name} is in the map already, as {name}: the same input files")
+            raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same input files")
 
 
 def _is_newest(connection: sqlite3.Connection, date: str) -> bool:
@@ -191,18 +223,3 @@ def _count_misses(connection: sqlite3.Connection, fruit_ids: NDArray[np.int64], 
         "UPDATE fruits SET n_missed = n_missed + 1, state = CASE WHEN ? THEN 'missed' ELSE state END WHERE id = ?",
         ((is_newest, fruit_id) for fruit_id in fruit_ids.tolist()),
     )
-
-
-def _missed(known: FruitCloud, matched_rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the rows of known fruits that were in view, by their neighbours, and were not matched."""
-    from scipy.spatial import cKDTree
-
-    seen = np.zeros(len(known), dtype=bool)
-    seen[matched_rows] = True
-    neighbours = min(NEIGHBOURS, len(known) - 1)
-    unseen = np.flatnonzero(~seen)
-    if not neighbours or not len(unseen):
-        return unseen[:0]
-    _, nearest = cKDTree(known.positions).query(known.positions[unseen], k=list(range(2, neighbours + 2)))
-    in_view: NDArray[np.bool_] = 2 * seen[nearest].sum(axis=1) > neighbours
-    return unseen[in_view]

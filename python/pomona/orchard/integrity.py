@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import sqlite3
+from collections.abc import Iterator
 from pathlib import Path
 
-from pomona.orchard import schema
+import numpy as np
+
+from pomona.orchard.cells import COLUMNS
+from pomona.orchard.failures import WrongContentError
+from pomona.orchard.numbering import misnumbered
+from pomona.orchard.opening import snapshot
+from pomona.orchard.replay import replayed, sighted
+from pomona.orchard.rows import columns_of, misfits
 
 __all__ = ["problems"]
 
@@ -22,12 +31,11 @@ INVARIANTS = (
     """SELECT 'fruit ' || f.id || ' was last seen on ' || f.last_seen || ', session ' || s.name || ' saw it later'
     FROM fruits f JOIN observations o ON o.fruit_id = f.id JOIN sessions s ON s.id = o.session_id
     WHERE s.date > f.last_seen""",
-    """SELECT 'observation ' || id || ' has the match probability ' || match_probability FROM observations
-    WHERE match_probability NOT BETWEEN 0 AND 1""",
     """SELECT 'fruit ' || id || ' is not in the spatial index' FROM fruits
     WHERE id NOT IN (SELECT id FROM rtree_fruits_geom)""",
     """SELECT 'the file of a session holds ' || (SELECT count(*) FROM sessions) || ' sessions' FROM pomona_format
     WHERE kind = 'session' AND (SELECT count(*) FROM sessions) != 1""",
+    "SELECT 'the map holds no session' FROM pomona_format WHERE kind = 'map' AND (SELECT count(*) FROM sessions) = 0",
 )
 
 
@@ -39,11 +47,37 @@ def problems(path: str | Path) -> list[str]:
     PomonaError
         When the file is not ours, from a newer program or so damaged that it cannot be read.
     """
-    with schema.snapshot(Path(path)) as (connection, _):
+    with snapshot(Path(path)) as (connection, _):
         damage = [line for (line,) in connection.execute("PRAGMA integrity_check") if line != "ok"]
-        dangling = [
-            f"{table} {row} points to a row of {parent} that is not there"
-            for table, row, parent, _ in connection.execute("PRAGMA foreign_key_check")
-        ]
-        broken = [line for query in INVARIANTS for (line,) in connection.execute(query)]
-        return damage + dangling + broken
+        try:
+            return damage + _contradictions(connection)
+        except (sqlite3.Error, UnicodeDecodeError, WrongContentError):
+            # Damaged pages need not give more to ask.
+            if not damage:
+                raise
+            return damage
+
+
+def _contradictions(connection: sqlite3.Connection) -> list[str]:
+    wrong = [line for table in COLUMNS for line in misfits(connection, table)]
+    broken = [line for query in INVARIANTS for (line,) in connection.execute(query) if line is not None]
+    found = wrong + list(_dangling(connection)) + broken + misnumbered(connection)
+    return found or list(_miscounted(connection))
+
+
+def _dangling(connection: sqlite3.Connection) -> Iterator[str]:
+    for child in COLUMNS:
+        for table, row, parent, _ in connection.execute(f"PRAGMA foreign_key_check({child})"):
+            yield f"{table} {row} points to a row of {parent} that is not there"
+
+
+def _miscounted(connection: sqlite3.Connection) -> Iterator[str]:
+    """Compare what only the whole history tells; that of a map whose places are wrong would be another one."""
+    fruits = replayed(sighted(connection))
+    states = np.where(fruits.is_missed, "missed", "seen").tolist()
+    told = columns_of(connection, "fruits", ("id", "state", "n_missed", "last_session_id"))
+    history = (fruits.ids.tolist(), states, fruits.n_missed.tolist(), fruits.last_session_ids.tolist())
+    for (fruit_id, *found), (_, *expected) in zip(zip(*told, strict=True), zip(*history, strict=True), strict=True):
+        for what, one, other in zip(("state", "n_missed", "last_session_id"), found, expected, strict=True):
+            if one != other:
+                yield f"fruit {fruit_id} has the {what} {one}, from what the sessions saw follows {other}"

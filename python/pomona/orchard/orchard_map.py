@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.cloud import FruitCloud
-from pomona.orchard import schema
+from pomona.orchard.cells import finite_json
+from pomona.orchard.opening import snapshot
 from pomona.orchard.reading import fruits_in_map
+from pomona.orchard.rows import columns_of
 
 __all__ = ["Observations", "OrchardMap", "Visit"]
 
@@ -90,40 +92,42 @@ class OrchardMap:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        with schema.snapshot(self.path) as (_, kind):
+        with snapshot(self.path) as (_, kind):
             self.kind = kind
 
     def fruits(self) -> FruitCloud:
         """Return every fruit where it was last seen, with its identity as id."""
-        with schema.snapshot(self.path) as (connection, _):
+        with snapshot(self.path) as (connection, _):
             return fruits_in_map(connection)
 
     def visits(self) -> tuple[Visit, ...]:
         """Return the sessions in order of date."""
-        with schema.snapshot(self.path) as (connection, _):
-            rows = connection.execute(
-                """SELECT s.name, s.date, s.recording, s.map_from_session, count(o.id), count(o.match_probability),
-                s.method, s.log_odds, s.noise_m FROM sessions s LEFT JOIN observations o ON o.session_id = s.id
-                GROUP BY s.id ORDER BY s.date, s.id"""
-            ).fetchall()
+        names = ("id", "name", "date", "recording", "map_from_session", "method", "log_odds", "noise_m")
+        with snapshot(self.path) as (connection, _):
+            rows = zip(*columns_of(connection, "sessions", names, "ORDER BY date, id"), strict=True)
+            seen_by, probabilities = columns_of(connection, "observations", ("session_id", "match_probability"))
+        n_fruits = Counter(seen_by)
+        n_matched = Counter(
+            by for by, probability in zip(seen_by, probabilities, strict=True) if probability is not None
+        )
         return tuple(
-            Visit(name, date, recording, np.array(json.loads(transform)), *about_match)
-            for name, date, recording, transform, *about_match in rows
+            Visit(name, date, recording, np.array(finite_json(transform)), n_fruits[i], n_matched[i], *about_match)
+            for i, name, date, recording, transform, *about_match in rows
         )
 
     def observations(self) -> Observations:
         """Return what was seen of each fruit, in order of fruit and date."""
-        with schema.snapshot(self.path) as (connection, _):
-            rows = connection.execute(
-                """SELECT o.fruit_id, s.name, o.label, o.geom, o.diameter_m, o.match_probability FROM observations o
-                JOIN sessions s ON s.id = o.session_id ORDER BY o.fruit_id, s.date, s.id"""
-            ).fetchall()
-        fruit_ids, sessions, labels, geoms, diameters_m, probabilities = zip(*rows, strict=True) if rows else [()] * 6
+        names = ("fruit_id", "session_id", "label", "geom", "diameter_m", "match_probability")
+        in_order = "JOIN sessions s ON s.id = session_id ORDER BY fruit_id, s.date, s.id"
+        with snapshot(self.path) as (connection, _):
+            sessions = dict(zip(*columns_of(connection, "sessions", ("id", "name")), strict=True))
+            fruit_ids, seen_by, labels, geoms, *numbers = columns_of(connection, "observations", names, in_order)
+        diameters_m, probabilities = (np.array(column, dtype=np.float64) for column in numbers)
         return Observations(
             fruit_ids=np.array(fruit_ids, dtype=np.int64),
-            sessions=tuple(sessions),
+            sessions=tuple(sessions[session_id] for session_id in seen_by),
             labels=tuple(labels),
             positions_in_map=geopackage.points_of(geoms),
-            diameters_m=np.array(diameters_m, dtype=np.float64),
-            probabilities=np.array(probabilities, dtype=np.float64),
+            diameters_m=diameters_m,
+            probabilities=probabilities,
         )

@@ -1,17 +1,13 @@
-"""The tables of an orchard map and of a session, and which files are ours."""
+"""The tables of an orchard map and of a session."""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Literal
 
 from pomona import __version__, geopackage
-from pomona.errors import PomonaError
 
-__all__ = ["FORMAT_VERSION", "Kind", "create", "is_blank", "kind_of", "opened", "snapshot", "transaction"]
+__all__ = ["FORMAT_VERSION", "LAYERS", "Kind", "create"]
 
 FORMAT_VERSION = 1
 """Counts the changes of the tables below. Version 1 is the first: no older file exists that could be migrated."""
@@ -80,61 +76,3 @@ def create(connection: sqlite3.Connection, kind: Kind) -> None:
     for name, geometry, columns, description in LAYERS:
         geopackage.add_table(connection, name, columns, description, geometry)
     geopackage.execute_all(connection, INDEXES)
-
-
-def is_blank(connection: sqlite3.Connection) -> bool:
-    """Tell whether nothing was ever committed to the database."""
-    return connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None
-
-
-def kind_of(connection: sqlite3.Connection, path: Path) -> Kind:
-    """Return what the file is; refuse one that is not ours or from a newer program."""
-    (application_id,) = connection.execute("PRAGMA application_id").fetchone()
-    if application_id != geopackage.APPLICATION_ID:
-        raise PomonaError(f"{path}: is not a GeoPackage: application id {application_id:#x}, expected 'GPKG'")
-    if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'pomona_format'").fetchone():
-        raise PomonaError(f"{path}: is a GeoPackage but not one of pomona: it has no table pomona_format")
-    row = connection.execute("SELECT format_version, kind FROM pomona_format").fetchone()
-    version, kind = row or (None, None)
-    if isinstance(version, int) and version > FORMAT_VERSION:
-        raise PomonaError(f"{path}: has format {version}, this program reads up to {FORMAT_VERSION}: update pomona")
-    if version != FORMAT_VERSION or kind not in ("session", "map"):
-        raise PomonaError(f"{path}: has format {version!r} and kind {kind!r}, expected 1 and 'session' or 'map'")
-    return "session" if kind == "session" else "map"
-
-
-@contextmanager
-def opened(
-    path: Path, *, create: bool = False, shown: Path | None = None, timeout_s: float = 10.0
-) -> Iterator[sqlite3.Connection]:
-    """Open and close a file; the errors of SQLite come as one line that names it, or `shown` for a temporary one."""
-    if not create and not path.is_file():
-        raise PomonaError(f"{path}: is not there, expected a session or a map (.gpkg)")
-    with geopackage.told(shown or path):
-        connection = geopackage.connect(path, create=create, timeout_s=timeout_s)
-        try:
-            yield connection
-        finally:
-            connection.close()
-
-
-@contextmanager
-def snapshot(path: Path) -> Iterator[tuple[sqlite3.Connection, Kind]]:
-    """Read a file of ours as it was at one moment, whatever is written meanwhile."""
-    with opened(path) as connection:
-        connection.execute("BEGIN")
-        yield connection, kind_of(connection, path)
-
-
-@contextmanager
-def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """Let nobody else write from here on; all of the block is kept, or nothing when it raises."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-        connection.execute("COMMIT")
-    except BaseException:
-        # A full disk may have ended the transaction already.
-        if connection.in_transaction:
-            connection.execute("ROLLBACK")
-        raise

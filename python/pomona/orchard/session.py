@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+
+import numpy as np
 
 from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.trajectory import Trajectory
 
-__all__ = ["Session"]
+__all__ = ["FARTHEST_M", "GUESSED", "Session", "iso_date"]
+
+FARTHEST_M = 1e12
+"""Nothing that grows is farther from anything than the planets; squares of such numbers can still be added."""
+
+GUESSED = "guessed from the age of the files"
+"""What `configuration["scan"]["date"]` of a session says when nobody noted the day of the visit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +60,19 @@ class Session:
     def __post_init__(self) -> None:
         if not self.name.strip():
             raise PomonaError("session: found an empty name, expected one that is used once in a map")
-        object.__setattr__(self, "date", _iso_date(self.date))
+        object.__setattr__(self, "date", iso_date(self.date))
         _json("configuration", self.configuration)
+        if len(self.cloud) and np.abs(self.cloud.positions).max() > FARTHEST_M:
+            raise PomonaError(f"session {self.name}: found a fruit beyond {FARTHEST_M:g} m")
+        _require_unicode((self.name, self.recording, *(self.cloud.ids or ())))
+        for column in self.cloud.extras.values():
+            _require_unicode(column)
+
+    @property
+    def is_date_guessed(self) -> bool:
+        """Whether the date is only that of the newest file of the recording."""
+        scan = self.configuration.get("scan")
+        return isinstance(scan, Mapping) and scan.get("date") == GUESSED
 
     @property
     def content_sha256(self) -> str:
@@ -79,7 +98,8 @@ class Session:
         return _json("input_hashes", self.input_hashes)
 
 
-def _iso_date(date: str) -> str:
+def iso_date(date: str) -> str:
+    """Return a local date, or date and time, as files hold it; refuse anything else with a `PomonaError`."""
     try:
         moment = datetime.fromisoformat(date)
     except ValueError:
@@ -90,6 +110,15 @@ def _iso_date(date: str) -> str:
         # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
         raise PomonaError(f"session: found the date {date!r} with a time zone, expected the orchard's local time")
     return moment.date().isoformat() if len(date) <= len("2021-09-27") else moment.isoformat()
+
+
+def _require_unicode(texts: Iterable[str]) -> None:
+    """Refuse half characters, which JSON can say and no file can hold."""
+    for text in texts:
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise PomonaError(f"session: found {text!r}, expected characters of Unicode") from None
 
 
 def _json(name: str, value: object) -> str:

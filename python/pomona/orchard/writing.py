@@ -15,11 +15,21 @@ from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
 from pomona.orchard import schema
+from pomona.orchard.numbering import last_ids
+from pomona.orchard.opening import blank
 from pomona.orchard.session import Session
 from pomona.settings import Settings
 from pomona.trajectory import Trajectory
 
-__all__ = ["Placement", "insert_fruits", "insert_observations", "insert_session", "update_layers", "write_session"]
+__all__ = [
+    "Placement",
+    "insert_fruits",
+    "insert_observations",
+    "insert_session",
+    "nullable",
+    "update_layers",
+    "write_session",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +85,7 @@ def write_session(
         When the date is not one, the configuration is not JSON or the file cannot be written.
     """
     session = Session(name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {})
-    with (
-        whole_file(path) as partial,
-        schema.opened(partial, create=True, shown=Path(path)) as connection,
-        schema.transaction(connection),
-    ):
+    with whole_file(path) as partial, blank(partial, Path(path)) as connection:
         schema.create(connection, "session")
         session_id = insert_session(connection, session)
         fruit_ids = insert_fruits(connection, session_id, session.date, cloud)
@@ -118,7 +124,7 @@ def insert_fruits(
     """Give new fruits their ids, (N,), in order of rows."""
     if not len(cloud_in_map):
         return np.empty(0, np.int64)
-    (last,) = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'fruits'").fetchone()
+    last = last_ids(connection).get("fruits", 0)
     ids = np.arange(last + 1, last + 1 + len(cloud_in_map))
     connection.executemany(
         """INSERT INTO fruits (id, geom, state, last_seen, last_session_id, n_sessions, diameter_m)
@@ -143,9 +149,7 @@ def insert_observations(
 ) -> None:
     """Add what the session saw of each fruit, one row of the cloud each; NaN where nothing was matched."""
     n = len(cloud_in_map)
-    (last,) = connection.execute(
-        "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'observations'"
-    ).fetchone()
+    last = last_ids(connection).get("observations", 0)
     cells = np.full((n, 6), np.nan)
     if cloud_in_map.covariances is not None:
         cells = cloud_in_map.covariances.reshape(n, 9)[:, [0, 4, 8, 1, 2, 5]]
@@ -156,10 +160,10 @@ def insert_observations(
         fruit_ids.tolist(),
         cloud_in_map.ids or [None] * n,
         _diameters(cloud_in_map),
-        *(_nullable(column) for column in cells.T),
+        *(nullable(column) for column in cells.T),
         [None] * n if cloud_in_map.n_views is None else cloud_in_map.n_views.tolist(),
-        _nullable(blank if probabilities is None else probabilities),
-        _nullable(blank if distances_m is None else distances_m),
+        nullable(blank if probabilities is None else probabilities),
+        nullable(blank if distances_m is None else distances_m),
         _other_columns(cloud_in_map),
         strict=True,
     )
@@ -213,12 +217,13 @@ def _insert_poses(
     )
 
 
-def _nullable(column: NDArray[np.float64]) -> list[float | None]:
+def nullable(column: NDArray[np.float64]) -> list[float | None]:
+    """Return numbers for a column, null where they are NaN."""
     return [None if value != value else value for value in column.tolist()]
 
 
 def _diameters(cloud: FruitCloud) -> list[float | None]:
-    return [None] * len(cloud) if cloud.diameters_m is None else _nullable(cloud.diameters_m)
+    return [None] * len(cloud) if cloud.diameters_m is None else nullable(cloud.diameters_m)
 
 
 def _other_columns(cloud: FruitCloud) -> list[str | None]:

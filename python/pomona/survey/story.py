@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pomona.cloud import FruitCloud
+from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
 from pomona.depth import Refusal
 from pomona.detect import Detector
 from pomona.errors import PomonaError, PomonaWarning
@@ -31,9 +32,6 @@ __all__ = ["Progress", "Survey", "scan"]
 
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
-
-PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
-"""The smallest berries and the largest melons."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,8 +58,8 @@ impl Space {
         for (x, y) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
             corners.push(pose.to_session(&camera.unproject(&Vector3::new(x, y, depth_m))));
         }
-        let low: Cell = std::array::from_fn(|axis| bound(&corners, axis, f64::min) - 1);
-        let high: Cell = std::array::from_fn(|axis| bound(&corners, axis, f64::max) + 1);
+        let low: Cell = std::array::from_fn(|axis| bound(&corners, axis, f64::min).saturating_sub(1));
+        let high: Cell = std::array::from_fn(|axis| bound(&corners, axis, f64::max).saturating_add(1));
         let inside = |cell: &Cell| (1..3).all(|axis| (low[axis]..=high[axis]).contains(&cell[axis]));
         // Cells are ordered by x first.
         let from = [low[0], i64::MIN, i64::MIN];

@@ -1,0 +1,92 @@
+"""A session for a map, from a file of either kind; what is doubtful must be said before it goes in."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud, Unit
+from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_spacing
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.orchard.reading import read_session
+from pomona.orchard.session import Session
+
+__all__ = ["load_session"]
+
+
+def load_session(path: str | Path, *, date: str | None = None, unit: Unit | None = None) -> Session:
+    """Read a session file, or a bare cloud (.csv, .ply) as a session that is called as its file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A session (.gpkg) or a cloud (.csv, .ply).
+    date : str, optional
+        ISO 8601 date of the visit; needed for a cloud and for a session whose date was guessed, instead of the
+        session's own otherwise.
+    unit : {"m", "cm", "mm", "free"}, optional
+        Unit of the coordinates; metres otherwise, and then they must look like metres.
+
+    Raises
+    ------
+    PomonaError
+        When the file cannot be read, has no date that anybody has noted, or has no distances or diameters of fruits
+        and nobody says that they are right: ``unit="m"``.
+    """
+    path = Path(path)
+    read = _session if path.suffix.lower() == ".gpkg" else _cloud
+    with _doubts_refused(is_said=unit is not None):
+        session = read(path, date, unit)
+        if unit is None:
+            check_spacing(path, session.cloud.positions)
+            _check_diameters(path, session.cloud.diameters_m)
+    return session
+
+
+def _session(path: Path, date: str | None, unit: Unit | None) -> Session:
+    if unit not in (None, "m"):
+        raise PomonaError(f"{path}: found --unit {unit}, but a session is in metres; scan again with the right unit")
+    session = read_session(path)
+    if date is not None:
+        return replace(session, date=date)
+    if session.is_date_guessed:
+        raise PomonaError(
+            f"{path}: its date {session.date} was guessed from the age of files, say the day of the visit: "
+            "--date YYYY-MM-DD"
+        )
+    return session
+
+
+def _cloud(path: Path, date: str | None, unit: Unit | None) -> Session:
+    cloud = FruitCloud.read(path, unit=unit or "m")
+    if date is None:
+        raise PomonaError(f"{path}: a bare cloud has no date, give the day of the visit: --date YYYY-MM-DD")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return Session(path.stem, date, path.name, cloud, input_hashes={path.name: digest})
+
+
+def _check_diameters(path: Path, diameters_m: NDArray[np.float64] | None) -> None:
+    low_m, high_m = PLAUSIBLE_DIAMETER_M
+    known_m = np.empty(0) if diameters_m is None else diameters_m[~np.isnan(diameters_m)]
+    if len(known_m) and not low_m <= (median_m := float(np.median(known_m))) <= high_m:
+        found = f"the median diameter is {median_m:.3g} m, expected {low_m:g} to {high_m:g} m"
+        warnings.warn(f"{path}: {found}; check the unit", PomonaWarning, stacklevel=3)
+
+
+@contextmanager
+def _doubts_refused(is_said: bool) -> Iterator[None]:
+    """Refuse what only draws a warning elsewhere: a map keeps it for good. Unless the unit is said."""
+    with warnings.catch_warnings():
+        if not is_said:
+            warnings.simplefilter("error", PomonaWarning)
+        try:
+            yield
+        except PomonaWarning as doubt:
+            raise PomonaError(f"{doubt}; a map takes it as it is with --unit m") from None
