@@ -9,6 +9,7 @@ import sys
 NAMES = (
     "robustness",
     "cells",
+    "units",
     "stereo",
     "lifting",
     "field",

@@ -70,9 +70,11 @@ impl Conditioned {
         };
         let is_measurable = measurable.contains(&sample.spacing);
         let rows = if is_measurable { sample.kept(&cloud.positions, &distinct) } else { Vec::new() };
+        // Measured again: what was left out shall not touch the unit either.
+        let spacing = Sample::new(&cloud.positions, &rows).spacing;
         let unit = match scale {
             Scale::Metric => 1.0,
-            Scale::Free => sample.spacing / SPACING_M,
+            Scale::Free => spacing / SPACING_M,
         };
         let middle = middle(&cloud.positions, &rows);
         Self {
@@ -81,7 +83,7 @@ impl Conditioned {
             rows,
             middle,
             unit,
-            spacing: sample.spacing / unit,
+            spacing: spacing / unit,
         }
     }
 
