@@ -19,6 +19,7 @@ NAMES = (
     "odometry",
     "tracking",
     "scan",
+    "disturbed",
     "endurance",
     "speed",
     "readme",

@@ -43,6 +43,8 @@ from pomona.survey import Part, Survey, scan
 MIN_VIEWS = 5
 """Clear boxes of a fruit that is counted."""
 
+UNDISTURBED = Boxed()
+
 Frames = Callable[[Sequence[int]], Sequence[int]]
 
 
@@ -65,7 +67,7 @@ class Case:
 
     name: str
     frames: Frames = lambda frames: frames
-    boxes: Boxed = Boxed()
+    boxes: Boxed = UNDISTURBED
     change: Callable[[int], Change] | None = None
     seeds: bool = False
 
@@ -174,7 +176,9 @@ def rows_of(case: Case, dates: Sequence[Date], seeds: int) -> list[dict[str, obj
         for number, (date, found) in enumerate(zip(dates, scans, strict=True), start=1):
             row |= {f"{key}_{number}": value for key, value in date_row(date, found).items()}
         row |= match_row(dates, scans) | {"cpu_s": seconds}
-        sys.stderr.write(" ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()) + "\n")
+        sys.stderr.write(
+            " ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()) + "\n"
+        )
         rows.append(row)
     return rows
 
@@ -183,7 +187,15 @@ def date_row(date: Date, found: Scanned | None) -> dict[str, object]:
     """Parts, count and kinds of errors of the longest part."""
     true = len(date.countable)
     if found is None:
-        return {"parts": 0, "count_error": -1.0, "missed": true, "false": 0, "split": 0, "p95_mm": float("nan"), "told": 1}
+        return {
+            "parts": 0,
+            "count_error": -1.0,
+            "missed": true,
+            "false": 0,
+            "split": 0,
+            "p95_mm": float("nan"),
+            "told": 1,
+        }
     ids = found.true_ids
     copies = Counter(name for name in ids if name)
     row_of = {name: row for row, name in enumerate(date.truth.ids or ())}
@@ -225,9 +237,10 @@ def report(rows: list[dict[str, object]]) -> str:
         [(name, *_cells(of)) for name, of in by_case.items()],
     )
     return (
-        "Both dates of the rendered row, stereo pictures and boxes alone, made worse; first date / second date, the mean\n"
-        "over the seeds, of the longest part. Counted against fruits with clear boxes in five frames of the whole\n"
-        f"undisturbed recording. P and R are of the match of both dates, the least R over the seeds in brackets.\n\n{table}"
+        "Both dates of the rendered row, stereo pictures and boxes alone, made worse; first date / second date, the\n"
+        "mean over the seeds, of the longest part. Counted against fruits with clear boxes in five frames of the\n"
+        "whole undisturbed recording. P and R are of the match of both dates, the least R over the seeds in\n"
+        f"brackets.\n\n{table}"
     )
 
 

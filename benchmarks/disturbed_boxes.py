@@ -105,7 +105,9 @@ def _seen(place: NDArray[np.float64], side_m: float, recording: Recording) -> tu
     row = calibration.fy * place[1] / place[2] + calibration.cy
     half = calibration.fx * side_m / 2 / place[2]
     inside = half < column < calibration.width - half and half < row < calibration.height - half
-    return tuple(float(round(edge)) for edge in (column - half, row - half, column + half, row + half)) if inside else None
+    return (
+        tuple(float(round(edge)) for edge in (column - half, row - half, column + half, row + half)) if inside else None
+    )
 
 
 def _jittered(box: TrueBox, sigma_px: float, recording: Recording, rng: np.random.Generator) -> TrueBox:
@@ -133,12 +135,12 @@ def stepped(factor: float, at_row: int) -> Change:
 
 
 def one_eye(factor: float) -> Change:
-    """The right picture is darker than the left one."""
+    """Make the right picture darker than the left one."""
     return lambda picture, side, _: _exposed(picture, factor if side == "right" else 1.0)
 
 
 def misaligned(lower_px: float, turned_deg: float) -> Change:
-    """The right picture is lower, and turned about its middle."""
+    """Lower the right picture, and turn it about its middle."""
 
     def change(picture: NDArray[np.uint8], side: str, _: int) -> NDArray[np.uint8]:
         if side == "left":

@@ -24,7 +24,9 @@ from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]
 
-FORMAT = 1
+FORMAT = 2
+
+APPEARANCE = ("colours", "fruitness", "fruit_px", "elsewhere")
 
 LIFTED = ("rows", "centres_in_camera", "covariances", "diameters_m", "diameter_sigmas_m", "hidden", "support")
 
@@ -90,8 +92,7 @@ def _write(file: Path, look: Look) -> None:
     arrays["refused"] = np.array(json.dumps({reason.name: count for reason, count in look.lifted.refused.items()}))
     if look.detections.ids is not None:
         arrays["ids"] = np.array(json.dumps(look.detections.ids))
-    if look.colours is not None:
-        arrays["colours"] = look.colours
+    arrays |= {name: values for name in APPEARANCE if (values := getattr(look, name)) is not None}
     with whole_file(file) as partial, partial.open("wb") as stream:
         np.savez(stream, **arrays)
 
@@ -108,7 +109,7 @@ def _read(file: Path, frame: int) -> Look:
                     **{name: arrays[name] for name in LIFTED},
                     refused=Counter({Refusal[name]: count for name, count in refused.items()}),
                 ),
-                arrays.get("colours"),
+                **{name: arrays.get(name) for name in APPEARANCE},
             )
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise PomonaError(f"{file}: not a kept frame ({error}): remove it") from None
