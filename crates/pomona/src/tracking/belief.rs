@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn green_fruits_among_leaves_stay() {
-        let alike: Vec<f64> = (0..200).map(|k| 0.5 + 0.01 * (k % 7) as f64).collect();
+        let alike: Vec<f64> = (0..200).map(|k| 0.5 + 0.01 * f64::from(k % 7)).collect();
         let colours = Colours { boxes: &alike, elsewhere: &alike };
         let found = believed(0.15, &[10; 3], &[0; 3], &[0.45, 0.5, 0.55], &colours);
         assert_eq!(found.is_believed, [true; 3]);
