@@ -42,7 +42,7 @@ def _quantiles(picture: Picture) -> NDArray[np.float64]:
     """Quantiles by the histogram, between whole values as if each filled its step."""
     step = max(picture.shape[1] // COLUMNS, 1)
     below = np.cumsum(np.bincount(picture[::step, ::step].ravel(), minlength=256))
-    return np.interp(QUANTILES * below[-1], below, np.arange(256) + 0.5)
+    return np.asarray(np.interp(QUANTILES * below[-1], below, np.arange(256) + 0.5), np.float64)
 
 
 def like(picture: Picture, reference: Picture) -> Picture:
