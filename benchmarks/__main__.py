@@ -20,6 +20,7 @@ NAMES = (
     "odometry",
     "tracking",
     "scan",
+    "disturbed",
     "endurance",
     "speed",
     "readme",

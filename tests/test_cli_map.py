@@ -97,7 +97,10 @@ def test_a_session_that_is_elsewhere_is_a_result(orchard: Path, visits: Path) ->
         (("add", "orchard.gpkg", "august.csv", "--date", "2024-08-01"), "session august is in the map already"),
         (("add", "orchard.gpkg", "august.csv"), "--date YYYY-MM-DD"),
         (("add", "orchard.gpkg", "august.csv", "--date", "yesterday"), "found the date 'yesterday'"),
-        (("add", "orchard.gpkg", "absent.csv", "--date", "2024-08-01"), "absent.csv: cannot be read: No such file"),
+        (
+            ("add", "orchard.gpkg", "absent.csv", "--date", "2024-08-01"),
+            "absent.csv: not found, expected a fruit cloud",
+        ),
         (("add", "absent/orchard.gpkg", "august.csv", "--date", "2024-08-01"), "cannot be written: No such file"),
         (("info", "august.csv"), "august.csv: is not a GeoPackage"),
         (("check", "absent.gpkg"), "absent.gpkg: is not there"),

@@ -53,7 +53,7 @@ def test_a_scan_to_a_stream_is_a_table_or_what_the_name_says(here: Path) -> None
     )
     assert done.returncode == 0, done.stderr
     assert (here / "a.csv").read_bytes() == (here / "b.csv").read_bytes()
-    assert len(load_session(here / "c.gpkg").cloud) == 3
+    assert len(load_session(here / "c.gpkg", date="2024-08-01").cloud) == 3
 
 
 def test_a_device_is_written_into(here: Path) -> None:

@@ -122,6 +122,7 @@ def test_joined_fuses_fruits_at_one_place() -> None:
         radii_m=np.full(3, 0.035),
         radius_sigmas_m=np.full(3, 0.002),
         n_views=np.array([2, 2, 1]),
+        n_glimpses=np.array([0, 1, 0]),
         evidence=np.ones(3),
         frames=np.array([0, 1, 1, 2, 2]),
         rows=np.array([0, 0, 1, 0, 1]),
@@ -134,7 +135,8 @@ def test_joined_fuses_fruits_at_one_place() -> None:
     assert joined.n_views.tolist() == [3, 1]
     assert np.allclose(joined.centres[0], [0.005, 0, 1])
     assert np.allclose(joined.covariances[0], covariance / 2)
-    assert joined.seen_in(2).numbers.tolist() == [3]
+    assert joined.n_glimpses.tolist() == [1, 0]
+    assert joined.select(np.array([0])).numbers.tolist() == [3]
     apart = tracks.at(tracks.centres + np.array([[0, 0, 0], [0.07, 0, 0], [0, 0, 0]]), tracks.covariances)
     assert len(apart.joined()) == 3
 

@@ -10,12 +10,14 @@ __all__ = [
     "Tracks",
     "__version__",
     "adjust",
+    "believed",
     "default_config",
     "describe",
     "fuse_centres",
     "fuse_diameters",
     "lift",
     "locate",
+    "look_of",
     "one_fruit_each",
     "read_pair",
     "search_rows",
@@ -110,9 +112,19 @@ class Tracker:
         scores: NDArray[np.float64],
         lifted: _Lifted,
     ) -> NDArray[np.int64]: ...
+    def glimpse(self, picture: NDArray[np.uint8]) -> None: ...
     @property
     def min_views(self) -> int: ...
     def finish(self, min_views: int | None = None) -> Tracks: ...
+
+class _TrackViews(TypedDict):
+    centres: NDArray[np.float64]
+    depths_m: NDArray[np.float64]
+    views: NDArray[np.int64]
+    glimpses: NDArray[np.int64]
+    shown_m2: NDArray[np.float64]
+    fruitness: NDArray[np.float64]
+    missed_boxes: float
 
 @final
 class Tracks:
@@ -129,6 +141,10 @@ class Tracks:
     @property
     def n_views(self) -> NDArray[np.int64]: ...
     @property
+    def n_glimpses(self) -> NDArray[np.int64]: ...
+    @property
+    def missed_boxes(self) -> float: ...
+    @property
     def evidence(self) -> NDArray[np.float64]: ...
     @property
     def frames(self) -> NDArray[np.int64]: ...
@@ -139,6 +155,20 @@ class Tracks:
     @property
     def shared(self) -> NDArray[np.bool_]: ...
 
+def believed(
+    tracks: _TrackViews,
+    *,
+    box_fruitness: NDArray[np.float64],
+    elsewhere: NDArray[np.float64],
+    focal_px: tuple[float, float],
+    principal_px: tuple[float, float],
+    size_px: tuple[float, float],
+    poses: NDArray[np.float64],
+    config: str,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], float]: ...
+def look_of(
+    picture: NDArray[np.uint8], boxes_px: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def one_fruit_each(
     *,
     centres: NDArray[np.float64],

@@ -19,7 +19,7 @@ from pomona.detect import Detections
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 
-__all__ = ["Tracker", "Tracks"]
+__all__ = ["Belief", "TrackViews", "Tracker", "Tracks", "believed"]
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,8 @@ class Tracks:
         Radii and their standard deviations, metres.
     n_views : (N,) int64
         Number of frames that saw the fruit.
+    n_glimpses : (N,) int64
+        Number of further frames whose pictures show it where the detector gave no box.
     evidence : (N,) float64
         Log-odds that it is a fruit and no false box, nats.
     frames, rows, fruits : (S,) int64
@@ -48,6 +50,8 @@ class Tracks:
         and rows; a box shows one fruit, a fruit has one box in a frame.
     shared : (S,) bool
         Whether the box is around another fruit too. It shows that the fruit is there, but not its place or size.
+    missed_boxes : float
+        Boxes that the detector missed, as pictures of fruits without one tell.
     """
 
     numbers: NDArray[np.int64]
@@ -56,11 +60,13 @@ class Tracks:
     radii_m: Array
     radius_sigmas_m: Array
     n_views: NDArray[np.int64]
+    n_glimpses: NDArray[np.int64]
     evidence: Array
     frames: NDArray[np.int64]
     rows: NDArray[np.int64]
     fruits: NDArray[np.int64]
     shared: NDArray[np.bool_]
+    missed_boxes: float = 0.0
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -94,9 +100,9 @@ class Tracks:
             raise PomonaError(f"tracks: {error}") from None
         return self._grouped(labels)
 
-    def seen_in(self, min_views: int) -> Tracks:
-        """Give the fruits that at least `min_views` frames saw."""
-        return self._only(np.flatnonzero(self.n_views >= min_views))
+    def select(self, rows: NDArray[np.int64]) -> Tracks:
+        """Give some of the fruits, by row."""
+        return self._only(rows)
 
     def _grouped(self, labels: NDArray[np.int64]) -> Tracks:
         """Fuse fruits of one label into the first of them."""
@@ -104,8 +110,9 @@ class Tracks:
         total, weighted = np.zeros_like(information), np.zeros_like(self.centres)
         np.add.at(total, labels, information)
         np.add.at(weighted, labels, np.einsum("nij,nj->ni", information, self.centres))
-        evidence = np.zeros_like(self.evidence)
+        evidence, n_glimpses = np.zeros_like(self.evidence), np.zeros_like(self.n_glimpses)
         np.add.at(evidence, labels, self.evidence)
+        np.add.at(n_glimpses, labels, self.n_glimpses)
         roots = np.flatnonzero(labels == np.arange(len(labels)))
         covariances, centres = self.covariances.copy(), self.centres.copy()
         covariances[roots] = np.linalg.inv(total[roots])
@@ -122,6 +129,7 @@ class Tracks:
             centres=centres,
             covariances=covariances,
             evidence=evidence,
+            n_glimpses=n_glimpses,
             n_views=np.bincount(fruits[kept], minlength=len(labels)),
             frames=self.frames[kept],
             rows=self.rows[kept],
@@ -141,12 +149,114 @@ class Tracks:
             radii_m=self.radii_m[chosen],
             radius_sigmas_m=self.radius_sigmas_m[chosen],
             n_views=self.n_views[chosen],
+            n_glimpses=self.n_glimpses[chosen],
             evidence=self.evidence[chosen],
             frames=self.frames[kept],
             rows=self.rows[kept],
             fruits=row_of[self.fruits[kept]],
             shared=self.shared[kept],
+            missed_boxes=self.missed_boxes,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class TrackViews:
+    """What speaks for tracks, one row each; NaN where nobody knows.
+
+    Attributes
+    ----------
+    centres : (N, 3) float64
+        In the session's frame, metres.
+    depths_m : (N,) float64
+        Depth from which they were seen, metres.
+    n_views, n_glimpses : (N,) int64
+        As in `Tracks`.
+    shown_m2 : (N,) float64
+        Mean area that their boxes show, square metres at that depth.
+    fruitness : (N,) float64
+        Mean fruitness of their boxes.
+    missed_boxes : float
+        As in `Tracks`.
+    """
+
+    centres: Array
+    depths_m: Array
+    n_views: NDArray[np.int64]
+    n_glimpses: NDArray[np.int64]
+    shown_m2: Array
+    fruitness: Array
+    missed_boxes: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """How far tracks are fruits.
+
+    Attributes
+    ----------
+    probability : (N,) float64
+        That each is a fruit which shows clearly.
+    is_believed : (N,) bool
+        Whether it was seen often enough, and looks like a fruit rather than a leaf.
+    frames_in_view : float
+        Frames for which a fruit stays in view, from its coming to its going.
+    """
+
+    probability: Array
+    is_believed: NDArray[np.bool_]
+    frames_in_view: float
+
+
+def believed(
+    tracks: TrackViews,
+    session_from_camera: Array,
+    calibration: Calibration,
+    *,
+    box_fruitness: Array,
+    elsewhere: Array,
+    config: Mapping[str, Any] | None = None,
+) -> Belief:
+    """Weigh which tracks are fruits (`docs/tracking.md` has the equations).
+
+    Parameters
+    ----------
+    tracks : TrackViews
+    session_from_camera : (F, 4, 4) float64
+        Poses of all frames.
+    calibration : Calibration
+        The camera.
+    box_fruitness, elsewhere : (B,), (E,) float64
+        Fruitness of all boxes, and of places without one.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`.
+
+    Raises
+    ------
+    PomonaError
+        A setting is outside its range, or arrays do not fit together.
+    """
+    try:
+        probability, is_believed, frames_in_view = _core.believed(
+            {
+                "centres": np.ascontiguousarray(tracks.centres, np.float64),
+                "depths_m": np.ascontiguousarray(tracks.depths_m, np.float64),
+                "views": np.ascontiguousarray(tracks.n_views, np.int64),
+                "glimpses": np.ascontiguousarray(tracks.n_glimpses, np.int64),
+                "shown_m2": np.ascontiguousarray(tracks.shown_m2, np.float64),
+                "fruitness": np.ascontiguousarray(tracks.fruitness, np.float64),
+                "missed_boxes": tracks.missed_boxes,
+            },
+            box_fruitness=np.ascontiguousarray(box_fruitness, np.float64),
+            elsewhere=np.ascontiguousarray(elsewhere, np.float64),
+            focal_px=(calibration.fx, calibration.fy),
+            principal_px=(calibration.cx, calibration.cy),
+            size_px=(float(calibration.width), float(calibration.height)),
+            poses=np.ascontiguousarray(session_from_camera, np.float64),
+            config=json.dumps(dict(config or {})),
+        )
+    except ValueError as error:
+        raise PomonaError(f"tracks: {error}") from None
+    return Belief(probability, is_believed, frames_in_view)
 
 
 class Tracker:
@@ -225,6 +335,10 @@ class Tracker:
         except ValueError as error:
             raise PomonaError(f"frame {frame_number}: {error}") from None
 
+    def glimpse(self, picture: NDArray[np.uint8]) -> None:
+        """Look in the colour picture of the last frame, (H, W, 3), for fruits that the detector gave no box."""
+        self._core.glimpse(np.ascontiguousarray(picture, np.uint8))
+
     @property
     def min_views(self) -> int:
         """Frames that must have seen a fruit: the setting `tracking.min_views`."""
@@ -246,9 +360,11 @@ class Tracker:
             radii_m=found.radii_m,
             radius_sigmas_m=found.radius_sigmas_m,
             n_views=found.n_views,
+            n_glimpses=found.n_glimpses,
             evidence=found.evidence,
             frames=found.frames,
             rows=found.rows,
             fruits=found.fruits,
             shared=found.shared,
+            missed_boxes=found.missed_boxes,
         )

@@ -1,5 +1,6 @@
 //! Python bindings of the pomona core: thin, no logic. One file per core module.
 
+mod appearance;
 mod bundle;
 mod camera;
 mod cloud;
@@ -20,6 +21,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<tracking::PyTracker>()?;
     module.add_class::<tracking::PyTracks>()?;
     module.add_function(wrap_pyfunction!(tracking::one_fruit_each, module)?)?;
+    module.add_function(wrap_pyfunction!(tracking::believed, module)?)?;
+    module.add_function(wrap_pyfunction!(appearance::look_of, module)?)?;
     module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::fuse_centres, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::fuse_diameters, module)?)?;

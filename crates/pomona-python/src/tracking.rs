@@ -1,10 +1,16 @@
 //! Fruits followed through the frames of one visit.
 
 use crate::cloud::points;
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pomona::Config;
 use pomona::nalgebra::{Matrix3, Matrix4};
-use pomona::tracking::{Body, Boxes, Camera, LiftedBoxes, Pose, Tracker, Tracks, merge_duplicates};
+use pomona::stereo::Picture;
+use pomona::tracking::{
+    Body, Boxes, Camera, Colours, LiftedBoxes, Pose, TrackViews, Tracker, Tracks, belief, merge_duplicates,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -85,6 +91,14 @@ impl PyTracker {
         Ok(PyArray1::from_iter(py, numbers.into_iter().map(|number| number.map_or(-1, |number| number as i64))))
     }
 
+    /// Looks in the picture of the last frame, (H, W, 3), for fruits that have no box.
+    fn glimpse(&mut self, py: Python<'_>, picture: PyReadonlyArray3<'_, u8>) -> PyResult<()> {
+        let width = picture.shape()[1];
+        let values = picture.as_slice()?;
+        py.detach(|| self.tracker.glimpse(Picture::new(values, width)));
+        Ok(())
+    }
+
     #[getter]
     fn min_views(&self) -> usize {
         self.min_views
@@ -136,6 +150,16 @@ impl PyTracks {
     }
 
     #[getter]
+    fn n_glimpses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.glimpses.iter().map(|&glimpses| glimpses as i64))
+    }
+
+    #[getter]
+    fn missed_boxes(&self) -> f64 {
+        self.0.missed_boxes
+    }
+
+    #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.0.evidence)
     }
@@ -159,6 +183,73 @@ impl PyTracks {
     fn shared<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_iter(py, self.0.sightings.iter().map(|sighting| sighting.shared))
     }
+}
+
+/// What is known of tracks, as Python passes it.
+#[derive(FromPyObject)]
+pub struct TrackArrays<'py> {
+    #[pyo3(item)]
+    centres: PyReadonlyArray2<'py, f64>,
+    #[pyo3(item)]
+    depths_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    views: PyReadonlyArray1<'py, i64>,
+    #[pyo3(item)]
+    glimpses: PyReadonlyArray1<'py, i64>,
+    #[pyo3(item)]
+    shown_m2: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    fruitness: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    missed_boxes: f64,
+}
+
+type Believed<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>, f64);
+
+/// Probability of each track to be a fruit, whether it is to be reported, and frames for which one stays in view.
+#[pyfunction]
+#[pyo3(signature = (tracks, *, box_fruitness, elsewhere, focal_px, principal_px, size_px, poses, config))]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+#[expect(clippy::too_many_arguments, reason = "a struct of arrays")]
+pub fn believed<'py>(
+    py: Python<'py>,
+    tracks: TrackArrays<'py>,
+    box_fruitness: PyReadonlyArray1<'py, f64>,
+    elsewhere: PyReadonlyArray1<'py, f64>,
+    focal_px: [f64; 2],
+    principal_px: [f64; 2],
+    size_px: [f64; 2],
+    poses: PyReadonlyArray3<'py, f64>,
+    config: &str,
+) -> PyResult<Believed<'py>> {
+    let config = parsed(config)?.tracking;
+    let centres: Vec<_> = points(&tracks.centres)?.iter().map(|point| point.coords).collect();
+    let n = centres.len();
+    let numbers = |values: &PyReadonlyArray1<'py, f64>| values.as_array().to_vec();
+    let (depths_m, shown_m2) = (numbers(&tracks.depths_m), numbers(&tracks.shown_m2));
+    let fruitness = numbers(&tracks.fruitness);
+    let (views, glimpses) = (rows(&tracks.views)?, rows(&tracks.glimpses)?);
+    if [depths_m.len(), shown_m2.len(), fruitness.len(), views.len(), glimpses.len()] != [n; 5] {
+        return Err(wrong("tracks: expected one row for each track in every array"));
+    }
+    let camera = Camera { focal_px, principal_px, size_px };
+    let matrix = |one: numpy::ndarray::ArrayView2<'_, f64>| Matrix4::from_fn(|row, column| one[[row, column]]);
+    let poses: Result<Vec<_>, _> = poses.as_array().outer_iter().map(|one| Pose::from_matrix(&matrix(one))).collect();
+    let poses = poses.map_err(wrong)?;
+    let (boxes, elsewhere) = (numbers(&box_fruitness), numbers(&elsewhere));
+    let tracks = TrackViews {
+        centres: &centres,
+        depths_m: &depths_m,
+        views: &views,
+        glimpses: &glimpses,
+        shown_m2: &shown_m2,
+        fruitness: &fruitness,
+        missed_boxes: tracks.missed_boxes,
+    };
+    let colours = Colours { boxes: &boxes, elsewhere: &elsewhere };
+    let found = py.detach(|| belief(&tracks, &colours, (&camera, &poses), &config));
+    let probability = PyArray1::from_vec(py, found.probability);
+    Ok((probability, PyArray1::from_vec(py, found.is_believed), found.frames_in_view))
 }
 
 /// For every fruit the smallest row of those that are the same fruit.

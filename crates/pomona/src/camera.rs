@@ -94,6 +94,11 @@ impl PixelBox {
         self.bottom - self.top
     }
 
+    /// Whether both have a pixel in common.
+    pub fn touches(&self, other: &Self) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+
     /// Whether a pixel is one of them.
     pub fn contains(&self, column: usize, row: usize) -> bool {
         (self.left..self.right).contains(&column) && (self.top..self.bottom).contains(&row)

@@ -7,6 +7,7 @@
 //! Lengths are metres, angles radians, frames right-handed. A transform `map_from_query` takes points of the query
 //! into the map.
 
+pub mod appearance;
 pub mod assignment;
 pub mod bundle;
 pub mod camera;

@@ -30,7 +30,7 @@ def info(
     check: bool = typer.Option(
         False,
         "--check",
-        help="Decode every picture; name those that cannot be read or show nothing, and swapped sides.",
+        help="Decode every picture; name those that cannot be read or show nothing, and swapped or misaligned sides.",
     ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
@@ -49,6 +49,7 @@ def info(
     if faults is not None:
         for name, frames in (("unreadable", faults.unreadable), ("blank", faults.blank)):
             found[name] = [{"frame": frame, "reason": reason} for frame, reason in frames.items()]
+        found["misaligned"] = faults.misaligned
     if json:
         say_json(found)
     else:

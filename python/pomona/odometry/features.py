@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
-CELL_PX = 40
-"""Side of the cells over which corners are spread: 144 at 640 x 360."""
+CELLS_ACROSS = 16
+"""Cells over which corners are spread, along the picture: 144 of 16 : 9. As many in a larger picture: it shows the
+same scene."""
 
 MIN_DISTANCE_PX = 4
 """Between corners: nearer ones see the same window."""
@@ -80,12 +81,18 @@ def corners(picture: Picture, taken: Array, per_cell: int) -> Array:
 
 
 def _cells(x: NDArray[Any], y: NDArray[Any], width: int) -> NDArray[np.int64]:
-    return np.asarray(y // CELL_PX * (width // CELL_PX + 1) + x // CELL_PX, np.int64)
+    side = _cell_px(width)
+    return np.asarray(y // side * (width // side + 1) + x // side, np.int64)
 
 
 def _n_cells(picture: Picture) -> int:
     height, width = picture.shape
-    return int((height // CELL_PX + 1) * (width // CELL_PX + 1))
+    side = _cell_px(width)
+    return int((height // side + 1) * (width // side + 1))
+
+
+def _cell_px(width: int) -> int:
+    return max(width // CELLS_ACROSS, 1)
 
 
 def follow(

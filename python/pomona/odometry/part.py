@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pomona.odometry.features import corners
 from pomona.odometry.reference import Found, Measure, Reference
 from pomona.odometry.window import Camera, Window
+from pomona.stereo.exposure import like
 
 __all__ = ["Part", "Placed"]
 
@@ -87,8 +88,9 @@ class Part:
     def place(self, frame: int, picture: Picture, measure: Measure) -> bool | str:
         """Place a frame: whether it became a keyframe, or why it cannot be placed."""
         reason, reference = "", self._newest
-        for expected in self._expected(frame, picture):
-            found = reference.locate(picture, expected)
+        compared = like(picture, reference.picture)
+        for expected in self._expected(frame, compared):
+            found = reference.locate(compared, expected)
             objection = "found no points to follow" if found is None else self._objection(frame, found)
             if found is not None and not objection:
                 return self._accept(frame, picture, measure, found)

@@ -14,6 +14,7 @@ from pomona.odometry.part import Part
 from pomona.odometry.reference import Measure
 from pomona.odometry.trajectory import OdometryTrajectory, trajectory_of
 from pomona.recording import Calibration
+from pomona.stereo.exposure import like
 
 __all__ = ["StereoOdometry"]
 
@@ -71,7 +72,8 @@ class StereoOdometry:
         self._check(left, "left")
         self._check(right, "right")
         farthest_px = min(self._camera[0] * self._camera[4] / NEAREST_M, self._calibration.width / 2)
-        return self._take(left, partial(disparities, left, right, farthest=farthest_px), is_flat(right))
+        measure = partial(disparities, left, like(right, left), farthest=farthest_px)
+        return self._take(left, measure, is_flat(right))
 
     def with_depth(self, left: Picture, depth_m: NDArray[np.float32]) -> Motion:
         """Take the next frame of a depth camera.

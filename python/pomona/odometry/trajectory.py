@@ -35,6 +35,9 @@ class OdometryTrajectory:
     information : (M, 6, 6) float64
         Inverse covariances of a step (translation, rotation), metres and radians, of the second camera in its own
         frame.
+    median_disparity_px : float
+        Median over the keyframes, NaN where there is none. Lengths err by what disparities are off by together, over
+        this.
     """
 
     frames: NDArray[np.int64]
@@ -44,6 +47,7 @@ class OdometryTrajectory:
     second: NDArray[np.int64]
     first_from_second: Array
     information: Array
+    median_disparity_px: float
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -67,7 +71,12 @@ def trajectory_of(parts: Sequence[Part]) -> OdometryTrajectory:
         second=np.array(second, np.int64),
         first_from_second=np.array(relative, np.float64).reshape(-1, 4, 4),
         information=np.array(information, np.float64).reshape(-1, 6, 6),
+        median_disparity_px=_median([px for part in parts for px in part.window.disparities_px]),
     )
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values)) if values else float("nan")
 
 
 def _motions(part: Part, row_of: dict[int, int]) -> list[tuple[int, int, Array, Array]]:

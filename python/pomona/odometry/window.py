@@ -59,6 +59,8 @@ class Window:
     positions, covariances : (P, 3), (P, 3, 3) float64
         Of the points from number `base` on, in the frame of reference of the part. The covariances are those while the
         keyframes stay.
+    disparities_px : list of float
+        Median disparity of each keyframe.
     """
 
     camera: Camera
@@ -67,6 +69,7 @@ class Window:
     base: int = 0
     positions: Array = field(default_factory=lambda: np.zeros((0, 3)))
     covariances: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    disparities_px: list[float] = field(default_factory=list)
     _kept: deque[_Keyframe] = field(default_factory=deque)
 
     def add(self, session_from_camera: Array, points: Rows, seen: Array, fresh: Array) -> None:
@@ -92,6 +95,7 @@ class Window:
         self.covariances = np.concatenate([self.covariances, np.zeros((len(fresh), 3, 3))])
         self.poses.append(session_from_camera)
         self._kept.append(keyframe)
+        self.disparities_px.append(float(np.nanmedian(np.concatenate([seen[:, 2], fresh[:, 2]]))))
         if len(self._kept) > 1:
             self.information.append(np.zeros((6, 6)))
             self._place_single(keyframe)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.recording.alignment import alignment_of
 from pomona.recording.frame import Recording
 from pomona.recording.pictures import UnreadablePictureError
 
@@ -30,10 +31,13 @@ class Checked:
         A picture is missing, cut off or corrupt.
     blank : dict
         A picture shows nothing: it is black, white or plain.
+    misaligned : str or None
+        How the right pictures lie to the left ones, where their rows are not the same.
     """
 
     unreadable: dict[int, str] = field(default_factory=dict)
     blank: dict[int, str] = field(default_factory=dict)
+    misaligned: str | None = None
 
 
 def checked(recording: Recording, progress: Callable[[int, int], None] | None = None) -> Checked:
@@ -60,7 +64,8 @@ def checked(recording: Recording, progress: Callable[[int, int], None] | None = 
                 found.blank.setdefault(frame.number, f"{where}: the {side} picture shows nothing: {level}")
         if progress is not None:
             progress(done, len(recording))
-    return found
+    alignment = alignment_of(recording)
+    return found if alignment is None or not alignment.is_off else replace(found, misaligned=str(alignment))
 
 
 def unreadable_frames(recording: Recording, progress: Callable[[int, int], None] | None = None) -> dict[int, str]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
+from pomona.stereo.exposure import like
 from pomona.stereo.pair import NEAREST_M, Picture, depth_of_disparity, focal_baseline_px_m, in_colour
 
 __all__ = ["DenseStereo"]
@@ -46,7 +47,8 @@ class DenseStereo:
 
     def __call__(self, left: Picture, right: Picture, boxes_px: NDArray[np.float64]) -> FruitDepth:
         """Measure the depth of the whole picture; see `StereoDepth` for the arguments and errors."""
-        greys = (cv2.cvtColor(in_colour(one, self._calibration), cv2.COLOR_BGR2GRAY) for one in (left, right))
+        left, right = in_colour(left, self._calibration), in_colour(right, self._calibration)
+        greys = (cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) for one in (left, like(right, left)))
         # Columns left of the picture repeat its edge, so that fruits there are matched too.
         wide = [cv2.copyMakeBorder(grey, 0, 0, self._disparities, 0, cv2.BORDER_REPLICATE) for grey in greys]
         matched = _matcher(self._disparities).compute(*wide)[:, self._disparities :]

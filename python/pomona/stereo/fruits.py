@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pomona import _core
 from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
+from pomona.stereo.exposure import like
 from pomona.stereo.pair import NEAREST_M, Picture, focal_baseline_px_m, in_colour
 
 __all__ = ["StereoDepth"]
@@ -52,9 +53,10 @@ class StereoDepth:
         PomonaError
             When a picture has another size.
         """
+        left, right = in_colour(left, self._calibration), in_colour(right, self._calibration)
         depth_m, numbers = _core.read_pair(
-            in_colour(left, self._calibration),
-            in_colour(right, self._calibration),
+            left,
+            like(right, left),
             np.asarray(boxes_px, np.float64).reshape(-1, 4),
             self._calibration,
             focal_baseline_px_m=self._focal_baseline_px_m,

@@ -26,7 +26,9 @@ from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]
 
-FORMAT = 1
+FORMAT = 2
+
+APPEARANCE = ("colours", "fruitness", "fruit_px", "elsewhere")
 
 MOST_BYTES = 1 << 28
 """256 MiB unpacked: a frame of ten thousand boxes is 4 MB."""
@@ -105,8 +107,7 @@ def _write(file: Path, look: Look) -> None:
     arrays["refused"] = np.array(json.dumps({reason.name: count for reason, count in look.lifted.refused.items()}))
     if look.detections.ids is not None:
         arrays["ids"] = np.array(json.dumps(look.detections.ids))
-    if look.colours is not None:
-        arrays["colours"] = look.colours
+    arrays |= {name: values for name in APPEARANCE if (values := getattr(look, name)) is not None}
     with whole_file(file) as partial, partial.open("wb") as stream:
         np.savez(stream, **arrays)
 
@@ -131,7 +132,7 @@ def _read(file: Path, frame: int) -> Look:
                     **{name: arrays[name] for name in LIFTED},
                     refused=Counter({Refusal[name]: count for name, count in refused.items()}),
                 ),
-                arrays.get("colours"),
+                **{name: arrays.get(name) for name in APPEARANCE},
             )
     except UNREADABLE as error:
         raise PomonaError(f"{file}: not a kept frame ({str(error)[:MOST_REASON]}): remove it") from None

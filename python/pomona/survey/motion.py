@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import refinement
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
 from pomona.odometry import Motion, OdometryTrajectory, StereoOdometry
 from pomona.recording import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
@@ -21,6 +22,13 @@ from pomona.survey.sightings import Sightings
 from pomona.survey.thinning import between_keys, followed, stride
 
 __all__ = ["Camera", "Place", "camera_of"]
+
+
+OFF_PX = 0.5
+"""What the disparities of a good calibration are off by together, after some months."""
+
+FAR_PX = 10.0
+"""Median disparity below which that makes more than 5 % of all lengths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +138,7 @@ class _Followed:
                 f"{recording.path}: found {found} pictures and no poses, expected poses, or left and right pictures"
             )
         self.needs: tuple[Kind, ...] = ("left", "right") if stereo else ("left", "depth")
-        self._stereo = stereo
+        self._stereo, self._path = stereo, recording.path
         self._odometry = StereoOdometry(recording.calibration)
         self._count_of: dict[int, int] = {}
 
@@ -168,7 +176,15 @@ class _Followed:
 
     @cached_property
     def _way(self) -> OdometryTrajectory:
-        return self._odometry.trajectory()
+        way = self._odometry.trajectory()
+        if self._stereo and way.median_disparity_px < FAR_PX:
+            part = OFF_PX / way.median_disparity_px
+            found = f"found a median disparity of {way.median_disparity_px:.1f} px, expected {FAR_PX:g} px or more"
+            message = (
+                f"{self._path}: {found}: {OFF_PX:g} px that the calibration is off by make {part:.0%} of all lengths"
+            )
+            warnings.warn(message, PomonaWarning, stacklevel=2)
+        return way
 
 
 def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int64]) -> refinement.Sightings:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.survey.believing import Believing
 from pomona.survey.motion import Camera
+from pomona.survey.registration import Fruits
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of
 from pomona.tracking import Tracker, Tracks
@@ -49,19 +51,23 @@ class Part:
     ----------
     cloud : FruitCloud
         Every fruit once, in the part's frame of reference. `extras` has `diameter_sigma_m`, the standard deviation of
-        the diameter in metres, and, of a recording with colour, `colour` as #rrggbb.
+        the diameter in metres, of tracked fruits `probability`, that each is a fruit which shows clearly, and, of a
+        recording with colour, `colour` as #rrggbb.
     trajectory : Trajectory
         Poses of the left camera.
     boxes : Boxes
         Which box is which fruit.
     began : str or None
         Why the part before it ended; None of the first.
+    frames_in_view : float or None
+        Frames for which a fruit stays in view; None where boxes were not tracked.
     """
 
     cloud: FruitCloud
     trajectory: Trajectory
     boxes: Boxes
     began: str | None = None
+    frames_in_view: float | None = None
 
 
 class OpenPart:
@@ -73,20 +79,29 @@ class OpenPart:
         Which part of the recording.
     began : str or None
         Why it began.
-    tracker : Tracker or None
-        Tells which boxes are one fruit; None where the boxes carry names, or there is one frame.
-    min_views : int
-        Frames that must have seen a fruit.
+    open_tracker : callable
+        Opens what tells which boxes are one fruit; gives None where the boxes carry names, or there is one frame.
+    believing : Believing
+        Tells which tracks are fruits.
     """
 
-    def __init__(self, number: int, began: str | None, tracker: Tracker | None, min_views: int) -> None:
-        self._number, self._began, self._tracker, self._min_views = number, began, tracker, min_views
+    def __init__(
+        self, number: int, began: str | None, open_tracker: Callable[[], Tracker | None], believing: Believing
+    ) -> None:
+        self._number, self._began, self._open_tracker, self._believing = number, began, open_tracker, believing
+        self._tracker = open_tracker()
         self._looks: list[Look] = []
         self._times_s: list[float] = []
         self._seen: Counter[str | int] = Counter()
 
-    def add(self, look: Look, time_s: float, session_from_camera: NDArray[np.float64]) -> None:
-        """Take the next frame."""
+    def add(
+        self,
+        look: Look,
+        time_s: float,
+        session_from_camera: NDArray[np.float64],
+        left: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the next frame; its left picture, where there is one, shows fruits that have no box."""
         self._looks.append(look)
         self._times_s.append(time_s)
         if self._tracker is None:
@@ -94,26 +109,66 @@ class OpenPart:
         else:
             numbers = self._tracker.update(look.frame, session_from_camera, look.detections, look.lifted)
             self._seen.update(numbers[numbers >= 0].tolist())
+            if left is not None:
+                self._tracker.glimpse(left)
 
     @property
     def n_fruits(self) -> int:
         """How many fruits there are so far, near enough to show while the work goes on."""
-        return sum(views >= self._min_views for views in self._seen.values())
+        least = 1 if self._tracker is None else self._tracker.min_views
+        return sum(views >= least for views in self._seen.values())
 
-    def closed(self, camera: Camera) -> Part:
-        """Make the fruits of all the frames."""
+    @property
+    def began(self) -> str | None:
+        """Why it began."""
+        return self._began
+
+    def refined(self, camera: Camera) -> NDArray[np.float64]:
+        """Give the poses of its frames, (F, 4, 4), by all that is known at the end."""
+        sightings = Sightings.of(self._looks)
+        frames = [look.frame for look in self._looks]
+        return camera.refined(self._number, frames, sightings, self._owners().of(sightings))
+
+    def fruits_seen_in(self, frames: slice, poses: NDArray[np.float64]) -> Fruits:
+        """Give the places of what some of its frames saw, believed to be a fruit or not; all frames say where."""
+        cloud, _ = self._fused(Sightings.of(self._looks), self._owners(), poses)
+        if cloud.views is None or cloud.covariances is None:
+            return Fruits(np.empty((0, 3)), np.empty((0, 3, 3)))
+        seen = np.isin(cloud.views.frames, [look.frame for look in self._looks[frames]])
+        rows = np.unique(cloud.views.fruits[seen])
+        return Fruits(cloud.positions[rows], cloud.covariances[rows])
+
+    def continued(self, poses: NDArray[np.float64], other: OpenPart, other_poses: NDArray[np.float64]) -> OpenPart:
+        """Give this part with the later frames of another one, whose poses are in the same frame of reference."""
+        joined = OpenPart(self._number, self._began, self._open_tracker, self._believing)
+        for part, known in ((self, poses), (other, other_poses)):
+            for look, time_s, pose in zip(part._looks, part._times_s, known, strict=True):
+                joined.add(look, time_s, pose)
+        return joined
+
+    def closed(self, poses: NDArray[np.float64]) -> Part:
+        """Make the fruits of all the frames, at these poses (F, 4, 4)."""
         sightings = Sightings.of(self._looks)
         tracks = None if self._tracker is None else self._tracker.finish(min_views=1)
         owners = self._named() if tracks is None else self._tracked(tracks)
         frames = [look.frame for look in self._looks]
-        poses = camera.refined(self._number, frames, sightings, owners.of(sightings))
+        probability = frames_in_view = None
         if tracks is not None:
             # Fragments of one fruit that drift kept apart come together once poses and places are refined.
             measured, row_of = self._fused(sightings, owners, poses)
-            owners = self._tracked(_joined(tracks, measured, row_of).seen_in(self._min_views))
+            tracks = _joined(tracks, measured, row_of)
+            belief = self._believing(tracks, self._looks, poses)
+            rows, frames_in_view = np.flatnonzero(belief.is_believed), belief.frames_in_view
+            owners, probability = self._tracked(tracks.select(rows)), belief.probability[rows]
         cloud, row_of = self._fused(sightings, owners, poses)
+        if probability is not None:
+            of_cloud = np.argsort(row_of[:-1])[len(row_of) - 1 - len(cloud) :]
+            cloud = _with_probability(cloud, probability[of_cloud])
         trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), poses)
-        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners.fruits]), self._began)
+        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners.fruits]), self._began, frames_in_view)
+
+    def _owners(self) -> _Owners:
+        return self._named() if self._tracker is None else self._tracked(self._tracker.finish(min_views=1))
 
     def _fused(
         self, sightings: Sightings, owners: _Owners, poses: NDArray[np.float64]
@@ -166,6 +221,10 @@ class _Owners:
 def _names(look: Look) -> Sequence[str]:
     ids = look.detections.ids
     return [str(row) for row in range(len(look.detections))] if ids is None else ids
+
+
+def _with_probability(cloud: FruitCloud, probability: NDArray[np.float64]) -> FruitCloud:
+    return replace(cloud, extras={**cloud.extras, "probability": tuple(f"{one:.4f}" for one in probability)})
 
 
 def _joined(tracks: Tracks, measured: FruitCloud, row_of: NDArray[np.int64]) -> Tracks:

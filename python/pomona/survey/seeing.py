@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona import _core
 from pomona.depth import Lifted, lift
 from pomona.detect import Detections, Detector
 from pomona.errors import PomonaError
@@ -37,12 +38,20 @@ class Look:
         The boxes in 3D, those that could be.
     colours : (D, 3) uint8 or None
         Median colour of each box, BGR; None where the recording has none.
+    fruitness, fruit_px : (D,) float64 or None
+        How far the colours in each box are the fruits' and not the leaves', 0 to 1, and how many of its pixels are
+        rather fruit; None where the recording has no colour.
+    elsewhere : (E,) float64 or None
+        Fruitness of places that no box touches.
     """
 
     frame: int
     detections: Detections
     lifted: Lifted
-    colours: NDArray[np.uint8] | None
+    colours: NDArray[np.uint8] | None = None
+    fruitness: NDArray[np.float64] | None = None
+    fruit_px: NDArray[np.float64] | None = None
+    elsewhere: NDArray[np.float64] | None = None
 
 
 class _Depth(Protocol):
@@ -99,13 +108,13 @@ class Seeing:
             raise UnreadablePictureError(f"frame {frame.number}: the left picture shows nothing")
         detections = self._detector(frame)
         lifted = self._depth(frame, detections.boxes_px)
-        return Look(frame.number, detections, lifted, self._colours(frame, detections.boxes_px))
-
-    def _colours(self, frame: Frame, boxes_px: NDArray[np.float64]) -> NDArray[np.uint8] | None:
+        look = Look(frame.number, detections, lifted)
         if not self._colour or frame.read_left is None:
-            return None
-        left = frame.read_left()
-        return np.array([_colour(left, box_px) for box_px in boxes_px], np.uint8).reshape(-1, 3)
+            return look
+        left, boxes_px = frame.read_left(), detections.boxes_px
+        colours = np.array([_colour(left, box_px) for box_px in boxes_px], np.uint8).reshape(-1, 3)
+        fruitness, fruit_px, elsewhere = _core.look_of(np.ascontiguousarray(left), boxes_px)
+        return replace(look, colours=colours, fruitness=fruitness, fruit_px=fruit_px, elsewhere=elsewhere)
 
 
 def _colour(picture: NDArray[np.uint8], box_px: NDArray[np.float64]) -> NDArray[np.float64]:

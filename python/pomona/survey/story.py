@@ -19,11 +19,14 @@ from pomona.depth import Refusal
 from pomona.detect import Detector
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording import Frame, Recording
+from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
+from pomona.survey.believing import Believing
 from pomona.survey.kept import Kept
 from pomona.survey.motion import Camera, Place, camera_of
 from pomona.survey.part import OpenPart, Part
 from pomona.survey.prefetch import prefetched
+from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing
 from pomona.tracking import Tracker
 from pomona.trajectory import Trajectory
@@ -32,6 +35,10 @@ __all__ = ["Progress", "Survey", "scan"]
 
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
+
+
+FEW_FRAMES = 5
+"""Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +123,8 @@ def scan(
         When pictures that are needed are not there, or no frame can be used. Single ones that cannot are skipped and
         told.
     """
+    if not (depth == "auto" and "depth" in recording.description()["pictures"]):
+        recording = straightened(recording)
     seeing = Seeing(recording, detector, depth=depth)
     camera = camera_of(recording, odometry=odometry)
     named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
@@ -134,6 +143,7 @@ def scan(
     _tell_skipped(recording, findings.skipped)
     survey = findings.survey(camera)
     _check_sizes(recording, survey)
+    _check_pace(recording, survey)
     return survey
 
 
@@ -146,10 +156,11 @@ def _placed(camera: Camera, frame: Frame) -> Place:
 
 def _open_part(recording: Recording, config: Mapping[str, Any] | None, number: int, began: str | None) -> OpenPart:
     """Open a part whose boxes are tracked, or, without a configuration, go by their names."""
-    tracker = None if config is None else Tracker(recording.calibration, config)
-    # Of a recording with fewer frames than a track needs, fruits are in all of them.
-    least = 1 if tracker is None else min(tracker.min_views, len(recording))
-    return OpenPart(number, began, tracker, least)
+
+    def open_tracker() -> Tracker | None:
+        return None if config is None else Tracker(recording.calibration, config)
+
+    return OpenPart(number, began, open_tracker, Believing(recording.calibration, config or {}))
 
 
 class _Findings:
@@ -171,6 +182,7 @@ class _Findings:
         """Take a frame, or note why it cannot be used."""
         try:
             look = coming.result()
+            left = frame.read_left() if look.colours is not None and frame.read_left is not None else None
         except UnreadablePictureError as error:
             self.skipped[frame.number] = str(error)
             return
@@ -181,14 +193,15 @@ class _Findings:
             self._parts[place.part] = self._open_part(place.part, place.broken)
         # Where nobody noted the time, frames are numbered: order is all that is known.
         time_s = float(frame.number if frame.time_s is None else frame.time_s)
-        self._parts[place.part].add(look, time_s, place.session_from_camera)
+        self._parts[place.part].add(look, time_s, place.session_from_camera, left)
         self._detections += len(look.detections)
         self._refused += look.lifted.refused
 
     def survey(self, camera: Camera) -> Survey:
         if not self._parts:
             raise PomonaError("stopped before a frame could be used")
-        parts = tuple(part.closed(camera) for part in self._parts.values())
+        placed = [(part, part.refined(camera)) for part in self._parts.values()]
+        parts = tuple(part.closed(poses) for part, poses in rejoined(placed))
         return Survey(parts, self._detections, self._refused, self.skipped, self.stopped)
 
 
@@ -201,6 +214,16 @@ def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:
         raise PomonaError(first)
     message = f"{recording.path}: skipped {len(skipped)} of {len(recording)} frames, first {first}"
     warnings.warn(message, PomonaWarning, stacklevel=3)
+
+
+def _check_pace(recording: Recording, survey: Survey) -> None:
+    """Warn where the camera passes fruits in few frames: then which of them count is half a guess."""
+    for part in survey.parts:
+        frames = part.frames_in_view
+        if frames is not None and 0 < frames < FEW_FRAMES <= len(part.trajectory) / 2:
+            found = f"found fruits that stay in view for {frames:.1f} frames, expected {FEW_FRAMES} or more"
+            warnings.warn(f"{recording.path}: {found}: film slower", PomonaWarning, stacklevel=3)
+            return
 
 
 def _check_sizes(recording: Recording, survey: Survey) -> None:

@@ -10,8 +10,8 @@
 //! farther left, with one unknown for the whole fruit: the disparity `d_c` of its centre. So the disc is matched as one,
 //! with the roundness of the fruit in it: near its rim t is 1, in its middle 1 - R/Z, which is most of a pixel.
 
-use super::colour::FruitColour;
 use super::picture::{Bounds, CHANNELS, Picture, TRUNCATION};
+use crate::appearance::FruitColour;
 use crate::camera::{Camera, PixelBox};
 use crate::lifting::outline::Outline;
 use crate::lifting::surface::UnitSphere;

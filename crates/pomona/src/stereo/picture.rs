@@ -32,6 +32,11 @@ impl<'a> Picture<'a> {
         self.values.len() / (self.width * CHANNELS).max(1)
     }
 
+    /// All channels, row by row.
+    pub(crate) fn values(&self) -> &'a [u8] {
+        self.values
+    }
+
     /// The colour of a pixel.
     pub fn at(&self, column: usize, row: usize) -> [u8; CHANNELS] {
         let first = (row * self.width + column) * CHANNELS;

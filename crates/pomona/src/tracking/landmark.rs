@@ -45,6 +45,8 @@ pub(crate) struct Landmark {
     pub last_seen: Instant,
     /// Log-odds that it is a fruit and not a false box.
     pub evidence: f64,
+    /// Frames that show it without a box, by number.
+    pub glimpses: Vec<i64>,
     /// Bit k is set when the frame k before the last that saw it did so, too.
     seen_in: u64,
     /// The fruit that it turned out to be.
@@ -54,7 +56,17 @@ pub(crate) struct Landmark {
 impl Landmark {
     pub fn born(birth: Birth, now: Instant) -> Self {
         let Birth { estimate, doubt, size, evidence } = birth;
-        Self { estimate, doubt, size, views: 1, last_seen: now, evidence, seen_in: 1, merged_into: None }
+        Self {
+            estimate,
+            doubt,
+            size,
+            views: 1,
+            last_seen: now,
+            evidence,
+            glimpses: Vec::new(),
+            seen_in: 1,
+            merged_into: None,
+        }
     }
 
     pub fn radius_m(&self) -> f64 {
@@ -87,6 +99,7 @@ impl Landmark {
         (self.last_seen, self.seen_in) = (latest.last_seen, seen_in);
         self.views += other.views;
         self.evidence += other.evidence;
+        self.glimpses.extend(&other.glimpses);
     }
 }
 

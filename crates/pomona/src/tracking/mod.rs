@@ -13,15 +13,20 @@
 //! 5. Boxes left over may be a second piece of an assigned fruit, or the outline of two fruits ([`sharing`]); the others
 //!    are born as fruits, by their depth or by their size ([`birth`]).
 //! 6. Assigned fruits take up what was seen ([`landmark`]); two that cannot both be there become one ([`merging`]).
-//! 7. The frame that is now `lag` frames old is looked at again, with what is known since ([`settling`]).
+//! 7. Where there is a picture, it tells which fruits without a box it shows all the same ([`glimpse`]).
+//! 8. The frame that is now `lag` frames old is looked at again, with what is known since ([`settling`]).
+//!
+//! In the end each track is weighed: is it a fruit, or what a detector takes for one ([`belief`])?
 //!
 //! Equations, assumptions and limits: `docs/tracking.md`.
 
 mod alignment;
 mod association;
+mod belief;
 mod birth;
 mod camera;
 mod config;
+mod glimpse;
 mod known;
 mod landmark;
 mod likelihood;
@@ -37,6 +42,7 @@ mod tracks;
 mod trust;
 mod unknown;
 
+pub use belief::{Belief, Colours, TrackViews, belief};
 pub use camera::{Camera, Pose};
 pub use config::TrackingConfig;
 pub use merging::{Body, merge_duplicates};

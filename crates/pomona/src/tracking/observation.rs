@@ -53,6 +53,14 @@ pub(crate) struct Observation {
     pub lift: Option<Lift>,
 }
 
+impl Observation {
+    /// xmin, ymin, xmax, ymax.
+    pub fn edges(&self) -> [f64; 4] {
+        let [across, down] = self.sides.map(|side| side.edges);
+        [across.low, down.low, across.high, down.high]
+    }
+}
+
 /// One axis of a box: its edges, and which of them the picture cuts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Side {

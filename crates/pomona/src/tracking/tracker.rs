@@ -5,6 +5,7 @@ use super::association::{Association, associate};
 use super::birth::birth;
 use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
+use super::glimpse::{Expected, Glimpses, OwnedPicture};
 use super::known::{Instant, Known};
 use super::likelihood::Weighed;
 use super::observation::{Boxes, LiftedBoxes, Observation, observations};
@@ -16,11 +17,16 @@ use super::tracks::{Sighting, Tracks, tracks};
 use super::trust::Reliability;
 use super::unknown::{Conditions, Unknown, unknown};
 use crate::error::{Error, Result};
+use crate::stereo::Picture;
 use nalgebra::Vector3;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Largest evidence of one frame, nats: boxes of one fruit err alike.
 const EVIDENCE_OF_A_FRAME: f64 = 3.0;
+
+/// Frames after which a picture is looked at for fruits without a box: most are known by then. At 1280 x 720 that many
+/// pictures are 22 MB.
+const GLIMPSE_LAG: usize = 8;
 
 /// Times that a pose is corrected: the second time boxes are assigned that the first one brought into the gates.
 const ALIGNMENTS: usize = 3;
@@ -42,6 +48,9 @@ pub struct Tracker {
     now: Instant,
     /// Number of the last frame, and the place that was given for it.
     last: Option<(i64, Vector3<f64>)>,
+    /// Pictures of the newest frames, the oldest first.
+    pictures: VecDeque<OwnedPicture>,
+    glimpses: Glimpses,
     /// What known fruits say that poses are wrong by: corrected pose = `correction` after the given one.
     correction: Pose,
 }
@@ -71,6 +80,8 @@ impl Tracker {
             sightings: Vec::new(),
             now: Instant::default(),
             last: None,
+            pictures: VecDeque::new(),
+            glimpses: Glimpses::default(),
             correction: Pose::IDENTITY,
         })
     }
@@ -103,13 +114,47 @@ impl Tracker {
         Ok(numbers)
     }
 
+    /// Takes the picture of the last frame, to look in it for the fruits that have no box there.
+    pub fn glimpse(&mut self, picture: Picture) {
+        let Some((number, _)) = self.last else { return };
+        self.pictures.push_back(OwnedPicture::new(number, picture));
+        if self.pictures.len() > GLIMPSE_LAG.min(self.config.lag) {
+            self.look_at_oldest();
+        }
+    }
+
+    /// Some frames later it is known which fruits the frame should show, those among them that were found after it.
+    fn look_at_oldest(&mut self) {
+        let Some(picture) = self.pictures.pop_front() else { return };
+        let Some(frame) = self.past.iter().find(|frame| frame.number == picture.frame) else { return };
+        let predictions = self.known.predictions(&self.camera, &frame.pose, frame.at.way_m, &self.config);
+        let row_of: BTreeMap<usize, usize> = (frame.told.iter().enumerate())
+            .filter_map(|(row, told)| told.map(|(fruit, _)| (self.known.root(fruit), row)))
+            .collect();
+        let expected: Vec<Expected> = predictions
+            .iter()
+            .filter(|prediction| !predictions.iter().any(|other| hides(other, prediction)))
+            .filter_map(|one| Expected::new(one.landmark, &one.likely, row_of.get(&one.landmark).copied()))
+            .collect();
+        for landmark in self.glimpses.seen(picture.picture(), &frame.observations, &expected) {
+            self.known.landmarks[landmark].glimpses.push(frame.number);
+        }
+    }
+
     /// The fruits seen so far in at least `min_views` frames, duplicates joined.
     pub fn finish(&self, min_views: usize) -> Tracks {
         let mut settled = self.clone();
+        while !settled.pictures.is_empty() {
+            settled.look_at_oldest();
+        }
         while !settled.past.is_empty() {
             settled.settle_oldest();
         }
-        tracks(&settled.known, &settled.sightings, min_views, &self.config)
+        if !settled.glimpses.are_many_missed() {
+            settled.known.landmarks.iter_mut().for_each(|one| one.glimpses.clear());
+        }
+        let found = tracks(&settled.known, &settled.sightings, min_views, &self.config);
+        Tracks { missed_boxes: settled.glimpses.missed_boxes(), ..found }
     }
 
     fn arrive(&mut self, number: i64, pose: &Pose) -> Result<()> {

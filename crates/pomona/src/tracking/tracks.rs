@@ -35,10 +35,14 @@ pub struct Tracks {
     pub radius_sigmas_m: Vec<f64>,
     /// Number of frames that saw the fruit.
     pub views: Vec<usize>,
+    /// Number of further frames that show it without a box.
+    pub glimpses: Vec<usize>,
     /// Log-odds that it is a fruit and no false box, nats.
     pub evidence: Vec<f64>,
     /// Who saw which fruit, by frame and row.
     pub sightings: Vec<Sighting>,
+    /// Boxes that the detector missed, estimated by what pictures show of fruits without one.
+    pub missed_boxes: f64,
 }
 
 /// Joins duplicates, drops what was seen too rarely.
@@ -81,10 +85,11 @@ fn once_a_frame(sightings: impl Iterator<Item = Sighting>) -> Vec<Sighting> {
 }
 
 fn report(roots: &[usize], landmarks: &[Landmark], sightings: &[Sighting], min_views: usize) -> Tracks {
-    let mut views = vec![0; landmarks.len()];
+    let mut frames: Vec<BTreeSet<i64>> = vec![BTreeSet::new(); landmarks.len()];
     for sighting in sightings {
-        views[sighting.fruit] += 1;
+        frames[sighting.fruit].insert(sighting.frame);
     }
+    let views: Vec<usize> = frames.iter().map(BTreeSet::len).collect();
     let kept: Vec<usize> = (0..landmarks.len()).filter(|&row| views[row] >= min_views.max(1)).collect();
     let row_of: BTreeMap<usize, usize> = kept.iter().enumerate().map(|(row, &old)| (old, row)).collect();
     let mut found = Tracks::default();
@@ -96,6 +101,8 @@ fn report(roots: &[usize], landmarks: &[Landmark], sightings: &[Sighting], min_v
         found.radii_m.push(landmark.radius_m());
         found.radius_sigmas_m.push(landmark.radius_m() * landmark.size.variance.sqrt());
         found.views.push(views[row]);
+        let glimpses: BTreeSet<i64> = landmark.glimpses.iter().copied().collect();
+        found.glimpses.push(glimpses.difference(&frames[row]).count());
         found.evidence.push(landmark.evidence);
     }
     let reported = sightings.iter().filter_map(|one| row_of.get(&one.fruit).map(|&fruit| Sighting { fruit, ..*one }));

@@ -4,8 +4,8 @@
 //! two opponent colours, red-green and yellow-blue. A pixel then is fruit with the probability `p_in / (p_in + p_out)`.
 //! Where fruits have the colour of leaves it is a half everywhere, and all pixels of a box count alike.
 
-use super::picture::Picture;
 use crate::camera::PixelBox;
+use crate::stereo::Picture;
 
 /// Bins along each opponent colour; 16 levels each.
 const BINS: usize = 32;
@@ -15,6 +15,9 @@ const PRIOR_PIXELS: f64 = 200.0;
 
 /// Part of a box on every side that is left out of its middle: corners show leaves.
 const MARGIN: usize = 5;
+
+/// A pixel of a greater probability is rather fruit than not.
+pub(crate) const FRUIT: f32 = 0.5;
 
 /// Probability of being fruit by colour.
 pub(crate) struct FruitColour {

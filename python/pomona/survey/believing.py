@@ -1,0 +1,80 @@
+"""Which tracks of a part are fruits: what its frames say of each, put before the core's judgement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.recording import Calibration
+from pomona.survey.seeing import Look
+from pomona.tracking import Belief, Tracks, TrackViews, believed
+
+__all__ = ["Believing"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Believing:
+    """Weighs the tracks of a part.
+
+    Attributes
+    ----------
+    calibration : Calibration
+        The left camera.
+    config : mapping
+        Values of the core's tables that differ from the defaults.
+    """
+
+    calibration: Calibration
+    config: Mapping[str, Any]
+
+    def __call__(self, tracks: Tracks, looks: Sequence[Look], session_from_camera: Array) -> Belief:
+        """Weigh tracks that these frames, from these poses (F, 4, 4), saw."""
+        row_of_frame = {look.frame: row for row, look in enumerate(looks)}
+        frames = np.array([row_of_frame[frame] for frame in tracks.frames.tolist()], np.int64)
+        poses = session_from_camera[frames]
+        depths_m = np.einsum("si,si->s", tracks.centres[tracks.fruits] - poses[:, :3, 3], poses[:, :3, 2])
+        boxes = np.cumsum([0, *(len(look.detections) for look in looks)])[frames] + tracks.rows
+        fruitness, fruit_px = (_of_boxes(looks, name) for name in ("fruitness", "fruit_px"))
+        shown_m2 = fruit_px[boxes] * depths_m**2 / (self.calibration.fx * self.calibration.fy)
+        return believed(
+            TrackViews(
+                centres=tracks.centres,
+                depths_m=_means(depths_m, tracks),
+                n_views=tracks.n_views,
+                n_glimpses=tracks.n_glimpses,
+                shown_m2=_means(shown_m2, tracks),
+                fruitness=_means(fruitness[boxes], tracks),
+                missed_boxes=tracks.missed_boxes,
+            ),
+            session_from_camera,
+            self.calibration,
+            box_fruitness=fruitness[np.isfinite(fruitness)],
+            elsewhere=np.concatenate([np.empty(0), *(look.elsewhere for look in looks if look.elsewhere is not None)]),
+            config=self.config,
+        )
+
+
+def _of_boxes(looks: Sequence[Look], name: str) -> Array:
+    """Give a number of every box of the frames, NaN where there is none."""
+    columns = (getattr(look, name) for look in looks)
+    return np.concatenate(
+        [
+            np.empty(0),
+            *(
+                np.full(len(look.detections), np.nan) if column is None else column
+                for look, column in zip(looks, columns, strict=True)
+            ),
+        ]
+    )
+
+
+def _means(values: Array, tracks: Tracks) -> Array:
+    """Mean of each track's sightings, (N,)."""
+    sums = np.bincount(tracks.fruits, weights=values, minlength=len(tracks))
+    return np.asarray(sums / np.bincount(tracks.fruits, minlength=len(tracks)))
