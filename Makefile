@@ -9,7 +9,7 @@ FUZZ_SEED ?= 1
 .DEFAULT_GOAL := help
 .PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit docs clean help
 
-all: lint test docs ## what CI runs, and the documentation
+all: lint docs test ## what CI runs
 
 $(UV):
 	$(PYTHON) -m venv .tools
@@ -33,9 +33,10 @@ test-rust: ## the core's tests
 test-python: install ## the tests of the Python face and the command line
 	$(RUN) pytest
 
-lint: install ## formatting, clippy, ruff, mypy and the stubs of the extension
+lint: install ## formatting, clippy, the core's pages, ruff, mypy and the stubs of the extension
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 	$(RUN) ruff check .
 	$(RUN) ruff format --check .
 	$(RUN) mypy

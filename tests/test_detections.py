@@ -224,7 +224,7 @@ def test_a_wrong_file_is_told_by_its_place(tmp_path, text, parts):
 def test_no_file_and_a_folder_are_told(tmp_path):
     with pytest.raises(PomonaError, match="not found, expected boxes"):
         open_detections(tmp_path / "none.csv", CAMERA, (0,))
-    with pytest.raises(PomonaError, match="found a folder, expected a file: boxes"):
+    with pytest.raises(PomonaError, match="no pictures found, expected instance masks"):
         open_detections(tmp_path, CAMERA, (0,))
     with pytest.raises(PomonaError, match=r"found a model, expected boxes: .*; a model goes with --model"):
         open_detections(tmp_path / "apples.onnx", CAMERA, (0,))

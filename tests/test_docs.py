@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -72,6 +73,23 @@ def test_tasks_that_are_named_exist(page: Path) -> None:
     named = set(re.findall(r"`make ([a-z-]+)`", page.read_text(encoding="utf-8")))
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     assert named <= targets
+
+
+@page_parameter
+def test_equations_can_be_drawn(page: Path) -> None:
+    """By the hook that draws them for the site, with the matplotlib that is locked."""
+    drawing = runpy.run_path(str(ROOT / "docs" / "hooks" / "equations.py"))
+    text = page.read_text(encoding="utf-8")
+    drawn = drawing["on_page_markdown"](text)
+    assert "$$" not in re.sub(r"```.*?```|`[^`\n]+`", "", drawn, flags=re.DOTALL)
+
+
+def test_ci_runs_what_the_guide_says() -> None:
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (said,) = re.findall(r"`.ci/run` is what CI runs: (.*), nothing else", guide)
+    run = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert re.findall(r"`(make [a-z]+)`", said) == re.findall(r"^(make [a-z]+)$", run, re.MULTILINE)
+    assert "make docs" in run
 
 
 def test_every_page_is_in_the_navigation() -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pomona import PomonaError, PomonaWarning
-from pomona.cli.scan import SUFFIXES
 from pomona.cloud import FruitCloud
 from pomona.detect.from_file import FileDetector
 from pomona.orchard import load_session
 from pomona.recording import open_recording
 from pomona.recording.check import unreadable_frames
+from pomona.scanning import SUFFIXES
 from pomona.survey import scan
 from recording_maker import FIELDS, FRUITS, make_recording
 

@@ -9,30 +9,56 @@ from pomona.errors import PomonaError, PomonaWarning
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
     from pomona.matching import Index, Match, Verdict, default_config, match
+    from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
+    from pomona.plot import draw_match, save_picture
+    from pomona.scanning import scan
+    from pomona.survey import Survey
+
+# Loaded at first use, so that `pomona --help` does not wait for numpy.
+_MODULE_OF = {
+    "FruitCloud": "pomona.cloud",
+    "Index": "pomona.matching",
+    "Match": "pomona.matching",
+    "Observations": "pomona.orchard",
+    "OrchardMap": "pomona.orchard",
+    "Session": "pomona.orchard",
+    "Survey": "pomona.survey",
+    "Verdict": "pomona.matching",
+    "Views": "pomona.cloud",
+    "Visit": "pomona.orchard",
+    "add_session": "pomona.orchard",
+    "default_config": "pomona.matching",
+    "draw_match": "pomona.plot",
+    "load_session": "pomona.orchard",
+    "match": "pomona.matching",
+    "save_picture": "pomona.plot",
+    "scan": "pomona.scanning",
+    "write_session": "pomona.orchard",
+}
 
 __all__ = [
     "FruitCloud",
     "Index",
     "Match",
+    "Observations",
+    "OrchardMap",
     "PomonaError",
     "PomonaWarning",
+    "Session",
+    "Survey",
     "Verdict",
     "Views",
+    "Visit",
     "__version__",
+    "add_session",
     "default_config",
+    "draw_match",
+    "load_session",
     "match",
+    "save_picture",
+    "scan",
+    "write_session",
 ]
-
-# Loaded at first use, so that `pomona --help` does not wait for numpy.
-_MODULE_OF = {
-    "FruitCloud": "pomona.cloud",
-    "Views": "pomona.cloud",
-    "Index": "pomona.matching",
-    "Match": "pomona.matching",
-    "Verdict": "pomona.matching",
-    "default_config": "pomona.matching",
-    "match": "pomona.matching",
-}
 
 
 def __getattr__(name: str) -> Any:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
-from pomona.cloud import FruitCloud
+from pomona.cards import as_card
+from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
 from pomona.errors import PomonaError
 from pomona.threads import capped_threads
 
 Method: TypeAlias = Literal["paper", "verified"]
 Scale: TypeAlias = Literal["metric", "free"]
-Cloud: TypeAlias = FruitCloud | ArrayLike
 Up: TypeAlias = Sequence[Sequence[float]]
 
 
@@ -32,9 +32,9 @@ class Verdict(StrEnum):
     NO_MATCH = "NoMatch"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Match:
-    """Registration, pairs and verdict of one query.
+    """Registration, pairs and verdict of one query; true where the query was found.
 
     Attributes
     ----------
@@ -81,6 +81,23 @@ class Match:
     n_map: int
     elapsed_s: float
 
+    def __bool__(self) -> bool:
+        return self.status is Verdict.FOUND
+
+    def __repr__(self) -> str:
+        if not self:
+            return f"Match({self.status}: {self.n_query} fruits, {self.n_map} in the map)"
+        found = f"{len(self.pairs)} of {self.n_query} fruits again among {self.n_map}"
+        return f"Match({self.status}: {found}, log-odds {self.log_odds:.0f})"
+
+    def _repr_html_(self) -> str:
+        facts: dict[str, object] = {"fruits": f"{self.n_query} in the query, {self.n_map} in the map"}
+        if self:
+            middle_cm = f", {100 * np.median(self.distances_m):.1f} cm apart (median)" if len(self.pairs) else ""
+            facts |= {"found again": f"{len(self.pairs)}{middle_cm}", "log-odds": f"{self.log_odds:.0f}"}
+            facts |= {"scale": f"{self.scale:.4g}", "noise": f"{100 * self.noise_m:.1f} cm per axis"}
+        return as_card(self.status, {**facts, "time": f"{self.elapsed_s:.3f} s"})
+
 
 class Index:
     """A map made ready once for many queries.
@@ -88,7 +105,7 @@ class Index:
     Parameters
     ----------
     map
-        A cloud, or (N, 3) metres.
+        A cloud, (N, 3) metres, or the name of a file with one.
     scale
         "metric" where both clouds are in metres, "free" where the ratio of their scales is unknown.
     method
@@ -114,7 +131,9 @@ class Index:
         config: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ) -> None:
-        self._map = _as_cloud(map)
+        self._unit: Unit = "free" if scale == "free" else "m"
+        self._map = as_cloud(map, self._unit)
+        self._kind = f"{method}, {scale}"
         threads = capped_threads(threads)
         overrides = json.dumps(dict(config or {}))
         try:
@@ -123,6 +142,15 @@ class Index:
             )
         except ValueError as error:
             raise PomonaError(f"map: {error}") from None
+
+    def __len__(self) -> int:
+        return len(self._map)
+
+    def __repr__(self) -> str:
+        return f"Index({len(self)} fruits, {self._kind})"
+
+    def _repr_html_(self) -> str:
+        return as_card("Index", {"fruits": len(self), "method": self._kind})
 
     def match(
         self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None, per_frame: bool = False
@@ -138,7 +166,7 @@ class Index:
         Parameters
         ----------
         query
-            A cloud, or (N, 3).
+            A cloud, (N, 3), or the name of a file with one.
         map_from_query
             (4, 4), the scale folded in.
         noise_m
@@ -158,7 +186,7 @@ class Index:
 
     def _ask(self, query: Cloud, question: Callable[[_core.MapIndex, Any], _core.Match]) -> Match:
         start = time.perf_counter()
-        cloud = _as_cloud(query)
+        cloud = as_cloud(query, self._unit)
         try:
             found = question(self._core, _arrays(cloud))
         except ValueError as error:
@@ -198,7 +226,7 @@ def match(
     Parameters
     ----------
     query, map
-        Clouds, or (N, 3) metres.
+        Clouds, (N, 3) metres, or names of files with them: .csv, .ply or .gpkg, in metres unless `scale` is "free".
     scale
         "metric" where both clouds are in metres, "free" where the ratio of their scales is unknown.
     method
@@ -231,12 +259,6 @@ def default_config() -> dict[str, Any]:
     """Return the core's settings with their defaults, a table per method."""
     defaults: dict[str, Any] = json.loads(_core.default_config())
     return defaults
-
-
-def _as_cloud(cloud: Cloud) -> FruitCloud:
-    if isinstance(cloud, FruitCloud):
-        return cloud
-    return FruitCloud(positions=np.asarray(cloud, np.float64))
 
 
 def _arrays(cloud: FruitCloud) -> _core._Arrays:

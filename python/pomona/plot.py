@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pomona.atomic import whole_file
+from pomona.cloud import as_cloud
 from pomona.errors import PomonaError
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from pomona.cloud import FruitCloud
+    from pomona.cloud import Cloud
     from pomona.matching import Match
 
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -82,7 +83,7 @@ def _principal_axes(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     return axes * np.where(largest < 0.0, -1.0, 1.0)[:, None]
 
 
-def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: ArrayLike | None = None) -> Figure:
+def draw_match(query: Cloud, map: Cloud, match: Match, *, up_in_map: ArrayLike | None = None) -> Figure:
     """Draw the query aside of the map, and a line for every pair, coloured by its probability.
 
     A query that was not found is drawn in its own frame, turned so that its row lies to the right.
@@ -90,7 +91,7 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     Parameters
     ----------
     query, map
-        The clouds that were matched.
+        The clouds that were matched, or the names of their files.
     match
         Their match.
     up_in_map
@@ -98,6 +99,8 @@ def draw_match(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     """
     from matplotlib.figure import Figure
 
+    # Nothing is said of the unit of a file that was matched already.
+    query, map = as_cloud(query, "free"), as_cloud(map, "free")
     view = view_from_above(map.positions, up_in_map)
     in_map = view.project(map.positions)
     in_query = _project_query(query.positions, match, view)

@@ -1,6 +1,6 @@
 //! Exact search among points of a fixed dimension: codes of constellations (5, 8, 11 or 14 numbers) and fruits (3).
 //!
-//! A balanced k-d tree, sixteen children to a node and up to sixteen points to a leaf ([`LANES`]). Nodes keep the tight
+//! A balanced k-d tree, sixteen children to a node and up to sixteen points to a leaf (`LANES`). Nodes keep the tight
 //! boxes of their children and leaves their points coordinate by coordinate, so that one pass of vector instructions
 //! measures all sixteen. Boxes and leaves are stored in single precision, about the middle of the points and over their
 //! reach; every candidate that survives is measured again in double precision. The bound that prunes is widened by the largest possible rounding

@@ -13,12 +13,9 @@ from pomona.likes import KEPT, SCANNED, VIDEO
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from typing import Any
 
     from pomona.recording import Recording
-    from pomona.survey import Kept, Survey
-
-SUFFIXES = (".gpkg", ".csv", ".ply")
+    from pomona.survey import Survey
 
 
 def _parts_there(output: Path) -> Iterable[Path]:
@@ -35,7 +32,9 @@ def scan(
         ..., "-o", "--output", help="Session to write: .gpkg, or its fruits as .csv or .ply; - is the standard output."
     ),
     detections: Path | None = typer.Option(
-        None, metavar="FILE", help="Boxes: our CSV, MOTChallenge text or COCO json; else detections.csv in the folder."
+        None,
+        metavar="FILE",
+        help="Boxes: CSV, MOTChallenge, COCO json, a folder of masks; else detections.csv or ids/ in RECORDING.",
     ),
     model: Path | None = typer.Option(None, metavar="ONNX", help="Detector that finds the boxes, instead of a file."),
     family: str | None = typer.Option(None, help="Family of the model, where the file does not say it."),
@@ -79,39 +78,42 @@ def scan(
     """
     from pomona.cli import scan_output
     from pomona.cli.progress import first_interrupt
-    from pomona.detect.opening import open_detector
-    from pomona.outputs import refuse_inputs
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
-    from pomona.recording.selected import selected
-    from pomona.recording.swapped import check_sides
+    from pomona.scanning import prepared, require_date, require_session_name
     from pomona.settings import Settings
-    from pomona.survey import scan as scan_recording
 
-    _require_writable(output, preview)
-    _require_date(date)
+    require_session_name(output)
+    require_date(date)
     overrides = Settings.load(config, {}).overrides
     chosen = None if topics is None else parsed_topics(topics)
     whole = open_recording(recording, calibration=calibration, topics=chosen, poses=poses)
     _require_drawable(whole, preview)
-    detector = open_detector(
-        detections, model, whole, family=family, min_score=min_score, classes=_classes(classes), tiles=tiles
+    ready = prepared(
+        whole,
+        detections=detections,
+        model=model,
+        outputs=[path for path in (output, preview) if path],
+        depth=depth,
+        odometry=odometry,
+        retrack=retrack,
+        every=every,
+        first=first,
+        last=last,
+        keep=keep,
+        config=overrides,
+        family=family,
+        min_score=min_score,
+        classes=_classes(classes),
+        tiles=tiles,
     )
-    refuse_inputs([path for path in (output, keep, preview) if path], [*whole.inputs(), detector.path])
-    opened = selected(whole, every=every, first=first, last=last)
-    looks = {"detector": detector.configuration, "depth": depth}
-    kept = None if keep is None else _kept(keep, opened, detector.path, looks)
-    check_sides(opened)
-    choices = {"odometry": odometry, "retrack": retrack}
+    opened = ready.recording
     with (
-        scan_output.scanning(opened, detector.description, told=model is not None) as progress,
+        scan_output.scanning(opened, ready.boxes.description, told=model is not None) as progress,
         first_interrupt() as stop,
     ):
-        survey = scan_recording(
-            opened, detector, depth=depth, **choices, config=overrides, keep=kept, progress=progress, stop=stop
-        )
-    configuration = {"scan": {**looks, **choices, "every": every}, **overrides}
-    written = _write(output, survey, opened, name, date, configuration, detector.path)
+        survey = ready.run(progress, stop)
+    written = ready.write(output, survey, name=name, date=date)
     _write_extras(keep, preview, opened, survey)
     found = scan_output.summary(opened, survey, written)
     if json:
@@ -126,43 +128,6 @@ def _classes(text: str | None) -> tuple[str | int, ...] | None:
     return None if text is None else tuple(int(name) if name.isdecimal() else name for name in text.split(","))
 
 
-def _kept(folder: Path, recording: Recording, detector: Path, looks: dict[str, Any]) -> Kept:
-    """Open the folder of what is kept, with all that looking at one frame depends on."""
-    from pomona import __version__
-    from pomona.survey import Kept
-    from pomona.survey.files import identity
-
-    files = identity(dict.fromkeys([*recording.inputs(), detector]))
-    return Kept(folder, {"version": __version__, "recording": str(recording.path.resolve()), "files": files, **looks})
-
-
-def _write(
-    output: Path,
-    survey: Survey,
-    recording: Recording,
-    name: str | None,
-    date: str | None,
-    configuration: dict[str, Any],
-    detector: Path,
-) -> dict[int, Path]:
-    from pomona.orchard.session import GUESSED
-    from pomona.survey import write_survey
-
-    day = date or recording.date
-    if day is None:
-        # A map takes no guessed date by accident: `map add` asks for --date where the session says so.
-        configuration = {**configuration, "scan": {**configuration["scan"], "date": GUESSED}}
-    return write_survey(
-        output,
-        survey,
-        recording,
-        name=name or recording.name,
-        date=day or _guessed_date(recording),
-        configuration=configuration,
-        inputs=[detector],
-    )
-
-
 def _write_extras(keep: Path | None, preview: Path | None, recording: Recording, survey: Survey) -> None:
     from pomona.cli.progress import counting
     from pomona.survey import write_stages
@@ -175,51 +140,12 @@ def _write_extras(keep: Path | None, preview: Path | None, recording: Recording,
             write_preview(preview, recording, survey, progress)
 
 
-def _require_writable(output: Path, preview: Path | None) -> None:
-    """Refuse before the work, not after it."""
-    from pomona.streams import is_stream
-
-    if output.suffix or not is_stream(output):
-        _require_suffix(output, SUFFIXES)
-    if preview is not None:
-        _require_suffix(preview, (".mp4",))
-
-
 def _require_drawable(recording: Recording, preview: Path | None) -> None:
+    from pomona.errors import PomonaError
     from pomona.survey.preview import require_preview
 
-    if preview is not None:
-        require_preview(recording)
-
-
-def _require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
-    from pomona.errors import PomonaError
-
-    if path.suffix.lower() not in suffixes:
-        raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected {', '.join(suffixes)}")
-
-
-def _require_date(date: str | None) -> None:
-    import datetime
-
-    from pomona.errors import PomonaError
-
-    try:
-        if date is not None:
-            datetime.datetime.fromisoformat(date)
-    except ValueError:
-        raise PomonaError(f"--date: found {date!r}, expected ISO 8601, for example 2024-08-09") from None
-
-
-def _guessed_date(recording: Recording) -> str:
-    """Take the day of the newest file, and say so."""
-    import datetime
-    import warnings
-
-    from pomona.errors import PomonaWarning
-
-    newest_s = max(file.stat().st_mtime for file in recording.inputs())
-    day = datetime.datetime.fromtimestamp(newest_s).date().isoformat()
-    message = f"{recording.path}: no date noted, took {day} from the age of its files; --date says it better"
-    warnings.warn(message, PomonaWarning, stacklevel=2)
-    return day
+    if preview is None:
+        return
+    if preview.suffix.lower() != ".mp4":
+        raise PomonaError(f"{preview}: found suffix {preview.suffix!r}, expected .mp4")
+    require_preview(recording)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud.fruit_cloud import FruitCloud
+from pomona.cloud.typed import as_whole, typed
 from pomona.errors import PomonaError
 from pomona.reading import shown
 
-__all__ = ["BLANKABLE", "MOST_WHOLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split"]
+__all__ = ["BLANKABLE", "MOST_WHOLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split", "typed_columns"]
 
 POSITION = ("x", "y", "z")
 COVARIANCE = ("cxx", "cyy", "czz", "cxy", "cxz", "cyz")
@@ -111,4 +112,17 @@ def split(cloud: FruitCloud) -> dict[str, Any]:
         if name in NUMBERS or name == "id":
             raise PomonaError(f"extras: found the name {name!r}, expected one that no column of ours has")
         columns[name] = column
+    return columns
+
+
+def typed_columns(cloud: FruitCloud) -> dict[str, Any]:
+    """Take a cloud apart as `split` does, text that is numbers as numbers; an id stays the name that it is.
+
+    Ids become numbers only where all are whole and none is written in another way.
+    """
+    columns = {
+        name: column if isinstance(column, np.ndarray) else typed(column) for name, column in split(cloud).items()
+    }
+    if cloud.ids is not None:
+        columns["id"] = as_whole(cloud.ids) or list(cloud.ids)
     return columns

@@ -10,6 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pomona.cards import as_card
+from pomona.cloud.facts import facts
 from pomona.errors import PomonaError
 
 __all__ = ["FruitCloud", "Unit", "Views"]
@@ -43,7 +45,7 @@ class Views:
         return len(self.frames)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FruitCloud:
     """Sparse landmarks of one visit, one row a fruit, in the session's own frame of reference.
 
@@ -100,6 +102,12 @@ class FruitCloud:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def __repr__(self) -> str:
+        return f"FruitCloud({', '.join(f'{name}: {value}' for name, value in facts(self).items())})"
+
+    def _repr_html_(self) -> str:
+        return as_card("FruitCloud", facts(self))
 
     @classmethod
     def read(cls, path: str | Path, *, unit: Unit = "m") -> FruitCloud:
@@ -167,6 +175,32 @@ class FruitCloud:
             covariances=None if self.covariances is None else linear @ self.covariances @ linear.T,
             diameters_m=None if self.diameters_m is None else self.diameters_m * scale,
         )
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame`, one row a fruit, with the columns of the file; numbers are numbers.
+
+        Raises
+        ------
+        PomonaError
+            When pandas is not installed.
+        """
+        from pomona.cloud.columns import typed_columns
+        from pomona.data_frames import to_pandas
+
+        return to_pandas(typed_columns(self))
+
+    def to_geopandas(self) -> Any:
+        """Return a `geopandas.GeoDataFrame` of the same columns, with the positions as points in local metres.
+
+        Raises
+        ------
+        PomonaError
+            When GeoPandas is not installed.
+        """
+        from pomona.cloud.columns import typed_columns
+        from pomona.data_frames import to_geopandas
+
+        return to_geopandas(typed_columns(self), self.positions)
 
     def label(self, row: int) -> str:
         """Return the id of a row, the row number where there are no ids."""

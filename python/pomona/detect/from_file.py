@@ -69,6 +69,11 @@ class FileDetector:
         return all(found.ids is not None for found in self.by_frame.values())
 
     @property
+    def inputs(self) -> list[Path]:
+        """The file."""
+        return [self.path]
+
+    @property
     def configuration(self) -> dict[str, Any]:
         """What it reads, for a session's provenance."""
         return {"detections": str(self.path.resolve())}

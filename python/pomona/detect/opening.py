@@ -1,22 +1,37 @@
-"""From what the user has, boxes or a model, to a detector."""
+"""From what the user has, boxes, masks or a model, to a detector."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, Unpack
 
+from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
+from pomona.detect.masks import MaskDetector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
 
-if TYPE_CHECKING:
-    from pomona.detect.onnx import OnnxDetector
+__all__ = ["FoundBoxes", "ModelSettings", "open_detections", "open_detector"]
 
-__all__ = ["ModelSettings", "open_detections", "open_detector"]
+IN_FOLDER = ("detections.csv", "ids")
+"""Boxes, or else instance masks, that lie in the folder of a recording."""
 
-IN_FOLDER = "detections.csv"
-"""Boxes that lie in the folder of a recording."""
+
+class FoundBoxes(Detector, Protocol):
+    """A detector that says what it is."""
+
+    @property
+    def inputs(self) -> list[Path]:
+        """The files that its boxes depend on."""
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """What it is, for a session's provenance, JSON values."""
+
+    @property
+    def description(self) -> str:
+        """What it is, in one line for people."""
 
 
 class ModelSettings(TypedDict, total=False):
@@ -32,26 +47,28 @@ class ModelSettings(TypedDict, total=False):
     threads: int | None
 
 
-def open_detections(path: str | Path, calibration: Calibration, numbers: Sequence[int]) -> FileDetector:
-    """Open a file of boxes or tracks of any kind that `FileDetector.read` knows; it is told by what is in it."""
-    return FileDetector.read(Path(path), calibration, numbers)
+def open_detections(path: str | Path, calibration: Calibration, numbers: Sequence[int]) -> FileDetector | MaskDetector:
+    """Open a file of boxes or tracks of any kind that `FileDetector.read` knows, told by what is in it; or masks.
+
+    A folder is one of instance masks.
+    """
+    path = Path(path)
+    return MaskDetector.open(path, calibration) if path.is_dir() else FileDetector.read(path, calibration, numbers)
 
 
 def open_detector(
     detections: Path | None, model: Path | None, recording: Recording, **settings: Unpack[ModelSettings]
-) -> FileDetector | OnnxDetector:
-    """Open what finds the fruits of a recording: a file of boxes, or a model.
-
-    Both have a `path`, a `description` in one line for people, and a `configuration` for a session's provenance.
+) -> FoundBoxes:
+    """Open what finds the fruits of a recording: a file of boxes, a folder of instance masks, or a model.
 
     Parameters
     ----------
     detections : Path or None
-        File of boxes.
+        File of boxes, or folder of masks.
     model : Path or None
         ONNX file.
     recording : Recording
-        Where neither is given, its folder may have a `detections.csv`.
+        Where neither is given, its folder may have a `detections.csv`, or else masks in `ids/`.
     **settings
         Of the model.
 
@@ -77,7 +94,11 @@ def open_detector(
 
 
 def _boxes_of(detections: Path | None, recording: Recording) -> Path:
-    path = detections or recording.path / IN_FOLDER
-    if detections is None and not path.is_file():
-        raise PomonaError(f"{path}: not found, expected boxes there, or --detections FILE or --model FILE")
-    return path
+    if detections is not None:
+        return detections
+    places = [recording.path / name for name in IN_FOLDER]
+    for place in places:
+        if place.exists():
+            return place
+    expected = "boxes there, masks in ids/, or --detections FILE or --model FILE"
+    raise PomonaError(f"{places[0]}: not found, expected {expected}")

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
+from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.orchard.cells import finite_json
 from pomona.orchard.opening import snapshot
@@ -48,7 +50,7 @@ class Visit:
     noise_m: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Observations:
     """What all sessions saw of all fruits, (K,) rows in order of fruit and date.
 
@@ -56,8 +58,8 @@ class Observations:
     ----------
     fruit_ids : (K,) int64
         Identity in the map.
-    sessions : tuple of K str
-        Name of the session.
+    sessions, dates : tuple of K str
+        Name and date of the session.
     labels : tuple of K str or None
         The session's own name of the fruit.
     positions_in_map : (K, 3) float64
@@ -70,10 +72,42 @@ class Observations:
 
     fruit_ids: NDArray[np.int64]
     sessions: tuple[str, ...]
+    dates: tuple[str, ...]
     labels: tuple[str | None, ...]
     positions_in_map: NDArray[np.float64]
     diameters_m: NDArray[np.float64]
     probabilities: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.fruit_ids)
+
+    def __repr__(self) -> str:
+        n_fruits, n_sessions = len(set(self.fruit_ids.tolist())), len(set(self.sessions))
+        return f"Observations({len(self)} of {n_fruits} fruits in {n_sessions} sessions)"
+
+    def columns(self) -> dict[str, Any]:
+        """Return them as a long table: fruit, session, date, label, x, y, z, diameter_m, probability."""
+        return {
+            "fruit": self.fruit_ids,
+            "session": self.sessions,
+            "date": self.dates,
+            "label": self.labels,
+            **dict(zip("xyz", self.positions_in_map.T, strict=True)),
+            "diameter_m": self.diameters_m,
+            "probability": self.probabilities,
+        }
+
+    def to_pandas(self) -> Any:
+        """Return `columns` as a `pandas.DataFrame`; `PomonaError` when pandas is not installed."""
+        from pomona.data_frames import to_pandas
+
+        return to_pandas(self.columns())
+
+    def to_geopandas(self) -> Any:
+        """Return `columns` as a `geopandas.GeoDataFrame` of points; `PomonaError` when it is not installed."""
+        from pomona.data_frames import to_geopandas
+
+        return to_geopandas(self.columns(), self.positions_in_map)
 
 
 class OrchardMap:
@@ -94,6 +128,14 @@ class OrchardMap:
         self.path = Path(path)
         with snapshot(self.path) as (_, kind):
             self.kind = kind
+
+    def __repr__(self) -> str:
+        return f"OrchardMap({str(self.path)!r}, {self.kind})"
+
+    def _repr_html_(self) -> str:
+        visits = self.visits()
+        rows = [(visit.name, visit.date, visit.n_fruits, visit.n_matched) for visit in visits]
+        return as_table(f"{self.path}: {self.kind}", ("visit", "date", "fruits", "known before"), rows)
 
     def fruits(self) -> FruitCloud:
         """Return every fruit where it was last seen, with its identity as id."""
@@ -120,12 +162,14 @@ class OrchardMap:
         names = ("fruit_id", "session_id", "label", "geom", "diameter_m", "match_probability")
         in_order = "JOIN sessions s ON s.id = session_id ORDER BY fruit_id, s.date, s.id"
         with snapshot(self.path) as (connection, _):
-            sessions = dict(zip(*columns_of(connection, "sessions", ("id", "name")), strict=True))
+            ids, names_of, dates_of = columns_of(connection, "sessions", ("id", "name", "date"))
             fruit_ids, seen_by, labels, geoms, *numbers = columns_of(connection, "observations", names, in_order)
+        sessions, dates = dict(zip(ids, names_of, strict=True)), dict(zip(ids, dates_of, strict=True))
         diameters_m, probabilities = (np.array(column, dtype=np.float64) for column in numbers)
         return Observations(
             fruit_ids=np.array(fruit_ids, dtype=np.int64),
             sessions=tuple(sessions[session_id] for session_id in seen_by),
+            dates=tuple(dates[session_id] for session_id in seen_by),
             labels=tuple(labels),
             positions_in_map=geopackage.points_of(geoms),
             diameters_m=diameters_m,

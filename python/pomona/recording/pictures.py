@@ -21,6 +21,7 @@ __all__ = [
     "picture_size",
     "read_colour",
     "read_depth",
+    "read_numbers",
 ]
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -97,6 +98,18 @@ def read_depth(path: Path, calibration: Calibration) -> NDArray[np.float32]:
         raise PomonaError(f"{path}: found {bits}-bit pixels, expected 16 bit: depth in {calibration.depth_unit_m:g} m")
     _require_size(path, picture, calibration)
     return picture.astype(np.float32) * np.float32(calibration.depth_unit_m)
+
+
+def read_numbers(path: Path, calibration: Calibration) -> NDArray[np.uint8 | np.uint16]:
+    """Read a picture of one channel whose pixels are numbers, (H, W), of 8 or 16 bits."""
+    import cv2
+
+    picture = _decode(path, cv2.IMREAD_UNCHANGED, calibration.size_px)
+    if picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
+        bits, channels = 8 * picture.dtype.itemsize, 1 if picture.ndim == 2 else picture.shape[2]
+        raise UnreadablePictureError(f"{path}: found {channels} channels of {bits} bits, expected one of 8 or 16 bits")
+    _require_size(path, picture, calibration)
+    return picture
 
 
 def decoded_picture(

@@ -7,7 +7,7 @@
 //!
 //! `m_k^2` being the squared Mahalanobis distance of an observation (Cauchy's loss: what is far off hardly pulls), `e_l` the
 //! error of a relative pose and `I_l` its information. Levenberg's and Marquardt's steps on reweighted normal equations
-//! ([`normal`]), points eliminated, poses in a folded order ([`ordering`]) solved within their envelope ([`envelope`]):
+//! (`normal`), points eliminated, poses in a folded order (`ordering`) solved within their envelope (`envelope`):
 //! time and memory grow with the length of the drive, not with its cube. One thread, no random numbers.
 //!
 //! The same adjustment serves a window of stereo keyframes and the fruits of a whole session; [`locate`] finds the pose

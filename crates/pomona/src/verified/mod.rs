@@ -1,14 +1,14 @@
 //! The verified method: seeds propose poses, the fruits around them decide.
 //!
 //! 1. Seeds of four fruits, their metric codes (invariant ones where the scale is free), near-tie labelings included,
-//!    find candidates in the map ([`seeds`], [`codes`], [`search`]).
+//!    find candidates in the map (`seeds`, `codes`, `search`).
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
-//!    local density, with an early exit ([`proposal`], [`vertical`]); the best are refined ([`hypothesis`]).
-//! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement ([`growth`]).
-//! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach ([`acceptance`]).
-//! 5. Where no constellation survives the noise, the outline of the clouds may still tell ([`outline`]).
-//! 6. What is reported is settled: noise and share from distances alone ([`scatter`]), one-to-one pairs with
-//!    probabilities ([`association`]) and patches fitted to them, in turns ([`settlement`]).
+//!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
+//! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
+//! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`).
+//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`outline`).
+//! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
+//!    probabilities (`association`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
 mod answer;

@@ -103,6 +103,11 @@ class OnnxDetector:
         return self.network.path
 
     @property
+    def inputs(self) -> list[Path]:
+        """The file."""
+        return [self.path]
+
+    @property
     def configuration(self) -> dict[str, Any]:
         """What it runs with, for a session's provenance."""
         classes = self.selection.classes

@@ -1,0 +1,38 @@
+"""What may stand where a cloud is asked for."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TypeAlias
+
+from numpy.typing import ArrayLike
+
+from pomona.cloud.fruit_cloud import FruitCloud, Unit
+
+__all__ = ["Cloud", "as_cloud"]
+
+Cloud: TypeAlias = FruitCloud | ArrayLike | PathLike[str]
+"""Fruits, (N, 3) metres, or the name of a file with them: .csv, .ply or .gpkg."""
+
+
+def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
+    """Take a cloud for itself, read it where it is the name of a file, and an array as positions.
+
+    Parameters
+    ----------
+    cloud : FruitCloud, array_like, str or Path
+        The fruits.
+    unit : {"m", "cm", "mm", "free"}
+        Of the coordinates, where it is a file; arrays are taken as they are.
+
+    Raises
+    ------
+    PomonaError
+        The file or the array is wrong.
+    """
+    if isinstance(cloud, FruitCloud):
+        return cloud
+    if isinstance(cloud, str | PathLike):
+        return FruitCloud.read(Path(cloud), unit=unit)
+    return FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there

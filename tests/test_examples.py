@@ -1,0 +1,35 @@
+"""The notebooks run, and show what they say that they show."""
+
+import contextlib
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from notebook import executed
+
+ROOT = Path(__file__).parent.parent
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+MOST_BYTES = 200_000
+
+
+def texts_of(notebook: dict[str, Any]) -> list[list[str]]:
+    """What the cells print and answer, as text without its numbers, which may become better; pictures are not read."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    texts = [["".join(shown.get("text") or shown["data"]["text/plain"]) for shown in cell["outputs"]] for cell in cells]
+    return [[re.sub(r"[-\d.\s]+", " ", text) for text in shown] for shown in texts]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
+def test_a_notebook_runs_and_shows_what_it_keeps(path: Path, tmp_path: Path) -> None:
+    with contextlib.chdir(tmp_path):
+        again = executed(path)
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    assert texts_of(again) == texts_of(kept), f"stale: run python tests/notebook.py {path}"
+    assert path.stat().st_size < MOST_BYTES
+
+
+def test_there_is_a_notebook_of_the_first_steps() -> None:
+    assert [path.name for path in NOTEBOOKS] == ["first_steps.ipynb"]

@@ -1,0 +1,135 @@
+"""What people meet who type `import pomona`: short answers, files where clouds are, tables for their own tools."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pomona
+from pomona import FruitCloud, Index, Match, OrchardMap, PomonaError
+from pomona.synth.clouds import scene_pair
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def visits(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two visits as files."""
+    folder, pair = tmp_path_factory.mktemp("visits"), scene_pair("base", 7)
+    pair.query.write(folder / "query.csv")
+    pair.map.write(folder / "map.csv")
+    return folder / "query.csv", folder / "map.csv"
+
+
+@pytest.fixture(scope="module")
+def match(visits: tuple[Path, Path]) -> Match:
+    return pomona.match(*visits)
+
+
+def test_names_of_files_are_clouds(visits: tuple[Path, Path], match: Match) -> None:
+    query, map = (FruitCloud.read(path) for path in visits)
+    read = pomona.match(query, map)
+    np.testing.assert_array_equal(match.pairs, read.pairs)
+    np.testing.assert_array_equal(Index(str(visits[1])).match(str(visits[0])).pairs, read.pairs)
+    index, pose = Index(visits[1]), match.map_from_query
+    np.testing.assert_array_equal(index.pairs_under(visits[0], pose).pairs, index.pairs_under(query, pose).pairs)
+    figure = pomona.draw_match(visits[0], visits[1], match)
+    assert figure.get_suptitle().startswith("Found")
+
+
+def test_a_file_of_unknown_scale_is_read_as_it_is(visits: tuple[Path, Path], tmp_path: Path) -> None:
+    query = FruitCloud.read(visits[0])
+    (tmp_path / "sfm.csv").write_text("x,y,z\n" + "\n".join(f"{x},{y},{z}" for x, y, z in 1000 * query.positions))
+    found = pomona.match(tmp_path / "sfm.csv", visits[1], scale="free")  # a warning of the unit would be an error here
+    assert found
+    assert found.scale == pytest.approx(0.001, rel=0.01)
+
+
+def test_a_file_that_is_not_there_is_told() -> None:
+    with pytest.raises(PomonaError, match=r"absent\.csv: not found"):
+        pomona.match("absent.csv", np.zeros((4, 3)))
+
+
+def test_a_match_is_true_where_it_was_found(match: Match, visits: tuple[Path, Path]) -> None:
+    assert match
+    assert not pomona.match(np.zeros((2, 3)), visits[1])
+
+
+def test_short_answers(match: Match, visits: tuple[Path, Path], tmp_path: Path) -> None:
+    cloud, index = FruitCloud.read(visits[1]), Index(visits[1])
+    orchard = tmp_path / "orchard.gpkg"
+    pomona.add_session(orchard, pomona.load_session(visits[1], date="2024-08-09"))
+    whole = OrchardMap(orchard)
+    assert re.fullmatch(r"Match\(Found: \d+ of \d+ fruits again among \d+, log-odds \d+\)", repr(match))
+    assert re.fullmatch(r"Match\(TooFew: 2 fruits, \d+ in the map\)", repr(index.match(np.zeros((2, 3)))))
+    assert repr(cloud).startswith(f"FruitCloud(fruits: {len(cloud)}, extent: ")
+    assert repr(FruitCloud(np.zeros((0, 3)))) == "FruitCloud(fruits: 0)"
+    assert repr(index) == f"Index({len(cloud)} fruits, verified, metric)"
+    assert repr(whole) == f"OrchardMap('{orchard}', map)"
+    assert repr(whole.observations()) == f"Observations({len(cloud)} of {len(cloud)} fruits in 1 sessions)"
+    for answer in (match, cloud, index, whole):
+        assert len(repr(answer)) < 200
+        html = answer._repr_html_()
+        assert html.startswith("<table>")
+        assert html.count("<tr>") == html.count("</tr>") >= 2
+
+
+def test_names_of_strangers_do_nothing_in_a_notebook() -> None:
+    cloud = FruitCloud(np.zeros((1, 3)), extras={"<script>alert(1)</script>": ("a",)})
+    assert "<script>" not in cloud._repr_html_()
+
+
+def test_every_public_part_is_documented_and_there() -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^::: pomona\.(\w+)$", page, re.MULTILINE))
+    assert documented == set(pomona.__all__) - {"__version__"}
+    assert all(hasattr(pomona, name) for name in pomona.__all__)
+    assert {"scan", "OrchardMap", "match", "Survey"} <= documented
+
+
+def test_tables_without_their_libraries_are_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, match: Match, visits: tuple[Path, Path]
+) -> None:
+    cloud = FruitCloud.read(visits[1])
+    for name in ("pandas", "geopandas"):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(PomonaError, match=f"^{name}: not installed, expected it here: pip install {name}$"):
+            getattr(cloud, f"to_{name}")()
+
+
+def test_tables_for_pandas_have_numbers_for_numbers(full_cloud: FruitCloud) -> None:
+    pytest.importorskip("pandas")
+    table = full_cloud.to_pandas()
+    assert list(table["id"]) == list(full_cloud.ids or ())
+    assert table["n_views"].dtype == np.int64
+    np.testing.assert_array_equal(table[["x", "y", "z"]].to_numpy(), full_cloud.positions)
+
+
+def test_tables_for_geopandas_have_points_in_local_metres(full_cloud: FruitCloud) -> None:
+    pytest.importorskip("geopandas")
+    table = full_cloud.to_geopandas()
+    assert [point.z for point in table.geometry] == full_cloud.positions[:, 2].tolist()
+    assert table.crs.to_wkt().startswith("ENGCRS")
+
+
+def test_observations_are_a_long_table(visits: tuple[Path, Path], tmp_path: Path) -> None:
+    orchard = tmp_path / "orchard.gpkg"
+    for path, date in zip(reversed(visits), ("2024-08-09", "2024-08-28"), strict=True):
+        assert pomona.add_session(orchard, pomona.load_session(path, date=date)).is_added
+    columns = OrchardMap(orchard).observations().columns()
+    assert list(columns) == ["fruit", "session", "date", "label", "x", "y", "z", "diameter_m", "probability"]
+    assert len({len(column) for column in columns.values()}) == 1
+    assert set(zip(columns["session"], columns["date"], strict=True)) == {
+        ("map", "2024-08-09"),
+        ("query", "2024-08-28"),
+    }
+    assert np.isnan(columns["probability"]).any()
+    assert (columns["probability"] > 0.5).any()
+
+
+def test_importing_pomona_loads_no_numpy() -> None:
+    code = "import sys, pomona; dir(pomona); assert 'numpy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
