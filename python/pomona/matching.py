@@ -140,7 +140,7 @@ class Index:
             self._core = _core.MapIndex(
                 _arrays(self._map), method=method, scale=scale, config=overrides, threads=threads
             )
-        except ValueError as error:
+        except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"map: {error}") from None
 
     def __len__(self) -> int:
@@ -189,7 +189,7 @@ class Index:
         cloud = as_cloud(query, self._unit)
         try:
             found = question(self._core, _arrays(cloud))
-        except ValueError as error:
+        except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"query: {error}") from None
         return Match(
             status=Verdict(found.status),

@@ -13,6 +13,9 @@ from pomona.errors import PomonaError
 from pomona.likes import Like, database_of, is_like
 from pomona.streams import is_device, is_standard_output, is_stream
 
+JOURNALS = ("-journal", "-wal", "-shm")
+"""What SQLite calls its files beside a map: they hold what a killed writer left, and SQLite removes them."""
+
 __all__ = ["Output", "refuse_database", "refuse_inputs", "require_outputs"]
 
 
@@ -87,6 +90,8 @@ def refuse_database(path: Path) -> None:
     PomonaError
         When there is one.
     """
+    if path.name.endswith(JOURNALS):
+        raise PomonaError(f"{path}: is the name of a database's journal, which no output takes: take another name")
     found = database_of(path)
     if found == "map":
         raise PomonaError(f"{path}: is an orchard map, which no output replaces: take another name")

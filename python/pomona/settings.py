@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 _CALL_TABLE = "match"
 
 MOST_NAME = 80
+MOST_LINE = 1000
+"""Characters of a line: a name of a hundred thousand dots would keep the parser busy for minutes."""
+
 """Characters of an unknown name that a message repeats."""
 
 
@@ -89,7 +92,11 @@ def _defaults_of_match() -> dict[str, Any]:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_text(path, "settings in TOML"))
+        text = read_text(path, "settings in TOML")
+        for number, line in enumerate(text.splitlines(), start=1):
+            if len(line) > MOST_LINE:
+                raise PomonaError(f"{path}: line {number}: found {len(line)} characters, expected at most {MOST_LINE}")
+        return tomllib.loads(text)
     except ValueError as error:
         raise PomonaError(f"{path}: is not TOML: {error}") from None
     except RecursionError:

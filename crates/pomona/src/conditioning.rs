@@ -13,6 +13,7 @@
 //! 5. What is left is moved to its mean; where the scale is free it is also scaled to one spacing.
 
 use crate::cloud::{FruitCloud, Views};
+use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use crate::matching::{Match, Pair, Registration};
 use crate::verified::CellHasher;
@@ -99,9 +100,20 @@ impl Conditioned {
             || (1.0 / LARGEST.sqrt()..LARGEST.sqrt()).contains(&(self.spacing / other.spacing))
     }
 
-    /// A length of the caller's in the unit.
-    pub(crate) fn length(&self, length_m: f64) -> f64 {
-        length_m / self.unit
+    /// The noise of two visits to this map in the unit.
+    ///
+    /// # Errors
+    /// It exceeds the spacing: then any fruit could be any of its neighbours.
+    pub(crate) fn noise(&self, noise_m: Option<f64>) -> Result<Option<f64>> {
+        let most_m = self.spacing * self.unit;
+        match noise_m {
+            Some(found) if !self.rows.is_empty() && found > most_m => {
+                let reason =
+                    format!("found {found} m, expected at most {most_m:.3} m, the spacing of the map's fruits");
+                Err(Error::Setting { name: "noise_m", reason })
+            }
+            _ => Ok(noise_m.map(|noise_m| noise_m / self.unit)),
+        }
     }
 
     /// A pose between the callers' frames, between the conditioned ones; `self` is the map.

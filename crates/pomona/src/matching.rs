@@ -156,7 +156,7 @@ impl MapIndex {
         query.validate()?;
         request.validate()?;
         let query = Conditioned::new(query, self.scale);
-        let request = Request { noise_m: request.noise_m.map(|noise_m| self.map.length(noise_m)), ..*request };
+        let request = Request { noise_m: self.map.noise(request.noise_m)?, ..*request };
         let found = self.found(&query, &request)?;
         Ok(self.restored(&query, found))
     }
@@ -207,7 +207,7 @@ impl MapIndex {
         };
         let query = Conditioned::new(query, self.scale);
         let pose = self.map.conditioned_pose(&query, pose);
-        let request = Request { noise_m: noise_m.map(|noise_m| self.map.length(noise_m)), ..request };
+        let request = Request { noise_m: self.map.noise(noise_m)?, ..request };
         let config = &self.config.verified;
         let found = crate::verified::pairs_under(prepared, &self.map.cloud, &query.cloud, &pose, &request, config);
         Ok(self.restored(&query, found))

@@ -64,9 +64,14 @@ def map_add(
     1: not found in the map, which stays as it was. 2: wrong input.
     """
     from pomona.cli.progress import working
+    from pomona.errors import PomonaError
     from pomona.orchard import add_session, load_session
     from pomona.settings import Settings
 
+    if unit is Unit.free and not orchard.exists():
+        raise PomonaError(
+            f"{orchard}: is not there, and a map starts in metres: found --unit free, expected m, cm or mm"
+        )
     visit = load_session(session, date=date, unit=None if unit is None else unit.value)
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None

@@ -211,7 +211,7 @@ def _array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) ->
     """Return `values` as a contiguous array of `dtype`; None in `shape` takes any length."""
     try:
         array = np.ascontiguousarray(values, dtype=dtype)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None
     fits = array.ndim == len(shape) and all(
         want is None or found == want for found, want in zip(array.shape, shape, strict=True)

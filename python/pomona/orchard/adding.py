@@ -137,6 +137,8 @@ def _add(
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
         known = fruits_in_map(connection)
+        if not len(known):
+            raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)
         if found.status.value != "Found":
             return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
@@ -195,8 +197,8 @@ def _require_new(connection: sqlite3.Connection, session: Session) -> None:
 
 
 def _is_newest(connection: sqlite3.Connection, date: str) -> bool:
-    (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
-    return bool(date >= newest)
+    (dates,) = columns_of(connection, "sessions", ("date",))
+    return bool(date >= max(dates))
 
 
 def _move_fruits(

@@ -115,10 +115,12 @@ pub(crate) fn search(
     let answer = search.answer(findings, map, query, Some(search.least_told()), stages);
     // Where the noise is heavy, pairs say little even under the true pose: then the outline may still tell.
     let unconfirmed = answer.verdict == Verdict::NoMatch && answer.stages.iter().any(|stage| stage.0 == "settled_nats");
-    match unconfirmed.then(|| search.by_outline()).flatten() {
+    let answer = match unconfirmed.then(|| search.by_outline()).flatten() {
         Some(found) => search.answer(vec![found], map, query, None, answer.stages),
         None => answer,
-    }
+    };
+    // Under a noise that is told far too small, the right pose has no pair.
+    if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
