@@ -43,6 +43,7 @@ def match(
     per_frame: bool | None = per_frame_option,
     threads: int | None = threads_option,
     unit: Unit | None = typer.Option(None, help="Unit of the coordinates in the files; m, or free with --scale free."),
+    query_unit: Unit | None = typer.Option(None, help="Unit of the coordinates of QUERY, where it is another."),
     output: Annotated[Path | None, Writes(PAIRS)] = typer.Option(
         None, "-o", "--output", help="Write the pairs here as CSV; - is the standard output."
     ),
@@ -68,7 +69,7 @@ def match(
 
         require_picture_name(plot)
     read_unit = unit or (Unit.free if settings.call["scale"] == Scale.free else Unit.m)
-    in_query = FruitCloud.read(query, unit=read_unit.value)
+    in_query = FruitCloud.read(query, unit=(query_unit or read_unit).value)
     in_map = FruitCloud.read(map, unit=read_unit.value)
     with working(f"matching {len(in_query)} fruits with {len(in_map)}"):
         answer = settings.match(in_query, in_map)
