@@ -114,7 +114,7 @@ def test_observations_are_a_long_table(pomona: Pomona, orchard: Path) -> None:
     of_first = [row for row in rows if row["fruit"] == rows[0]["fruit"]]
     assert [row["date"] for row in of_first] == ["2024-08-09", "2024-08-28"]
     assert [row["probability"] != "" for row in of_first] == [False, True]
-    assert all(float(row["diameter_m"]) == 0.07 for row in rows)
+    assert [float(row["diameter_m"]) for row in rows] == pytest.approx([0.07] * 80)
     code, _, err = pomona("export", output, "--observations", "-o", orchard.with_name("again.csv"))
     assert code == 2
     assert "found a cloud, expected a session or a map" in err
