@@ -360,3 +360,20 @@ def test_frame_by_frame_needs_to_know_who_saw_what(run_here: Run, visits: Path, 
     matches = json.loads(done.stdout)["matches"]
     assert len({match["query"] for match in matches}) == len({match["map"] for match in matches}) == len(matches)
     assert np.mean([match["query"] == match["map"] for match in matches]) > 0.7
+
+
+def test_a_query_may_have_a_unit_of_its_own(visits: Path, run_here: Run) -> None:
+    metres = run_here("match", visits / "query.csv", visits / "map.csv", "--json")
+    mixed = run_here("match", visits / "query_mm.csv", visits / "map.csv", "--query-unit", "mm", "--json")
+    assert mixed.returncode == 0, mixed.stderr
+    assert mixed.stderr == ""
+    np.testing.assert_allclose(json.loads(mixed.stdout)["map_from_query"], json.loads(metres.stdout)["map_from_query"])
+
+
+def test_draws_the_view_that_was_asked_for(visits: Path, run_here: Run, tmp_path: Path) -> None:
+    for view in ("row", "lines"):
+        done = run_here(
+            "match", visits / "query.csv", visits / "map.csv", "--plot", tmp_path / f"{view}.svg", "--plot-view", view
+        )
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "row.svg").read_bytes() != (tmp_path / "lines.svg").read_bytes()

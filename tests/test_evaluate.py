@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from hypothesis import strategies as st
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.evaluate import PairScore, score_pairs
+from pomona.evaluate import PairScore, score_pairs, score_placed_pairs
 from pomona.pairs import read_pairs
+from pomona.scanning import scan as pomona_scan
+from recording_maker import make_recording
 
 QUERY_TRUTH = ("a", "b", "c", "only-query")
 MAP_TRUTH = ("c", "only-map", "a", "b")
@@ -108,3 +111,91 @@ def test_refuses_what_are_no_pairs(
 def test_refuses_a_missing_file(tmp_path: Path, clouds: tuple[FruitCloud, FruitCloud]) -> None:
     with pytest.raises(PomonaError, match="not found, expected pairs"):
         read_pairs(tmp_path / "none.csv", *clouds)
+
+
+@pytest.fixture
+def seen(tmp_path: Path) -> Path:
+    """Two scans of six fruits, which call them by numbers of their own; the true fruits of both dates."""
+    rng = np.random.default_rng(3)
+    true = rng.uniform([0, 0, 0], [3, 1, 2], (60, 3))
+    grown = true + rng.normal(0, 0.05, true.shape)
+    for name, positions in (("truth_query", grown), ("truth_map", true)):
+        FruitCloud(positions, ids=tuple(f"apple {row}" for row in range(60))).write(tmp_path / f"{name}.csv")
+    order = rng.permutation(60)
+    found = grown[order] + rng.normal(0, 0.003, true.shape)
+    found[0] = [9.0, 9.0, 9.0]  # a false fruit
+    FruitCloud(found, ids=tuple(f"q{row}" for row in range(60))).write(tmp_path / "query.csv")
+    FruitCloud(true + 0.002, ids=tuple(f"m{row}" for row in range(60))).write(tmp_path / "map.csv")
+    right = [f"q{row},m{order[row]}" for row in range(1, 41)]
+    (tmp_path / "pairs.csv").write_text("\n".join(["query,map", "q0,m0", f"q50,m{order[51]}", *right]) + "\n")
+    return tmp_path
+
+
+Pomona = Callable[..., tuple[int, str, str]]
+
+
+def judged(pomona: Pomona, seen: Path, *flags: object) -> dict[str, float]:
+    code, out, err = pomona(
+        "evaluate", "match", seen / "query.csv", seen / "map.csv", seen / "pairs.csv", "--json", *flags
+    )
+    assert code == 0, err
+    return json.loads(out)
+
+
+def truths(seen: Path) -> list[object]:
+    return ["--truth", seen / "truth_query.csv", "--truth", seen / "truth_map.csv"]
+
+
+def test_judges_by_place_where_ids_say_nothing(pomona: Pomona, seen: Path) -> None:
+    score = judged(pomona, seen, *truths(seen))
+    # A pair of a false fruit is false, as is one of two different fruits.
+    assert (score["true"], score["false"], score["common"]) == (40, 2, 59)
+    assert judged(pomona, seen, *truths(seen), "--within", 0.0101)["true"] <= 40
+
+
+def test_finds_frames_of_their_own_in_the_truth(pomona: Pomona, seen: Path) -> None:
+    turn = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 1], [0, 0, 0, 1]])
+    FruitCloud.read(seen / "query.csv").transformed(turn).write(seen / "query.csv")
+    command = ("evaluate", "match", seen / "query.csv", seen / "map.csv", seen / "pairs.csv", *truths(seen))
+    code, out, err = pomona(*command)
+    assert (code, out) == (2, "")
+    assert "query.csv: found 0 of 60 fruits within 3 cm of a true one" in err
+    assert "--align" in err
+    assert judged(pomona, seen, *truths(seen), "--align")["true"] == 40
+
+
+def test_one_truth_may_be_that_of_both(pomona: Pomona, seen: Path) -> None:
+    (seen / "pairs.csv").write_text("query,map\nm3,m3\nm4,m5\n")
+    command = ("evaluate", "match", seen / "map.csv", seen / "map.csv", seen / "pairs.csv")
+    code, out, _ = pomona(*command, "--truth", seen / "truth_map.csv", "--json")
+    assert code == 0
+    assert (json.loads(out)["true"], json.loads(out)["false"]) == (1, 1)
+
+
+def test_two_fruits_at_one_true_one_are_both_right() -> None:
+    assert score_placed_pairs([(0, 0), (1, 1)], ("a", "a", ""), ("a", "b")) == PairScore(true=1, false=1, missed=0)
+    assert score_placed_pairs([(2, 0)], ("a", "a", ""), ("a", "b")) == PairScore(true=0, false=1, missed=1)
+
+
+def test_scans_without_common_ids_are_refused_and_not_scored(pomona: Pomona, seen: Path) -> None:
+    code, out, err = pomona("evaluate", "match", seen / "query.csv", seen / "map.csv", seen / "pairs.csv")
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "found no id in common, expected true ids; --truth FRUITS judges by place" in err
+
+
+def test_numbers_of_a_tracker_are_no_true_ids(pomona: Pomona, tmp_path: Path) -> None:
+    row = make_recording(tmp_path / "2024-08-09", (0.0, 0.02, 0.04, 0.06, 0.08), ids=False)
+    for name in ("a", "b"):
+        assert len(pomona_scan(row, output=tmp_path / f"{name}.gpkg").cloud) == 3
+    (tmp_path / "pairs.csv").write_text("query,map\n1,1\n")
+    code, out, err = pomona("evaluate", "match", tmp_path / "a.gpkg", tmp_path / "b.gpkg", tmp_path / "pairs.csv")
+    assert (code, out) == (2, "")
+    assert "a.gpkg: found ids that its tracker gave, expected true ids" in err
+
+
+@pytest.mark.parametrize(("flags", "said"), [(["--align"], "--align"), (["--within", 0.1], "--within")])
+def test_flags_of_the_truth_come_with_it(pomona: Pomona, seen: Path, flags: list[object], said: str) -> None:
+    code, _, err = pomona("evaluate", "match", seen / "query.csv", seen / "map.csv", seen / "pairs.csv", *flags)
+    assert code == 2
+    assert f"{said}: found without --truth FRUITS" in err

@@ -1,7 +1,9 @@
 """Fruits for other programs: CSV, PLY and GeoJSON, by the command."""
 
+import csv
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +76,7 @@ def test_geojson_says_what_gdal_must_know(session_file: Path, full_cloud: FruitC
 def test_rows_without_ids_go_by_their_number(tmp_path: Path) -> None:
     export_cloud(FruitCloud(np.zeros((2, 3))), tmp_path / "a.geojson", "geojson")
     features = json.loads((tmp_path / "a.geojson").read_text())["features"]
-    assert [feature["id"] for feature in features] == ["0", "1"]
+    assert [feature["id"] for feature in features] == [0, 1]
     export_cloud(FruitCloud(np.zeros((0, 3))), tmp_path / "a.geojson", "geojson")
     assert json.loads((tmp_path / "a.geojson").read_text())["features"] == []
 
@@ -85,3 +87,85 @@ def test_an_unknown_format_and_a_missing_folder_are_refused(tmp_path: Path) -> N
         export_cloud(cloud, tmp_path / "a.shp", "shp")  # type: ignore[arg-type]
     with pytest.raises(PomonaError, match=r"absent/a\.csv: cannot be written: No such file or directory"):
         export_cloud(cloud, tmp_path / "absent" / "a.csv", "csv")
+
+
+@pytest.fixture
+def orchard(tmp_path: Path, session_file: Path, full_cloud: FruitCloud) -> Path:
+    """A map of two visits of the same six fruits, three weeks apart."""
+    rng = np.random.default_rng(2)
+    true = rng.uniform([0, 0, 0], [4, 1, 2], (40, 3))
+    for date, moved_m in (("2024-08-09", 0.0), ("2024-08-28", 0.004)):
+        extras = {"note": tuple(map(str, range(40)))}
+        cloud = FruitCloud(true + rng.normal(0, moved_m, true.shape), diameters_m=np.full(40, 0.07), extras=extras)
+        write_session(tmp_path / f"{date}.gpkg", cloud, name=date, date=date, recording="test")
+        assert add_session(tmp_path / "orchard.gpkg", load_session(tmp_path / f"{date}.gpkg")).is_added
+    return tmp_path / "orchard.gpkg"
+
+
+Pomona = Callable[..., tuple[int, str, str]]
+
+
+def test_observations_are_a_long_table(pomona: Pomona, orchard: Path) -> None:
+    output = orchard.with_name("seen.csv")
+    assert pomona("export", orchard, "--observations", "-o", output) == (0, f"{output}: 80 observations\n", "")
+    with output.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert set(rows[0]) == {"x", "y", "z", "diameter_m", "fruit", "session", "date", "label", "probability"}
+    of_first = [row for row in rows if row["fruit"] == rows[0]["fruit"]]
+    assert [row["date"] for row in of_first] == ["2024-08-09", "2024-08-28"]
+    assert [row["probability"] != "" for row in of_first] == [False, True]
+    assert [float(row["diameter_m"]) for row in rows] == pytest.approx([0.07] * 80)
+    code, _, err = pomona("export", output, "--observations", "-o", orchard.with_name("again.csv"))
+    assert code == 2
+    assert "found a cloud, expected a session or a map" in err
+
+
+def test_numbers_are_numbers_for_gdal(pomona: Pomona, orchard: Path) -> None:
+    output = orchard.with_name("seen.geojson")
+    assert pomona("export", orchard, "--observations", "-o", output)[0] == 0
+    about = pyogrio.read_info(output)
+    types = dict(zip(about["fields"].tolist(), about["dtypes"].tolist(), strict=True))
+    assert (types["fruit"], types["probability"], types["diameter_m"]) == ("int32", "float64", "float64")
+    assert types["date"] == "datetime64[D]"
+
+
+def test_numbers_are_numbers_in_ply(tmp_path: Path) -> None:
+    extras = {
+        "whole": ("3", "-4"),
+        "share": ("0.50", ""),
+        "name": ("007", "8"),
+        "large": ("1723190400000", "1"),
+        "blank": ("", ""),
+    }
+    cloud = FruitCloud(np.zeros((2, 3)), ids=("1.5", "2"), extras=extras)
+    cloud.write(tmp_path / "a.ply")
+    header = (tmp_path / "a.ply").read_bytes().split(b"end_header")[0].decode()
+    assert "property int whole\n" in header
+    assert "property double share\n" in header
+    read = FruitCloud.read(tmp_path / "a.ply")
+    assert read.ids == cloud.ids
+    assert read.extras == {**extras, "share": ("0.5", "")}
+
+
+def test_numbers_are_numbers_in_geojson(tmp_path: Path) -> None:
+    extras = {"whole": ("3", ""), "share": ("0.50", "1e-3"), "name": ("007", "8")}
+    export_cloud(FruitCloud(np.zeros((2, 3)), ids=("7", "8"), extras=extras), tmp_path / "a.geojson", "geojson")
+    features = json.loads((tmp_path / "a.geojson").read_text())["features"]
+    assert features[0]["properties"] == {"id": 7, "whole": 3, "share": 0.5, "name": "007"}
+    assert features[1]["properties"] == {"id": 8, "whole": None, "share": 0.001, "name": "8"}
+    assert features[0]["id"] == 7
+
+
+def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, session_file: Path) -> None:
+    output = session_file.with_name("fruits.geojson")
+    assert pomona("export", session_file, "-o", output)[0] == 0
+    assert json.loads(output.read_text())["type"] == "FeatureCollection"
+    for name, flags, said in (
+        ("a.geojson", ["--to", "csv"], "found suffix '.geojson' and --to csv, expected the same or one of them"),
+        ("a.shp", [], "found suffix '.shp', expected .csv, .ply, .geojson, .json, or --to FORMAT"),
+    ):
+        code, out, err = pomona("export", session_file, "-o", session_file.with_name(name), *flags)
+        assert (code, out) == (2, "")
+        assert said in err
+        assert not session_file.with_name(name).exists()
+    assert pomona("export", session_file, "--to", "csv", "-o", session_file.with_name("fruits.txt"))[0] == 0

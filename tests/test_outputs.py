@@ -94,7 +94,7 @@ def test_an_input_is_never_replaced(pomona: Pomona, here: Path, command: str, re
         ("scan R -o fruits.csv --preview", "video.mp4"),
         ("scan R -o fruits.csv --keep", "notes"),
         ("export map.csv --to csv -o", "session.gpkg"),
-        ("export map.csv --to ply -o", "query.csv"),
+        ("export map.csv --to ply -o", "scanner.ply"),
         ("export map.csv --to geojson -o", "field.json"),
         ("synth clouds base -o", "."),
     ],

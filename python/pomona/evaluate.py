@@ -1,8 +1,8 @@
-"""Scores against truth: fruits carry the same id in both clouds where they are the same fruit."""
+"""Scores against truth: two fruits are one where they have the same true id."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pomona.errors import PomonaError
 
@@ -73,6 +73,36 @@ def score_pairs(
     """
     for side, truth in (("query", truth_in_query), ("map", truth_in_map)):
         _refuse_repeats(side, truth)
+    return _scored(pairs, truth_in_query, truth_in_map)
+
+
+def score_placed_pairs(
+    pairs: Iterable[tuple[int, int]],
+    truth_in_query: Sequence[str],
+    truth_in_map: Sequence[str],
+) -> PairScore:
+    """Compare pairs of rows with the true fruits that the rows lie at, as `pomona.truth.true_fruits` tells them.
+
+    Two rows may lie at one fruit: either is right. A row that lies at none is a false fruit, and so is every pair of
+    it.
+
+    Parameters
+    ----------
+    pairs
+        Row in the query and row in the map of each pair.
+    truth_in_query, truth_in_map
+        True id of each row, empty where it lies at no true fruit.
+
+    Raises
+    ------
+    PomonaError
+        A pair names a row that does not exist.
+    """
+    scored = _scored(pairs, truth_in_query, truth_in_map)
+    return replace(scored, false=scored.false + scored.unjudged, unjudged=0)
+
+
+def _scored(pairs: Iterable[tuple[int, int]], truth_in_query: Sequence[str], truth_in_map: Sequence[str]) -> PairScore:
     true: set[str] = set()
     false = unjudged = 0
     for query_row, map_row in pairs:

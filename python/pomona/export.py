@@ -10,12 +10,15 @@ import numpy as np
 
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud, csv_file, ply_file
+from pomona.cloud.columns import COVARIANCE, POSITION, typed_columns
 from pomona.errors import PomonaError
 
-__all__ = ["ExportFormat", "export_cloud"]
+__all__ = ["LOCAL_METRES", "SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
 
 ExportFormat = Literal["csv", "ply", "geojson"]
 
+SUFFIXES: dict[str, ExportFormat] = {".csv": "csv", ".ply": "ply", ".geojson": "geojson", ".json": "geojson"}
+"""What the name of a file says of its format."""
 
 LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
 """A frame without a place on Earth, as well-known text."""
@@ -55,21 +58,47 @@ def _write_geojson(path: Path, cloud: FruitCloud) -> None:
         "name": path.stem,
         "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
     }
-    columns: dict[str, list[Any]] = {name: list(cells) for name, cells in cloud.extras.items()}
-    if cloud.diameters_m is not None:
-        columns["diameter_m"] = [None if np.isnan(value) else value for value in cloud.diameters_m.tolist()]
-    if cloud.n_views is not None:
-        columns["n_views"] = cloud.n_views.tolist()
-    if cloud.covariances is not None:
-        columns["covariance_m2"] = cloud.covariances.tolist()
+    columns = _properties(cloud)
     with whole_file(path) as partial, partial.open("w", encoding="utf-8") as file:
         file.write(json.dumps(head)[:-1] + ', "features": [')
         for row, position in enumerate(cloud.positions.tolist()):
             feature = {
                 "type": "Feature",
-                "id": cloud.label(row),
-                "properties": {"id": cloud.label(row), **{name: cells[row] for name, cells in columns.items()}},
+                "id": columns["id"][row],
+                "properties": {name: cells[row] for name, cells in columns.items()},
                 "geometry": {"type": "Point", "coordinates": position},
             }
             file.write(("," if row else "") + "\n" + json.dumps(feature, ensure_ascii=False, allow_nan=False))
         file.write("\n]}\n")
+
+
+def _properties(cloud: FruitCloud) -> dict[str, list[Any]]:
+    """Give the columns besides the place, numbers as numbers; None is unknown."""
+    columns = typed_columns(cloud)
+    lists = {
+        name: [None if value != value else value for value in np.asarray(column).tolist()]  # nan is not itself
+        if isinstance(column, np.ndarray)
+        else column
+        for name, column in columns.items()
+        if name not in (*POSITION, *COVARIANCE)
+    }
+    if cloud.covariances is not None:
+        lists["covariance_m2"] = cloud.covariances.tolist()
+    return {"id": list(range(len(cloud))), **lists}
+
+
+def format_of(path: Path, to: ExportFormat | None) -> ExportFormat:
+    """Tell the format of a file that is to be written, by what was said or by its name.
+
+    Raises
+    ------
+    PomonaError
+        When neither tells, or they contradict each other.
+    """
+    named = SUFFIXES.get(path.suffix.lower())
+    if to is not None and named not in (to, None):
+        raise PomonaError(f"{path}: found suffix {path.suffix!r} and --to {to}, expected the same or one of them")
+    told = to or named
+    if told is None:
+        raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected {', '.join(SUFFIXES)}, or --to FORMAT")
+    return told

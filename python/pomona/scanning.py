@@ -76,7 +76,9 @@ class Scan:
         """Write what was found, with all that it was made from; see `write_survey`."""
         day = date or self.recording.date
         # A map takes no guessed date by accident: `map add` asks for --date where the session says so.
-        about = {**self.looks, **self.choices, "every": self.every, **({} if day else {"date": GUESSED})}
+        named = bool(getattr(self.boxes, "with_ids", False)) and not self.choices["retrack"]
+        about = {**self.looks, **self.choices, "every": self.every, "named": named}
+        about |= {} if day else {"date": GUESSED}
         return write_survey(
             output,
             survey,

@@ -39,7 +39,7 @@ def _as_lines(made: Demo) -> list[str]:
         f"  against the truth  {share} ({score.true} true, {score.false} false, {score.missed} missed)",
         f"  growth             {made.growth_mm:+.1f} mm in diameter, median",
         "look at",
-        f"  {made.picture}  both visits from above, a line for every fruit found again",
+        f"  {made.picture}  both visits in one frame: fruits found again, new and missed",
         f"  {made.orchard}  the map; opens in QGIS",
         f"  {made.pairs}  the pairs with their probabilities",
         "go on with",

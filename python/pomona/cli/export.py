@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pomona.cli.match_options import Unit
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Writes
-from pomona.likes import EXPORTS
+from pomona.likes import EXPORTS, Like
+
+if TYPE_CHECKING:
+    from pomona.cloud import FruitCloud
 
 
 class Format(StrEnum):
@@ -22,20 +26,38 @@ class Format(StrEnum):
     geojson = "geojson"
 
 
+def _like(given: Mapping[str, Any]) -> Like:
+    from pomona.export import format_of
+
+    return EXPORTS[format_of(given["output"], given["to"])]
+
+
 def export(
     source: Path = typer.Argument(
         metavar="SESSION_OR_MAP", help="A session or a map (.gpkg), or a cloud (.csv, .ply)."
     ),
-    to: Format = typer.Option(..., help="Format of the file to write."),
-    output: Annotated[Path, Writes(lambda given: EXPORTS[given["to"]])] = typer.Option(
+    output: Annotated[Path, Writes(_like)] = typer.Option(
         ..., "-o", "--output", help="The file to write; - is the standard output."
+    ),
+    to: Format | None = typer.Option(None, help="Format of the file to write, where its suffix does not say it."),
+    observations: bool = typer.Option(
+        False, "--observations", help="Of a session or map: a row for each fruit and visit that saw it, with the date."
     ),
     unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
 ) -> None:
     """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen."""
     from pomona.cloud import FruitCloud
-    from pomona.export import export_cloud
+    from pomona.export import export_cloud, format_of
 
-    cloud = FruitCloud.read(source, unit=unit.value)
-    export_cloud(cloud, output, to.value)
-    say(f"{output}: {len(cloud)} fruits")
+    cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
+    export_cloud(cloud, output, format_of(output, None if to is None else to.value))
+    say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
+
+
+def _observed(source: Path) -> FruitCloud:
+    from pomona.errors import PomonaError
+    from pomona.orchard import OrchardMap
+
+    if source.suffix.lower() in (".csv", ".ply"):
+        raise PomonaError(f"{source}: found a cloud, expected a session or a map (.gpkg) with --observations")
+    return OrchardMap(source).observations().cloud()

@@ -9,6 +9,7 @@ import typer
 
 from pomona.cli.match_options import (
     Method,
+    PlotView,
     Scale,
     Unit,
     call_flags,
@@ -42,10 +43,14 @@ def match(
     per_frame: bool | None = per_frame_option,
     threads: int | None = threads_option,
     unit: Unit | None = typer.Option(None, help="Unit of the coordinates in the files; m, or free with --scale free."),
+    query_unit: Unit | None = typer.Option(None, help="Unit of the coordinates of QUERY, where it is another."),
     output: Annotated[Path | None, Writes(PAIRS)] = typer.Option(
         None, "-o", "--output", help="Write the pairs here as CSV; - is the standard output."
     ),
     plot: Annotated[Path | None, Writes(PICTURE)] = typer.Option(None, help="Draw the match here: .png, .svg or .pdf."),
+    plot_view: PlotView = typer.Option(
+        PlotView.row, help="row: both visits in one frame, found, new and missed; lines: aside, a line for every pair."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
     explain: bool = typer.Option(False, "--explain", help="Print what happened, stage by stage, with counts."),
 ) -> None:
@@ -64,23 +69,25 @@ def match(
 
         require_picture_name(plot)
     read_unit = unit or (Unit.free if settings.call["scale"] == Scale.free else Unit.m)
-    in_query = FruitCloud.read(query, unit=read_unit.value)
+    in_query = FruitCloud.read(query, unit=(query_unit or read_unit).value)
     in_map = FruitCloud.read(map, unit=read_unit.value)
     with working(f"matching {len(in_query)} fruits with {len(in_map)}"):
         answer = settings.match(in_query, in_map)
     if output is not None:
         write_pairs(output, answer, in_query, in_map)
     if plot is not None:
-        _draw(plot, in_query, in_map, answer, settings.call["up"])
+        _draw(plot, in_query, in_map, answer, settings.call["up"], plot_view)
     _print(answer, in_query, in_map, json=json, explain=explain)
     if answer.status != "Found":
         raise typer.Exit(1)
 
 
-def _draw(path: Path, query: FruitCloud, map: FruitCloud, answer: Match, up: list[list[float]] | None) -> None:
+def _draw(
+    path: Path, query: FruitCloud, map: FruitCloud, answer: Match, up: list[list[float]] | None, view: PlotView
+) -> None:
     from pomona.plot import draw_match, save_picture
 
-    save_picture(draw_match(query, map, answer, up_in_map=up[1] if up else None), path)
+    save_picture(draw_match(query, map, answer, up_in_map=up[1] if up else None, view=view.value), path)
 
 
 def _print(answer: Match, query: FruitCloud, map: FruitCloud, *, json: bool, explain: bool) -> None:

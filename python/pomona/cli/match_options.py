@@ -23,6 +23,13 @@ class Scale(StrEnum):
     free = "free"
 
 
+class PlotView(StrEnum):
+    """Which picture of a match."""
+
+    row = "row"
+    lines = "lines"
+
+
 class Unit(StrEnum):
     """Unit of the coordinates in the files."""
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pomona.atomic import whole_file
 from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
 from pomona.cloud.fruit_cloud import FruitCloud
+from pomona.cloud.typed import as_floats, as_whole
 from pomona.errors import PomonaError
 from pomona.likes import PLY_MARK
 from pomona.reading import parsed_json, require_file, shown, whole_number
@@ -75,7 +76,7 @@ def write(path: Path, cloud: FruitCloud) -> None:
     arrays: dict[str, NDArray[Any]] = {}
     comments: list[str] = []
     for name, column in split(cloud).items():
-        numbers = column if isinstance(column, np.ndarray) else _as_numbers(column)
+        numbers = column if isinstance(column, np.ndarray) else _as_numbers(column, whole=name == "id")
         if numbers is None:
             comments += [
                 f"comment text {_word(path, name)} {row} {json.dumps(cell)}" for row, cell in enumerate(column)
@@ -99,11 +100,16 @@ def write(path: Path, cloud: FruitCloud) -> None:
         file.write(table.tobytes())
 
 
-def _as_numbers(cells: tuple[str, ...]) -> NDArray[np.int32] | None:
-    """Return text that is nothing but 32-bit whole numbers as such, so that it reads back the same."""
-    if not all(cell.isdecimal() and str(int(cell)) == cell and len(cell) < 10 for cell in cells):
-        return None
-    return np.array([int(cell) for cell in cells], dtype=np.int32)
+def _as_numbers(cells: tuple[str, ...], *, whole: bool) -> NDArray[np.int32] | NDArray[np.float64] | None:
+    """Return text that is nothing but numbers as such: of 32 bits where all are whole, else doubles with nan for none.
+
+    Whole numbers read back as they were written, others as the same number; ids must be whole. None is for text.
+    """
+    integers = as_whole(cells)
+    if integers is not None and all(number is not None and abs(number) < 2**31 for number in integers):
+        return np.array(integers, dtype=np.int32)
+    floats = None if whole or (integers is not None and None not in integers) else as_floats(cells)
+    return None if floats is None else np.array(floats, dtype=np.float64)
 
 
 def _word(path: Path, name: str) -> str:
@@ -113,7 +119,9 @@ def _word(path: Path, name: str) -> str:
 
 
 def _text(value: float) -> str:
-    return str(int(value)) if isinstance(value, int) else repr(value)
+    if isinstance(value, int):
+        return str(value)
+    return "" if np.isnan(value) else repr(value)
 
 
 def _read_header(path: Path, file: IO[bytes]) -> Header:

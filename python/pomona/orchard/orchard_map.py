@@ -97,6 +97,23 @@ class Observations:
             "probability": self.probabilities,
         }
 
+    def cloud(self) -> FruitCloud:
+        """Return them as a cloud, one row an observation; what they say besides place and size is in `extras`."""
+        unknown = np.isnan(self.probabilities)
+        return FruitCloud(
+            positions=self.positions_in_map,
+            diameters_m=self.diameters_m,
+            extras={
+                "fruit": tuple(map(str, self.fruit_ids.tolist())),
+                "session": self.sessions,
+                "date": self.dates,
+                "label": tuple(label or "" for label in self.labels),
+                "probability": tuple(
+                    "" if none else f"{number:.6f}" for number, none in zip(self.probabilities, unknown, strict=True)
+                ),
+            },
+        )
+
     def to_pandas(self) -> Any:
         """Return `columns` as a `pandas.DataFrame`; `PomonaError` when pandas is not installed."""
         from pomona.data_frames import to_pandas

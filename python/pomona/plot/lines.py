@@ -1,27 +1,22 @@
-"""Pictures of a match: both clouds seen from above, a line for every fruit found again."""
+"""The match as the figures of the paper have it: the query drawn aside, a line for every fruit found again."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.atomic import whole_file
-from pomona.cloud import as_cloud
-from pomona.errors import PomonaError
+from pomona.plot.views import View, view_from_above
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from pomona.cloud import Cloud
+    from pomona.cloud import FruitCloud
     from pomona.matching import Match
 
-PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+__all__ = ["draw_lines"]
 
 _MAP_COLOUR = "#2a5d8f"
 _QUERY_COLOUR = "#c8502d"
@@ -29,61 +24,7 @@ _UNMATCHED_COLOUR = "#b5b5b5"
 _COLOURS_OF_PROBABILITY = "summer_r"  # from yellow to green, as the lines of the paper's figures
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """The plane a cloud is drawn in.
-
-    Attributes
-    ----------
-    axes
-        (2, 3) orthonormal; to the right and upwards in the picture.
-    labels
-        What the two axes are, without the unit.
-    """
-
-    axes: NDArray[np.float64]
-    labels: tuple[str, str]
-
-    def project(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates of (N, 3) positions in the picture, (N, 2)."""
-        return positions @ self.axes.T
-
-
-def view_from_above(positions: NDArray[np.float64], up: ArrayLike | None = None) -> View:
-    """Look down the vertical with the row to the right; without a vertical, onto the two largest extents.
-
-    Parameters
-    ----------
-    positions
-        (N, 3) metres.
-    up
-        The vertical in the frame of the positions, of any length but zero.
-    """
-    if up is None:
-        along, across = _principal_axes(positions)[:2]
-        return View(
-            np.stack([along, across]), ("along the largest extent", "along the second extent, vertical unknown")
-        )
-    vertical = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
-    horizontal = positions - np.outer(positions @ vertical, vertical)
-    along = _principal_axes(horizontal)[0]
-    along = along - (along @ vertical) * vertical
-    if np.linalg.norm(along) < 1e-9:  # all fruits on one vertical: any horizontal direction will do
-        along = np.cross(vertical, np.eye(3)[np.argmin(np.abs(vertical))])
-    along /= np.linalg.norm(along)
-    return View(np.stack([along, np.cross(vertical, along)]), ("along the row", "across the row, seen from above"))
-
-
-def _principal_axes(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) directions of falling extent as rows; the largest component of each is positive, so that none flips."""
-    if len(positions) == 0:
-        return np.eye(3)
-    axes: NDArray[np.float64] = np.linalg.svd(positions - positions.mean(axis=0))[2]
-    largest = axes[np.arange(3), np.argmax(np.abs(axes), axis=1)]
-    return axes * np.where(largest < 0.0, -1.0, 1.0)[:, None]
-
-
-def draw_match(query: Cloud, map: Cloud, match: Match, *, up_in_map: ArrayLike | None = None) -> Figure:
+def draw_lines(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: ArrayLike | None = None) -> Figure:
     """Draw the query aside of the map, and a line for every pair, coloured by its probability.
 
     A query that was not found is drawn in its own frame, turned so that its row lies to the right.
@@ -91,7 +32,7 @@ def draw_match(query: Cloud, map: Cloud, match: Match, *, up_in_map: ArrayLike |
     Parameters
     ----------
     query, map
-        The clouds that were matched, or the names of their files.
+        The clouds that were matched.
     match
         Their match.
     up_in_map
@@ -99,8 +40,6 @@ def draw_match(query: Cloud, map: Cloud, match: Match, *, up_in_map: ArrayLike |
     """
     from matplotlib.figure import Figure
 
-    # Nothing is said of the unit of a file that was matched already.
-    query, map = as_cloud(query, "free"), as_cloud(map, "free")
     view = view_from_above(map.positions, up_in_map)
     in_map = view.project(map.positions)
     in_query = _project_query(query.positions, match, view)
@@ -199,23 +138,3 @@ def _title(match: Match) -> str:
     if match.map_from_query is None:
         return f"{match.status.value}: {clouds}"
     return f"{match.status.value}: {clouds}, {len(match.pairs)} found again, log-odds {match.log_odds:.0f}"
-
-
-def require_picture_name(path: Path) -> None:
-    """Refuse a file name that is no picture, before any work is done.
-
-    Raises
-    ------
-    PomonaError
-        The suffix is none of `PICTURE_SUFFIXES`.
-    """
-    if path.suffix.lower() not in PICTURE_SUFFIXES:
-        found = path.suffix or "no suffix"
-        raise PomonaError(f"{path}: found {found}, expected a picture named {', '.join(PICTURE_SUFFIXES)}")
-
-
-def save_picture(figure: Figure, path: Path) -> None:
-    """Write a figure as its suffix says; the file appears whole or not at all."""
-    require_picture_name(path)
-    with whole_file(path) as partial:
-        figure.savefig(partial, format=path.suffix.lower()[1:])

@@ -1,0 +1,36 @@
+"""Pictures as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pomona.atomic import whole_file
+from pomona.errors import PomonaError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["PICTURE_SUFFIXES", "require_picture_name", "save_picture"]
+
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+
+
+def require_picture_name(path: Path) -> None:
+    """Refuse a file name that is no picture, before any work is done.
+
+    Raises
+    ------
+    PomonaError
+        The suffix is none of `PICTURE_SUFFIXES`.
+    """
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        found = path.suffix or "no suffix"
+        raise PomonaError(f"{path}: found {found}, expected a picture named {', '.join(PICTURE_SUFFIXES)}")
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure as its suffix says; the file appears whole or not at all."""
+    require_picture_name(path)
+    with whole_file(path) as partial:
+        figure.savefig(partial, format=path.suffix.lower()[1:])
