@@ -65,7 +65,10 @@ def test_what_does_not_go_together_is_told(row):
     with pytest.raises(PomonaError, match="min_score: found without a model, expected --model FILE"):
         open_detector(None, None, recording, min_score=0.5)
     (row / "detections.csv").unlink()
-    with pytest.raises(PomonaError, match=r"detections\.csv: not found, expected boxes there, or --detections FILE"):
+    with pytest.raises(
+        PomonaError,
+        match=r"detections\.csv: not found, expected boxes there, masks in ids/, or --detections FILE or --model FILE",
+    ):
         open_detector(None, None, recording)
     (row / "left" / "0000.png").unlink()
     (row / "left").rmdir()
