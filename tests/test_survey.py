@@ -20,6 +20,7 @@ from pomona.recording import Frame, open_recording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey import Kept, scan
 from pomona.survey.prefetch import prefetched
+from pomona.survey.preview import LEGIBLE_PX, lettering
 from recording_maker import FIELDS, make_recording
 
 STEPS_M = (0.0, 0.05, 0.1, 0.15)
@@ -283,3 +284,13 @@ def test_depth_can_be_measured_otherwise(pomona, shared_data, tmp_path):
     code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "no.csv", "--depth", "sgbm")
     assert (code, told.count("\n")) == (2, 1)
     assert "depth: found 'sgbm', expected stereo, dense or a stereo network" in told
+
+
+@pytest.mark.parametrize("size_px", [(640, 360), (1280, 720), (1920, 1080), (3840, 2160)])
+def test_letters_of_the_preview_are_legible_whatever_the_size(size_px):
+    """Letters take the same part of the picture's height, and no fewer pixels than a letter has strokes."""
+    times = -(-LEGIBLE_PX // size_px[0])
+    height_px = times * size_px[1]
+    (_, letter_px), _ = cv2.getTextSize("7", cv2.FONT_HERSHEY_SIMPLEX, 0.38 * lettering(height_px), 1)
+    assert letter_px >= 8
+    assert 1 / 100 <= letter_px / height_px <= 1 / 50

@@ -34,6 +34,9 @@ GOLDEN = 0.618034
 LEGIBLE_PX = 1280
 """Smaller pictures are drawn on enlarged, to this width or more."""
 
+LETTERS_FIT_PX, LEAST_LETTERING = 600, 0.9
+"""Height of the picture for which letters are 9 px high; they grow with it, and below stay what the font can show."""
+
 GREY = (160, 160, 160)
 """Boxes that became no fruit."""
 
@@ -80,7 +83,7 @@ def require_preview(recording: Recording) -> None:
         When PyAV is missing or the recording has no left pictures.
     """
     if find_spec("av") is None:
-        raise PomonaError("a preview needs PyAV: install pomona[video]")
+        raise PomonaError("a preview needs PyAV, which is not installed: pip install av")
     if "left" not in recording.description()["pictures"]:
         raise PomonaError(f"{recording.path}: no left pictures, a preview is drawn on them")
 
@@ -124,6 +127,7 @@ def _drawn(picture: Picture, frame: int, part: Part, times: int) -> Picture:
     """Draw the boxes of one frame: fruits in their own colour with name, diameter and depth; the rest grey."""
     import cv2
 
+    size = lettering(times * len(picture))
     drawn = np.asarray(cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC), np.uint8)
     rows = np.flatnonzero(part.boxes.frames == frame)
     depths_m = _depths(part, frame)
@@ -131,11 +135,11 @@ def _drawn(picture: Picture, frame: int, part: Part, times: int) -> Picture:
         low, high = (np.round(times * corner).astype(int) for corner in np.split(part.boxes.boxes_px[row], 2))
         fruit = int(part.boxes.fruits[row])
         colour = GREY if fruit < 0 else _colour(fruit)
-        cv2.rectangle(drawn, low.tolist(), high.tolist(), colour, 1, cv2.LINE_AA)
+        cv2.rectangle(drawn, low.tolist(), high.tolist(), colour, max(1, round(size)), cv2.LINE_AA)
         if fruit >= 0:
-            _write(drawn, (int(low[0]), int(low[1]) - 4), _label(part, fruit), colour)
-            _write(drawn, (int(low[0]), int(high[1]) + 12), f"{depths_m[fruit]:.2f} m", colour)
-    _write(drawn, (8, 18), f"frame {frame}", (255, 255, 255))
+            _write(drawn, (low[0], low[1] - 4 * size), _label(part, fruit), colour, size)
+            _write(drawn, (low[0], high[1] + 13 * size), f"{depths_m[fruit]:.2f} m", colour, size)
+    _write(drawn, (8 * size, 18 * size), f"frame {frame}", (255, 255, 255), size)
     return drawn
 
 
@@ -151,12 +155,20 @@ def _label(part: Part, fruit: int) -> str:
     return name if part.cloud.diameters_m is None else f"{name}: {1000 * part.cloud.diameters_m[fruit]:.0f} mm"
 
 
-def _write(picture: Picture, place: tuple[int, int], text: str, colour: tuple[int, int, int]) -> None:
+def lettering(height_px: int) -> float:
+    """Size of letters and lines: on a screen a picture is seen as high as the screen, whatever its pixels."""
+    return max(height_px / LETTERS_FIT_PX, LEAST_LETTERING)
+
+
+def _write(picture: Picture, place: tuple[float, float], text: str, colour: tuple[int, int, int], size: float) -> None:
     """Write with a dark rim, legible on leaves and sky."""
     import cv2
 
-    for width, ink in ((3, (0, 0, 0)), (1, colour)):
-        cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.38, ink, width, cv2.LINE_AA)
+    x, y, rim = round(float(place[0])), round(float(place[1])), max(1, round(size))
+    # Thicker letters are also wider, so the rim is the same letters moved.
+    around = [(x + right, y + down) for right in (-rim, 0, rim) for down in (-rim, 0, rim)]
+    for at, ink in (*((each, (0, 0, 0)) for each in around), ((x, y), colour)):
+        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.38 * size, ink, rim, cv2.LINE_AA)
 
 
 def _colour(fruit: int) -> tuple[int, int, int]:
