@@ -7,7 +7,7 @@ FUZZ_SECONDS ?= 600
 FUZZ_SEED ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit docs clean help
+.PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit wheel docs clean help
 
 all: lint docs test ## what CI runs
 
@@ -56,11 +56,15 @@ fuzz: install ## damaged input for every reader and binding, FUZZ_SECONDS=600; w
 audit: install ## licences of all dependencies, and advisories as far as they can be fetched
 	$(RUN) python -m audit
 
+wheel: install ## a wheel for others, into dist/, looked at before it is called done
+	$(RUN) maturin build --release --locked --out dist
+	$(RUN) python -m audit.wheel dist
+
 docs: $(UV) ## the documentation site, into site/
 	NO_MKDOCS_2_WARNING=1 $(UV) run --frozen --group docs mkdocs build --strict
 
 clean: ## remove what was built
-	rm -rf .venv .tools site target out
+	rm -rf .venv .tools site target out dist
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -377,3 +378,15 @@ def test_draws_the_view_that_was_asked_for(visits: Path, run_here: Run, tmp_path
         )
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "row.svg").read_bytes() != (tmp_path / "lines.svg").read_bytes()
+
+
+def test_config_says_what_each_setting_means(run_here: Run) -> None:
+    lines = run_here("config").stdout.splitlines()
+    for number, line in enumerate(lines):
+        if re.match(r"\w+ = |# \w+ is not set$|\[", line):
+            assert lines[number - 1].startswith("# "), line
+            assert not lines[number - 1].endswith("is not set"), line
+    assert max(map(len, lines)) <= 120
+    # From the comments of the core, and from the docstring of `pomona.match`.
+    assert "# Standard deviation of one edge of a box, pixels.\nedge_sigma_px = 1.0" in "\n".join(lines)
+    assert '# "verified", or "paper" for the published method.\nmethod = "verified"' in "\n".join(lines)

@@ -576,7 +576,7 @@ def test_without_the_libraries_the_extra_is_named(tmp_path, monkeypatch):
     for form, module in (("ros1", "rosbags"), ("mcap", "mcap")):
         bag = write_bag(tmp_path / "row", stereo(1), form)
         monkeypatch.setitem(sys.modules, module, None)
-        refused(bag, "pomona[bags]")
+        refused(bag, "pip install mcap rosbags")
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")

@@ -228,7 +228,7 @@ def test_several_videos_are_not_guessed(row):
 def test_without_pyav_the_extra_is_named(row, monkeypatch):
     write_video(row / "row.mkv")
     monkeypatch.setitem(sys.modules, "av", None)
-    refused(row / "row.mkv", "pomona[video]")
+    refused(row / "row.mkv", "pip install av")
 
 
 def test_a_video_is_rectified(row):

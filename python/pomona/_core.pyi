@@ -21,6 +21,7 @@ __all__ = [
     "one_fruit_each",
     "read_pair",
     "search_rows",
+    "setting_meanings",
 ]
 
 __version__: str
@@ -220,6 +221,7 @@ def search_rows(
     left: NDArray[np.uint8], right: NDArray[np.uint8], points: NDArray[np.float64], farthest_px: int
 ) -> NDArray[np.float64]: ...
 def default_config() -> str: ...
+def setting_meanings() -> dict[str, str]: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
 def fuse_centres(
     centres: NDArray[np.float64], covariances: NDArray[np.float64], rays: NDArray[np.float64]

@@ -242,7 +242,8 @@ def match(
     config
         Values of the core's tables that differ from `default_config()`; unknown keys are errors.
     threads
-        Threads of the search, as for `Index`.
+        Threads of the search, from 1, of which no more than there are cores are used; None takes all. The answer does
+        not depend on it.
 
     Raises
     ------

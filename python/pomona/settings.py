@@ -75,11 +75,12 @@ class Settings:
         return match(query, map, **self.call, config=self.overrides)
 
     def as_toml(self) -> str:
-        """Return every effective value; reading it back gives the same settings."""
+        """Return every effective value with what it means; reading it back gives the same settings."""
         from pomona.matching import default_config
+        from pomona.meanings import meanings
 
         tables = {_CALL_TABLE: self.call, **_merged(default_config(), self.overrides)}
-        return "\n".join(_toml_lines(tables)).lstrip("\n")
+        return "\n".join(_toml_lines(tables, meanings())).lstrip("\n")
 
 
 def _defaults_of_match() -> dict[str, Any]:
@@ -166,15 +167,20 @@ def _merged(defaults: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[s
     return merged
 
 
-def _toml_lines(tables: Mapping[str, Any], place: str = "") -> Iterator[str]:
+def _toml_lines(tables: Mapping[str, Any], meant: Mapping[str, str], place: str = "") -> Iterator[str]:
     """Values first, then the tables below, as TOML asks; None has no value in TOML and becomes a comment."""
+    from pomona.meanings import comment
+
     inner = {name: value for name, value in tables.items() if isinstance(value, dict)}
     for name, value in tables.items():
         if name not in inner:
+            yield from comment(meant[f"{place}{name}"])
             yield f"# {name} is not set" if value is None else f"{name} = {_toml_value(value)}"
     for name, table in inner.items():
-        yield f"\n[{place}{name}]"
-        yield from _toml_lines(table, f"{place}{name}.")
+        yield ""
+        yield from comment(meant[f"{place}{name}"])
+        yield f"[{place}{name}]"
+        yield from _toml_lines(table, meant, f"{place}{name}.")
 
 
 def _toml_value(value: Any) -> str:

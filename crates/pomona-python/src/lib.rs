@@ -32,5 +32,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(row_search::search_rows, module)?)?;
     module.add_function(wrap_pyfunction!(stereo::read_pair, module)?)?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
+    module.add_function(wrap_pyfunction!(matching::setting_meanings, module)?)?;
     Ok(())
 }

@@ -6,11 +6,18 @@ use pomona::nalgebra::{Matrix4, Vector3};
 use pomona::{Config, MapIndex, Match, Method, Scale, Similarity, Verdict};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::collections::HashMap;
 
 /// Settings and their defaults as JSON.
 #[pyfunction]
 pub fn default_config() -> PyResult<String> {
     serde_json::to_string(&Config::default()).map_err(wrong)
+}
+
+/// What every setting and every table means, by their names with dots between tables.
+#[pyfunction]
+pub fn setting_meanings() -> HashMap<String, &'static str> {
+    Config::meanings().collect()
 }
 
 fn wrong(error: impl std::fmt::Display) -> PyErr {

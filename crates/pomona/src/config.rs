@@ -5,6 +5,7 @@
 
 use crate::constellation::MAX_NEIGHBOURS;
 use crate::error::{Error, Result};
+use crate::meanings::settings;
 use crate::ransac::RansacConfig;
 use crate::tracking::TrackingConfig;
 use crate::verified::VerifiedConfig;
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Distance of neighbouring fruits of a cluster: about one apple, which is what the lengths below are chosen for.
 pub const CLUSTER_SPACING_M: f64 = 0.08;
 
+settings! {
 /// Settings of all methods. Unknown keys are errors; missing ones keep their defaults.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -26,7 +28,9 @@ pub struct Config {
     /// Fruits followed through the frames of a recording.
     pub tracking: TrackingConfig,
 }
+}
 
+settings! {
 /// Which fruits make a constellation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -37,6 +41,7 @@ pub struct ConstellationConfig {
     /// constellations per fruit. The paper: 10.
     pub n: usize,
 }
+}
 
 impl Default for ConstellationConfig {
     fn default() -> Self {
@@ -44,6 +49,7 @@ impl Default for ConstellationConfig {
     }
 }
 
+settings! {
 /// The paper's method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -69,6 +75,7 @@ pub struct PaperConfig {
     /// How hard RANSAC looks.
     pub ransac: RansacConfig,
 }
+}
 
 impl Default for PaperConfig {
     fn default() -> Self {
@@ -86,6 +93,21 @@ impl Default for PaperConfig {
 }
 
 impl Config {
+    /// What every setting and every table means, by their names with dots between tables.
+    pub fn meanings() -> impl Iterator<Item = (String, &'static str)> {
+        let tables = [
+            ("", Self::MEANINGS),
+            ("constellation.", ConstellationConfig::MEANINGS),
+            ("paper.", PaperConfig::MEANINGS),
+            ("paper.ransac.", RansacConfig::MEANINGS),
+            ("verified.", VerifiedConfig::MEANINGS),
+            ("tracking.", TrackingConfig::MEANINGS),
+        ];
+        tables
+            .into_iter()
+            .flat_map(|(table, settings)| settings.iter().map(move |(name, is)| (format!("{table}{name}"), is.trim())))
+    }
+
     /// Checks ranges.
     ///
     /// # Errors
@@ -129,6 +151,26 @@ mod tests {
     fn unknown_keys_are_errors() {
         let message = toml::from_str::<Config>("[paper]\ninlier_mm = 80").unwrap_err().to_string();
         assert!(message.contains("inlier_mm"), "{message}");
+    }
+
+    #[test]
+    fn every_setting_has_a_meaning() {
+        fn names(table: &toml::Table, place: &str) -> Vec<String> {
+            let inner = table.iter().flat_map(|(name, value)| match value {
+                toml::Value::Table(inner) => names(inner, &format!("{place}{name}.")),
+                _ => Vec::new(),
+            });
+            table.keys().map(|name| format!("{place}{name}")).chain(inner).collect()
+        }
+        let meanings: std::collections::HashMap<_, _> = Config::meanings().collect();
+        let config = Config {
+            paper: PaperConfig { max_code_distance: Some(1.0), ..PaperConfig::default() },
+            ..Config::default()
+        };
+        let names = names(&toml::Table::try_from(config).expect("a table"), "");
+        assert!(names.contains(&"paper.ransac.seed".to_owned()));
+        assert_eq!(names.len(), meanings.len());
+        assert!(names.iter().all(|name| !meanings[name].is_empty()), "{names:?}");
     }
 
     #[test]

@@ -25,6 +25,7 @@ pub mod geometry;
 pub mod index;
 pub mod lifting;
 pub mod matching;
+mod meanings;
 mod paper;
 pub mod ransac;
 pub mod row_search;

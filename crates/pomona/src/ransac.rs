@@ -1,9 +1,11 @@
 //! RANSAC with Procrustes: the transform that most of the given pairs agree on.
 
 use crate::geometry::{Scale, Similarity, fit};
+use crate::meanings::settings;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
+settings! {
 /// How hard to look.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -14,6 +16,7 @@ pub struct RansacConfig {
     pub max_samples: usize,
     /// Seed of the samples.
     pub seed: u64,
+}
 }
 
 impl Default for RansacConfig {

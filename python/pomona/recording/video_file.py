@@ -109,7 +109,7 @@ class VideoFile:
 
 def missing_pyav(path: Path) -> PomonaError:
     """Say how to install what decodes videos."""
-    return PomonaError(f"{path}: a video needs PyAV, which is not installed: pip install 'pomona[video]'")
+    return PomonaError(f"{path}: a video needs PyAV, which is not installed: pip install av")
 
 
 def _opened(path: Path) -> InputContainer:

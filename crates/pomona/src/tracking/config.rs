@@ -1,11 +1,13 @@
 //! Settings of the tracker.
 
 use crate::error::{Error, Result};
+use crate::meanings::settings;
 use serde::{Deserialize, Serialize};
 
 /// Part of the noise of a pose that is left when some fifteen fruits have corrected it: one over the square root.
 const LEFT_BY_ALIGNMENT: f64 = 0.25;
 
+settings! {
 /// How fruits are tracked through one visit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -38,6 +40,7 @@ pub struct TrackingConfig {
     pub solid: f64,
     /// Log-odds above which two fruits are taken for one, nats.
     pub merge_log_odds: f64,
+}
 }
 
 impl Default for TrackingConfig {

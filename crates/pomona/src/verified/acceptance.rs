@@ -2,8 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::Scale;
+use crate::meanings::settings;
 use serde::{Deserialize, Serialize};
 
+settings! {
 /// Settings of the verified method. Lengths are shares of the clouds' own spacing (see the docs page), so that there is
 /// nothing to tune to an orchard.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -16,6 +18,7 @@ pub struct VerifiedConfig {
     pub seeds_per_fruit: u64,
     /// Least probability of a reported pair.
     pub min_probability: f64,
+}
 }
 
 impl Default for VerifiedConfig {

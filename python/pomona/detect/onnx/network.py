@@ -126,7 +126,7 @@ def open_session(path: Path, threads: int | None = None) -> Any:
         import onnxruntime
     except ImportError:
         needed = "a model needs ONNX Runtime, which is not installed"
-        raise PomonaError(f"{path}: {needed}: pip install 'pomona[onnx]'") from None
+        raise PomonaError(f"{path}: {needed}: pip install onnxruntime") from None
     require_file(path, "an ONNX model")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = capped_threads(threads) or cores()

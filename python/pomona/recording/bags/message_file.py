@@ -174,4 +174,4 @@ def ros2_name(kind: str) -> str:
 
 def missing_extra(path: Path) -> PomonaError:
     """Say how to install what reads bags."""
-    return PomonaError(f"{path}: a bag needs rosbags and mcap, which are not installed: pip install 'pomona[bags]'")
+    return PomonaError(f"{path}: a bag needs rosbags and mcap, which are not installed: pip install mcap rosbags")

@@ -1,0 +1,56 @@
+"""`python -m audit.wheel FOLDER`: what must be right about a wheel before others get it."""
+
+from __future__ import annotations
+
+import sys
+import zipfile
+from email.parser import HeaderParser
+from pathlib import Path
+
+MOST_EXTENSION_BYTES = 8_000_000
+"""Of the compiled core: some 3 MB without debug symbols, 27 MB with them."""
+
+NEEDED = ("Summary", "Author", "License-Expression", "Project-URL", "Keywords", "Classifier", "Requires-Python")
+"""Fields of the metadata by which people find out what it is."""
+
+
+def faults(wheel: Path) -> list[str]:
+    """Say what is wrong with a wheel, one thing a line."""
+    with zipfile.ZipFile(wheel) as archive:
+        sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
+        about = next((name for name in sizes if name.endswith(".dist-info/METADATA")), None)
+        text = "" if about is None else archive.read(about).decode("utf-8")
+    return [*_of_extension(sizes), *_of_metadata(text), *_of_files(sizes)]
+
+
+def _of_extension(sizes: dict[str, int]) -> list[str]:
+    cores = [name for name in sizes if name.startswith("pomona/_core.") and name.endswith((".so", ".pyd"))]
+    if not cores:
+        return ["found no compiled core, expected pomona/_core"]
+    return [
+        f"{name}: found {sizes[name]} bytes, expected at most {MOST_EXTENSION_BYTES}: debug symbols are in it"
+        for name in cores
+        if sizes[name] > MOST_EXTENSION_BYTES
+    ]
+
+
+def _of_metadata(text: str) -> list[str]:
+    fields = HeaderParser().parsestr(text)
+    return [f"METADATA: found no {name}" for name in NEEDED if name not in fields]
+
+
+def _of_files(sizes: dict[str, int]) -> list[str]:
+    needed = ("pomona/py.typed", "pomona/_core.pyi")
+    return [f"found no {name}" for name in needed if name not in sizes]
+
+
+def main(folder: Path) -> None:
+    """Look at the wheels of a folder; exit code 1 where something is wrong or there is none."""
+    wheels = sorted(folder.glob("pomona-*.whl"))
+    wrong = [f"{wheel.name}: {fault}" for wheel in wheels for fault in faults(wheel)]
+    print("\n".join(wrong or [f"{wheel}: {wheel.stat().st_size / 1e6:.1f} MB" for wheel in wheels] or ["no wheel"]))
+    sys.exit(1 if wrong or not wheels else 0)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
