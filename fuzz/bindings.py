@@ -33,7 +33,7 @@ def _default_config(_: Drawn) -> None:
 def _adjust(draw: Drawn) -> None:
     k, p = draw.count() % 6, draw.count()
     _core.adjust(
-        (500.0, 500.0 * draw.positive(), 320.0, 240.0, 0.12 * draw.positive()),
+        draw.choice(None, _camera(draw, 640, 480)),
         draw.poses(k),
         draw.rows(k, 2).astype(bool),
         draw.numbers(p, 3),
@@ -63,11 +63,11 @@ def _locate(draw: Drawn) -> None:
     n = draw.count()
     expected = draw.poses(1)
     _core.locate(
-        (500.0, 500.0, 320.0, 240.0, draw.positive()),
+        _camera(draw, 640, 480),
         draw.numbers(n, 3) + np.array([0, 0, 3.0]),
         draw.covariances(n),
         300 + 50 * draw.numbers(n, 2),
-        expected[0].tolist() if expected.shape == (1, 4, 4) else [],
+        expected[0] if expected.shape == (1, 4, 4) else expected,
         sigma_px=draw.positive(),
     )
 
@@ -99,8 +99,10 @@ def _fuse_diameters(draw: Drawn) -> None:
 
 def _camera(draw: Drawn, width: int, height: int) -> Any:
     size = (draw.choice(width, width, width, 2**62, 0), draw.choice(height, height, height, -1))
-    fx, fy = 60.0 * draw.positive(), 60.0
-    return SimpleNamespace(width=size[0], height=size[1], fx=fx, fy=fy, cx=width / 2, cy=height / 2 + draw.number())
+    focal_px, cy = 60.0 * draw.positive(), height / 2 + draw.number()
+    baseline_m = draw.choice(0.12, 0.12, 0.12 * draw.positive(), None)
+    optics = {"fx": focal_px, "fy": 60.0, "cx": width / 2, "cy": cy, "baseline_m": baseline_m}
+    return SimpleNamespace(width=size[0], height=size[1], **optics)
 
 
 def _boxes(draw: Drawn, n: int) -> Any:
@@ -124,7 +126,6 @@ def _read_pair(draw: Drawn) -> None:
         right,
         _boxes(draw, draw.count()),
         _camera(draw, width, height),
-        focal_baseline_px_m=7.2 * draw.positive(),
         nearest_m=draw.choice(0.3, draw.number()),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,9 @@ def target(content: bytes) -> None:
 
 
 def _follow(draw: Drawn) -> None:
-    tracker = _core.Tracker(
-        focal_px=(draw.positive() * 500, 500.0),
-        principal_px=(320.0, 240.0 + draw.number()),
-        size_px=(640.0, 480.0 * draw.positive()),
-        config=draw.config(),
-    )
+    size = {"width": 640, "height": draw.choice(480, 480, 0, 2**40)}
+    optics = {"fx": draw.positive() * 500, "fy": 500.0, "cx": 320.0, "cy": 240.0 + draw.number(), "baseline_m": None}
+    tracker = _core.Tracker(SimpleNamespace(**size, **optics), config=draw.config())
     for step in range(draw.choice(1, 2, 5)):
         n = draw.count()
         m = draw.choice(n, n, n // 2)
@@ -45,9 +43,7 @@ def _follow(draw: Drawn) -> None:
         }
         pose = draw.poses(1)
         frame = draw.choice(step, step, step, -step, 2**62)
-        tracker.update(
-            frame, pose[0].tolist() if len(pose) else [], boxes_px, np.abs(draw.numbers(n)).clip(0, 1), lifted
-        )
+        tracker.update(frame, pose[0] if len(pose) else pose, boxes_px, np.abs(draw.numbers(n)).clip(0, 1), lifted)
     look_at(tracker.finish(draw.choice(None, 0, 1, 2**40)))
 
 

@@ -46,6 +46,8 @@ class _Camera(Protocol):
     def cx(self) -> float: ...
     @property
     def cy(self) -> float: ...
+    @property
+    def baseline_m(self) -> float | None: ...
 
 @final
 class Match:
@@ -97,18 +99,11 @@ class _Lifted(TypedDict):
 
 @final
 class Tracker:
-    def __new__(
-        cls,
-        *,
-        focal_px: tuple[float, float],
-        principal_px: tuple[float, float],
-        size_px: tuple[float, float],
-        config: str,
-    ) -> Tracker: ...
+    def __new__(cls, camera: _Camera, *, config: str) -> Tracker: ...
     def update(
         self,
         frame: int,
-        session_from_camera: list[list[float]],
+        session_from_camera: NDArray[np.float64],
         boxes_px: NDArray[np.float64],
         scores: NDArray[np.float64],
         lifted: _Lifted,
@@ -161,9 +156,7 @@ def believed(
     *,
     box_fruitness: NDArray[np.float64],
     elsewhere: NDArray[np.float64],
-    focal_px: tuple[float, float],
-    principal_px: tuple[float, float],
-    size_px: tuple[float, float],
+    camera: _Camera,
     poses: NDArray[np.float64],
     config: str,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], float]: ...
@@ -193,10 +186,8 @@ class _Between(TypedDict):
     first_from_second: NDArray[np.float64]
     information: NDArray[np.float64]
 
-_StereoCamera = tuple[float, float, float, float, float]
-
 def adjust(
-    camera: _StereoCamera,
+    camera: _Camera | None,
     poses: NDArray[np.float64],
     fixed: NDArray[np.bool_],
     points: NDArray[np.float64],
@@ -209,11 +200,11 @@ def adjust(
     first_scale: float | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def locate(
-    camera: _StereoCamera,
+    camera: _Camera,
     known: NDArray[np.float64],
     covariances: NDArray[np.float64],
     pixels: NDArray[np.float64],
-    expected: list[list[float]],
+    expected: NDArray[np.float64],
     *,
     sigma_px: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]] | None: ...
@@ -241,6 +232,5 @@ def read_pair(
     boxes_px: NDArray[np.float64],
     camera: _Camera,
     *,
-    focal_baseline_px_m: float,
     nearest_m: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...

@@ -23,9 +23,6 @@ Rows = NDArray[np.int64]
 FIRST_SCALE = 1000.0
 """A fruit that is seen again may lie 30 sigma from where drift says: the adjustment begins with a loss that wide."""
 
-NO_CAMERA = (1.0, 1.0, 0.0, 0.0, 1.0)
-"""Sightings are places; there are no pictures to project into."""
-
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
@@ -118,7 +115,7 @@ def refine(session_from_camera: Array, sightings: Sightings, motions: Motions | 
     fixed[:1] = True
     try:
         found = _core.adjust(
-            NO_CAMERA,
+            None,  # sightings are places; there are no pictures to project into
             poses,
             fixed,
             _medians(poses, sightings),

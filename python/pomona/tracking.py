@@ -248,9 +248,7 @@ def believed(
             },
             box_fruitness=np.ascontiguousarray(box_fruitness, np.float64),
             elsewhere=np.ascontiguousarray(elsewhere, np.float64),
-            focal_px=(calibration.fx, calibration.fy),
-            principal_px=(calibration.cx, calibration.cy),
-            size_px=(float(calibration.width), float(calibration.height)),
+            camera=calibration,
             poses=np.ascontiguousarray(session_from_camera, np.float64),
             config=json.dumps(dict(config or {})),
         )
@@ -280,12 +278,7 @@ class Tracker:
 
     def __init__(self, calibration: Calibration, config: Mapping[str, Any] | None = None) -> None:
         try:
-            self._core = _core.Tracker(
-                focal_px=(calibration.fx, calibration.fy),
-                principal_px=(calibration.cx, calibration.cy),
-                size_px=(float(calibration.width), float(calibration.height)),
-                config=json.dumps(dict(config or {})),
-            )
+            self._core = _core.Tracker(calibration, config=json.dumps(dict(config or {})))
         except ValueError as error:
             raise PomonaError(str(error)) from None
 
@@ -331,7 +324,7 @@ class Tracker:
             "support": np.ascontiguousarray(lifted.support[measured], np.float64),
         }
         try:
-            return self._core.update(frame_number, pose.tolist(), detections.boxes_px, detections.scores, arrays)
+            return self._core.update(frame_number, pose, detections.boxes_px, detections.scores, arrays)
         except ValueError as error:
             raise PomonaError(f"frame {frame_number}: {error}") from None
 

@@ -1,27 +1,23 @@
 //! Bundle adjustment and the pose of a picture among known points.
 
+use crate::camera::Calibration;
 use crate::cloud::points;
+use crate::pose::{pose, pose_array, pose_arrays, poses};
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
 use pomona::bundle::{
-    Adjustment, KnownPoints, LocateSettings, Measured, Observation, Pose, Problem, RelativePose, Settings, State,
-    StereoCamera, adjust as adjust_bundle, locate as locate_picture,
+    Adjustment, KnownPoints, LocateSettings, Measured, Observation, Problem, RelativePose, Settings, State,
+    adjust as adjust_bundle, locate as locate_picture,
 };
-use pomona::nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, Vector2, Vector3};
+use pomona::nalgebra::{Matrix3, Matrix6, Vector2, Vector3};
+use pomona::{Camera, Pose};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
-}
-
-/// fx, fy, cx, cy, baseline.
-type Camera = [f64; 5];
-
-fn stereo([fx, fy, cx, cy, baseline_m]: Camera) -> StereoCamera {
-    StereoCamera { focal_px: [fx, fy], centre_px: [cx, cy], baseline_m }
 }
 
 /// Observations, as Python passes them: which pose sees which point where, and how surely.
@@ -68,7 +64,7 @@ pub struct Between<'py> {
 impl Between<'_> {
     fn to_relative_poses(&self) -> PyResult<Vec<RelativePose>> {
         let (first, second) = (rows("first", &self.first)?, rows("second", &self.second)?);
-        let transforms = poses(&self.first_from_second)?;
+        let transforms = poses("first_from_second", &self.first_from_second, Pose::from_exact_matrix)?;
         let information: Vec<Matrix6<f64>> =
             squares::<6>(&self.information)?.map(|block| Matrix6::from_fn(|row, column| block[row][column])).collect();
         if first.len() != second.len() || transforms.len() != first.len() || information.len() != first.len() {
@@ -102,7 +98,7 @@ type Adjusted<'py> = (
 #[expect(clippy::needless_pass_by_value, clippy::too_many_arguments, reason = "arguments arrive by value from Python")]
 pub fn adjust<'py>(
     py: Python<'py>,
-    camera: Camera,
+    camera: Option<Calibration>,
     poses: PyReadonlyArray3<'py, f64>,
     fixed: PyReadonlyArray1<'py, bool>,
     points: PyReadonlyArray2<'py, f64>,
@@ -113,6 +109,11 @@ pub fn adjust<'py>(
     max_steps: Option<usize>,
     first_scale: Option<f64>,
 ) -> PyResult<Adjusted<'py>> {
+    let camera = match (&camera, &pictures) {
+        (Some(camera), _) => camera.to_stereo_camera()?,
+        (None, None) => Camera::UNIT,
+        (None, Some(_)) => return Err(wrong("camera: found none, expected that of the pictures")),
+    };
     let mut observations = Vec::new();
     if let Some(pictures) = &pictures {
         pictures.append(Measured::Picture, &mut observations)?;
@@ -121,12 +122,13 @@ pub fn adjust<'py>(
         places.append(Measured::Place, &mut observations)?;
     }
     let relative_poses = relative_poses.map_or(Ok(Vec::new()), |between| between.to_relative_poses())?;
-    let initial = State { poses: self::poses(&poses)?, points: self::points(&points)? };
+    let initial =
+        State { poses: self::poses("poses", &poses, Pose::from_exact_matrix)?, points: self::points(&points)? };
     let n_poses = initial.poses.len();
     if wanted.iter().any(|&(first, second)| first.max(second) >= n_poses) {
         return Err(wrong(format!("wanted: expected rows below {n_poses}")));
     }
-    let problem = Problem { camera: stereo(camera), fixed: fixed.as_array().to_vec(), observations, relative_poses };
+    let problem = Problem { camera, fixed: fixed.as_array().to_vec(), observations, relative_poses };
     let defaults = Settings::default();
     let settings = Settings {
         max_steps: max_steps.unwrap_or(defaults.max_steps),
@@ -140,7 +142,7 @@ pub fn adjust<'py>(
     };
     let (found, information): (Adjustment, _) = py.detach(run).map_err(|error: pomona::Error| wrong(error))?;
     Ok((
-        pose_array(py, &found.state.poses)?,
+        pose_arrays(py, &found.state.poses)?,
         array(py, found.state.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect(), [found.state.points.len(), 3])?,
         blocks(py, found.point_covariances.iter().copied())?,
         PyArray1::from_vec(py, found.squared_errors),
@@ -157,11 +159,11 @@ type Place<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn locate<'py>(
     py: Python<'py>,
-    camera: Camera,
+    camera: Calibration,
     known: PyReadonlyArray2<'py, f64>,
     covariances: PyReadonlyArray3<'py, f64>,
     pixels: PyReadonlyArray2<'py, f64>,
-    expected: [[f64; 4]; 4],
+    expected: PyReadonlyArray2<'py, f64>,
     sigma_px: f64,
 ) -> PyResult<Option<Place<'py>>> {
     if pixels.shape()[1] != 2 {
@@ -173,14 +175,13 @@ pub fn locate<'py>(
         pixels: pixels.as_array().outer_iter().map(|row| Vector2::new(row[0], row[1])).collect(),
     };
     let settings = LocateSettings { sigma_px, ..LocateSettings::default() };
-    let expected = pose(&expected);
-    let found = py.detach(|| locate_picture(&stereo(camera), &known, &expected, &settings)).map_err(wrong)?;
+    let camera = camera.to_stereo_camera()?;
+    let expected = pose("expected", &expected, Pose::from_exact_matrix)?;
+    let found = py.detach(|| locate_picture(&camera, &known, &expected, &settings)).map_err(wrong)?;
     let Some(found) = found else { return Ok(None) };
-    let matrix = found.pose.to_matrix();
-    let rows = |rows: Vec<f64>, n: usize| PyArray1::from_vec(py, rows).reshape([n, n]);
     Ok(Some((
-        rows(matrix.transpose().as_slice().to_vec(), 4)?,
-        rows(found.information.as_slice().to_vec(), 6)?,
+        pose_array(py, &found.pose)?,
+        PyArray1::from_slice(py, found.information.as_slice()).reshape([6, 6])?,
         PyArray1::from_vec(py, found.inliers),
     )))
 }
@@ -205,16 +206,6 @@ fn matrices(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
     Ok(squares::<3>(all)?.map(|block| Matrix3::from_fn(|row, column| block[row][column])).collect())
 }
 
-fn poses(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Pose>> {
-    Ok(squares::<4>(all)?.map(|block| pose(&block)).collect())
-}
-
-fn pose(matrix: &[[f64; 4]; 4]) -> Pose {
-    let rotation = Matrix3::from_fn(|row, column| matrix[row][column]);
-    let translation = Translation3::new(matrix[0][3], matrix[1][3], matrix[2][3]);
-    Pose::from_parts(translation, Rotation3::from_matrix_unchecked(rotation))
-}
-
 fn array<T: Element, const D: usize>(
     py: Python<'_>,
     values: Vec<T>,
@@ -225,11 +216,6 @@ where
     numpy::ndarray::Dim<[usize; D]>: numpy::ndarray::Dimension,
 {
     PyArray1::from_vec(py, values).reshape(shape)
-}
-
-fn pose_array<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let values = poses.iter().flat_map(|pose| pose.to_matrix().transpose().as_slice().to_vec()).collect();
-    array(py, values, [poses.len(), 4, 4])
 }
 
 /// Symmetric blocks as (N, D, D).

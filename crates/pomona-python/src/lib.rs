@@ -7,6 +7,7 @@ mod cloud;
 mod descriptor;
 mod lifting;
 mod matching;
+mod pose;
 mod row_search;
 mod stereo;
 mod tracking;

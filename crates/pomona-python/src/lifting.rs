@@ -1,6 +1,6 @@
 //! Boxes and depth to fruits; many sightings to one.
 
-use crate::camera::Fields;
+use crate::camera::Calibration;
 use crate::cloud::{matrices, points};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -29,7 +29,7 @@ pub fn lift<'py>(
     depth_m: PyReadonlyArray2<'py, f32>,
     boxes_px: PyReadonlyArray2<'py, f64>,
     sources: PyReadonlyArray2<'py, f64>,
-    camera: Fields,
+    camera: Calibration,
 ) -> PyResult<Lifted<'py>> {
     let camera = camera.to_camera()?;
     if depth_m.shape() != [camera.height, camera.width] {

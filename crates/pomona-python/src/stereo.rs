@@ -1,6 +1,6 @@
 //! A rectified pair to the disparity of fruits.
 
-use crate::camera::Fields;
+use crate::camera::Calibration;
 use crate::lifting::boxes;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pomona::stereo::{Picture, Rig, read};
@@ -11,29 +11,26 @@ type Reading<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f64>>);
 
 /// Depth (H, W) around the fruits, and (D, 3) disparity of each fruit's centre, its sigma, support; NaN where unmatched.
 #[pyfunction]
-#[pyo3(signature = (left, right, boxes_px, camera, *, focal_baseline_px_m, nearest_m))]
+#[pyo3(signature = (left, right, boxes_px, camera, *, nearest_m))]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn read_pair<'py>(
     py: Python<'py>,
     left: PyReadonlyArray3<'py, u8>,
     right: PyReadonlyArray3<'py, u8>,
     boxes_px: PyReadonlyArray2<'py, f64>,
-    camera: Fields,
-    focal_baseline_px_m: f64,
+    camera: Calibration,
     nearest_m: f64,
 ) -> PyResult<Reading<'py>> {
-    let camera = camera.to_camera()?;
+    let camera = camera.to_stereo_camera()?;
     let expected = [camera.height, camera.width, 3];
     if left.shape() != expected || right.shape() != expected {
         return Err(PyValueError::new_err("left, right: expected colour pictures of the camera's size"));
     }
-    for (name, value) in [("focal_baseline_px_m", focal_baseline_px_m), ("nearest_m", nearest_m)] {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(PyValueError::new_err(format!("{name}: found {value}, expected a finite number above 0")));
-        }
+    if !(nearest_m.is_finite() && nearest_m > 0.0) {
+        return Err(PyValueError::new_err(format!("nearest_m: found {nearest_m}, expected a finite number above 0")));
     }
     let boxes = boxes(&boxes_px)?;
-    let rig = Rig { camera, focal_baseline_px_m, nearest_m };
+    let rig = Rig { camera, nearest_m };
     let (left, right) = (left.as_slice()?, right.as_slice()?);
     let found = py.detach(|| read(Picture::new(left, camera.width), Picture::new(right, camera.width), &boxes, &rig));
     let numbers = found

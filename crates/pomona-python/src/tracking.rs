@@ -1,16 +1,16 @@
 //! Fruits followed through the frames of one visit.
 
+use crate::camera::Calibration;
 use crate::cloud::points;
+use crate::pose::{pose, poses};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
-use pomona::Config;
-use pomona::nalgebra::{Matrix3, Matrix4};
+use pomona::nalgebra::Matrix3;
 use pomona::stereo::Picture;
-use pomona::tracking::{
-    Body, Boxes, Camera, Colours, LiftedBoxes, Pose, TrackViews, Tracker, Tracks, belief, merge_duplicates,
-};
+use pomona::tracking::{Body, Boxes, Colours, LiftedBoxes, TrackViews, Tracker, Tracks, belief, merge_duplicates};
+use pomona::{Config, Pose};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -52,10 +52,10 @@ pub struct PyTracker {
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 impl PyTracker {
     #[new]
-    #[pyo3(signature = (*, focal_px, principal_px, size_px, config))]
-    fn new(focal_px: [f64; 2], principal_px: [f64; 2], size_px: [f64; 2], config: &str) -> PyResult<Self> {
+    #[pyo3(signature = (camera, *, config))]
+    fn new(camera: Calibration, config: &str) -> PyResult<Self> {
         let config = parsed(config)?.tracking;
-        let tracker = Tracker::new(Camera { focal_px, principal_px, size_px }, config).map_err(wrong)?;
+        let tracker = Tracker::new(camera.to_camera()?, config).map_err(wrong)?;
         Ok(Self { tracker, min_views: config.min_views })
     }
 
@@ -63,13 +63,12 @@ impl PyTracker {
         &mut self,
         py: Python<'py>,
         frame: i64,
-        session_from_camera: [[f64; 4]; 4],
+        session_from_camera: PyReadonlyArray2<'py, f64>,
         boxes_px: PyReadonlyArray2<'py, f64>,
         scores: PyReadonlyArray1<'py, f64>,
         lifted: LiftedArrays<'py>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let pose = Pose::from_matrix(&Matrix4::from_fn(|row, column| session_from_camera[row][column]));
-        let pose = pose.map_err(wrong)?;
+        let pose = pose("session_from_camera", &session_from_camera, Pose::from_matrix)?;
         let edges_px = boxes(&boxes_px)?;
         let scores = scores.as_array().to_vec();
         let rows = rows(&lifted.rows)?;
@@ -208,17 +207,14 @@ type Believed<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>, f64
 
 /// Probability of each track to be a fruit, whether it is to be reported, and frames for which one stays in view.
 #[pyfunction]
-#[pyo3(signature = (tracks, *, box_fruitness, elsewhere, focal_px, principal_px, size_px, poses, config))]
+#[pyo3(signature = (tracks, *, box_fruitness, elsewhere, camera, poses, config))]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
-#[expect(clippy::too_many_arguments, reason = "a struct of arrays")]
 pub fn believed<'py>(
     py: Python<'py>,
     tracks: TrackArrays<'py>,
     box_fruitness: PyReadonlyArray1<'py, f64>,
     elsewhere: PyReadonlyArray1<'py, f64>,
-    focal_px: [f64; 2],
-    principal_px: [f64; 2],
-    size_px: [f64; 2],
+    camera: Calibration,
     poses: PyReadonlyArray3<'py, f64>,
     config: &str,
 ) -> PyResult<Believed<'py>> {
@@ -232,10 +228,8 @@ pub fn believed<'py>(
     if [depths_m.len(), shown_m2.len(), fruitness.len(), views.len(), glimpses.len()] != [n; 5] {
         return Err(wrong("tracks: expected one row for each track in every array"));
     }
-    let camera = Camera { focal_px, principal_px, size_px };
-    let matrix = |one: numpy::ndarray::ArrayView2<'_, f64>| Matrix4::from_fn(|row, column| one[[row, column]]);
-    let poses: Result<Vec<_>, _> = poses.as_array().outer_iter().map(|one| Pose::from_matrix(&matrix(one))).collect();
-    let poses = poses.map_err(wrong)?;
+    let camera = camera.to_camera()?;
+    let poses = self::poses("session_from_camera", &poses, Pose::from_matrix)?;
     let (boxes, elsewhere) = (numbers(&box_fruitness), numbers(&elsewhere));
     let tracks = TrackViews {
         centres: &centres,

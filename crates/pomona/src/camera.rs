@@ -1,6 +1,11 @@
-//! A rectified pinhole camera.
+//! A rectified pinhole camera, and what lies on its pictures.
 
-/// Size and intrinsics, pixels. The origin of picture coordinates is the top left corner of the top left pixel.
+use nalgebra::{Matrix3, Vector3};
+
+/// Size, intrinsics and, where there is a camera to its right, the distance to it.
+///
+/// Pixels; the origin of picture coordinates is the top left corner of the top left pixel. A point (x, y, z) of the
+/// camera is seen at u = fx x / z + cx, v = fy y / z + cy, and the right picture shows it fx baseline / z farther left.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Columns of a picture.
@@ -15,9 +20,38 @@ pub struct Camera {
     pub cx: f64,
     /// Vertical principal point.
     pub cy: f64,
+    /// Distance of the right camera, metres; none of a camera alone.
+    pub baseline_m: Option<f64>,
 }
 
 impl Camera {
+    /// Focal length 1: where places are measured and no pictures.
+    pub const UNIT: Self = Self { width: 0, height: 0, fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, baseline_m: None };
+
+    /// Focal lengths along x and y.
+    #[inline]
+    pub fn focal_px(&self) -> [f64; 2] {
+        [self.fx, self.fy]
+    }
+
+    /// Principal point.
+    #[inline]
+    pub fn principal_px(&self) -> [f64; 2] {
+        [self.cx, self.cy]
+    }
+
+    /// Width and height of a picture.
+    #[inline]
+    pub fn size_px(&self) -> [f64; 2] {
+        [self.width as f64, self.height as f64]
+    }
+
+    /// Focal length times baseline, the disparity at one metre; 0 of a camera alone.
+    #[inline]
+    pub fn focal_baseline_px_m(&self) -> f64 {
+        self.fx * self.baseline_m.unwrap_or(0.0)
+    }
+
     /// Direction (x, y, 1) of a picture point.
     pub fn ray(&self, x_px: f64, y_px: f64) -> [f64; 3] {
         [(x_px - self.cx) / self.fx, (y_px - self.cy) / self.fy, 1.0]
@@ -27,7 +61,53 @@ impl Camera {
     pub fn pixel_ray(&self, column: usize, row: usize) -> [f64; 3] {
         self.ray(column as f64 + 0.5, row as f64 + 0.5)
     }
+
+    /// Column, row and depth of a point in the frame of the camera.
+    pub fn project(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy, point.z)
+    }
+
+    /// The point at a column, row and depth.
+    pub fn unproject(&self, seen: &Vector3<f64>) -> Vector3<f64> {
+        let [x, y, _] = self.ray(seen.x, seen.y);
+        Vector3::new(x * seen.z, y * seen.z, seen.z)
+    }
+
+    /// Derivative of [`Self::project`].
+    pub(crate) fn projection_jacobian(&self, point: &Vector3<f64>) -> Matrix3<f64> {
+        let ([fx, fy], z) = (self.focal_px(), point.z);
+        Matrix3::new(fx / z, 0.0, -fx * point.x / (z * z), 0.0, fy / z, -fy * point.y / (z * z), 0.0, 0.0, 1.0)
+    }
+
+    /// Derivative of [`Self::unproject`].
+    pub(crate) fn ray_jacobian(&self, seen: &Vector3<f64>) -> Matrix3<f64> {
+        let (&Self { fx, fy, cx, cy, .. }, z) = (self, seen.z);
+        Matrix3::new(z / fx, 0.0, (seen.x - cx) / fx, 0.0, z / fy, (seen.y - cy) / fy, 0.0, 0.0, 1.0)
+    }
+
+    /// Column, row and disparity of a point in front of the camera, with their derivative.
+    #[inline]
+    pub(crate) fn project_pair(&self, point: &Vector3<f64>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+        if point.z <= NEAREST_M {
+            return None;
+        }
+        let (&Self { fx, fy, cx, cy, .. }, inverse) = (self, 1.0 / point.z);
+        let (x, y) = (point.x * inverse, point.y * inverse);
+        let reach = self.focal_baseline_px_m();
+        let seen = Vector3::new(fx * x + cx, fy * y + cy, reach * inverse);
+        let slope = Matrix3::new(fx, 0.0, -fx * x, 0.0, fy, -fy * y, 0.0, 0.0, -reach * inverse) * inverse;
+        Some((seen, slope))
+    }
+
+    /// Whether a point in the picture's pyramid lies in front of the camera and within `margin_px` of the picture.
+    pub(crate) fn sees(&self, seen: &Vector3<f64>, margin_px: f64) -> bool {
+        let size_px = self.size_px();
+        seen.z > 0.0 && (0..2).all(|axis| seen[axis] > -margin_px && seen[axis] < size_px[axis] + margin_px)
+    }
 }
+
+/// Nearer than a centimetre nothing is in focus, and the projection has no use.
+const NEAREST_M: f64 = 0.01;
 
 /// Depth along the optical axis of a camera, metres, row by row; 0 where nothing was measured.
 #[derive(Debug, Clone, Copy)]
@@ -107,5 +187,41 @@ impl PixelBox {
     /// Column and row of each pixel, row by row.
     pub fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
         (self.top..self.bottom).flat_map(move |row| (self.left..self.right).map(move |column| (column, row)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera =
+        Camera { width: 640, height: 360, fx: 417.0, fy: 420.0, cx: 320.0, cy: 180.0, baseline_m: Some(0.12) };
+
+    #[test]
+    fn a_point_comes_back_from_where_it_is_seen() {
+        let point = Vector3::new(0.6, -0.3, 1.4);
+        assert!((CAMERA.unproject(&CAMERA.project(&point)) - point).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_two_derivatives_are_inverse() {
+        let point = Vector3::new(0.6, -0.3, 1.4);
+        let there_and_back = CAMERA.projection_jacobian(&point) * CAMERA.ray_jacobian(&CAMERA.project(&point));
+        assert!((there_and_back - Matrix3::identity()).abs().max() < 1e-12);
+    }
+
+    #[test]
+    fn a_pair_shows_what_each_picture_shows_and_the_depth_as_disparity() {
+        let point = Vector3::new(0.6, -0.3, 1.4);
+        let (seen, _) = CAMERA.project_pair(&point).expect("in front");
+        assert!((seen.xy() - CAMERA.project(&point).xy()).norm() < 1e-12);
+        assert!((seen.z - 417.0 * 0.12 / 1.4).abs() < 1e-12);
+        let alone = Camera { baseline_m: None, ..CAMERA };
+        assert!(alone.project_pair(&point).expect("in front").0.z.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_pair_shows_nothing_behind_the_camera() {
+        assert!(CAMERA.project_pair(&Vector3::new(0.1, 0.1, -1.0)).is_none());
     }
 }

@@ -27,6 +27,7 @@ pub mod lifting;
 pub mod matching;
 mod meanings;
 mod paper;
+pub mod pose;
 pub mod ransac;
 pub mod row_search;
 pub mod stereo;
@@ -34,11 +35,13 @@ pub mod tracking;
 pub mod verified;
 pub mod voting;
 
+pub use camera::Camera;
 pub use cloud::{FruitCloud, Views};
 pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
 pub use matching::{MapIndex, Match, Method, Pair, Registration, Request, Verdict, match_clouds};
+pub use pose::Pose;
 pub use verified::VerifiedConfig;
 
 /// The linear algebra whose types the interface uses.

@@ -3,8 +3,9 @@
 mod filmed_row;
 
 use filmed_row::{Dice, RADIUS_M, Seen, outline, pose, row, seen, tracker};
+use pomona::Pose;
 use pomona::nalgebra::{Matrix4, Rotation3, Vector3};
-use pomona::tracking::{Boxes, LiftedBoxes, Pose, TrackingConfig, Tracks};
+use pomona::tracking::{Boxes, LiftedBoxes, TrackingConfig, Tracks};
 use pomona::{Config, Error};
 
 /// Tracks of a row, and the name of the fruit behind each sighting.

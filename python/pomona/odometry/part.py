@@ -164,7 +164,7 @@ class Part:
         if found is not None:
             numbers, places = self._newest.numbers[found.agrees], found.places[found.agrees]
             depths = (self._newest.positions[found.agrees] - pose[:3, 3]) @ pose[:3, 2]
-            expected = self.camera[0] * self.camera[4] / depths
+            expected = self.camera.fx * self.camera.baseline_m / depths
             per_cell = int(np.ceil(self._per_cell * WANTED_INLIERS / found.inliers))
             self._per_cell = int(np.clip(per_cell, *CORNERS_PER_CELL))
         new = corners(picture, places, self._per_cell)

@@ -112,7 +112,7 @@ class Reference:
 
     def project(self, pose: Array) -> tuple[Array, Mask]:
         """Picture places (N, 2) of the points from another pose, and which lie ahead."""
-        fx, fy, cx, cy, _ = self.camera
+        fx, fy, cx, cy = self.camera.fx, self.camera.fy, self.camera.cx, self.camera.cy
         in_camera = (self.positions - pose[:3, 3]) @ pose[:3, :3]
         ahead = np.asarray(in_camera[:, 2] > NEAREST_M, bool)
         x, y, z = np.where(ahead[:, None], in_camera, 1.0).T
@@ -128,9 +128,7 @@ class Reference:
         there, matched = rematch(self.picture, picture, places[known], candidates)
         in_camera, covariances = triangulated(self.camera, np.column_stack([places[known], disparity[known]])[matched])
         here = np.linalg.inv(self.pose) @ expected
-        located = _core.locate(
-            self.camera, in_camera, covariances, there[matched], here.tolist(), sigma_px=MATCH_SIGMA_PX
-        )
+        located = _core.locate(self.camera, in_camera, covariances, there[matched], here, sigma_px=MATCH_SIGMA_PX)
         return None if located is None else np.asarray(self.pose @ located[0], np.float64)
 
     def _consensus(self, places: Array, matched: Mask, expected: Array) -> Found | None:
@@ -140,7 +138,7 @@ class Reference:
             self.positions[rows],
             self.covariances[rows],
             places[rows],
-            expected.tolist(),
+            expected,
             sigma_px=SIGMA_PX,
         )
         if located is None:

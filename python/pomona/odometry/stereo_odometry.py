@@ -13,6 +13,7 @@ from pomona.odometry.motion import Motion
 from pomona.odometry.part import Part
 from pomona.odometry.reference import Measure
 from pomona.odometry.trajectory import OdometryTrajectory, trajectory_of
+from pomona.odometry.window import Camera
 from pomona.recording import Calibration
 from pomona.stereo.exposure import like
 
@@ -49,7 +50,8 @@ class StereoOdometry:
         baseline_m = calibration.baseline_m or DEPTH_BASELINE_M
         centre = (calibration.cx - CENTRE_PX, calibration.cy - CENTRE_PX)
         self._calibration = calibration
-        self._camera = (calibration.fx, calibration.fy, *centre, baseline_m)
+        focal = (calibration.fx, calibration.fy)
+        self._camera = Camera(*calibration.size_px, *focal, *centre, baseline_m)
         self._parts: list[Part] = []
         self._count = 0
         self._failed: str | None = None
@@ -71,7 +73,7 @@ class StereoOdometry:
             raise PomonaError("odometry: found no baseline in the calibration, expected one, or depth pictures")
         self._check(left, "left")
         self._check(right, "right")
-        farthest_px = min(self._camera[0] * self._camera[4] / NEAREST_M, self._calibration.width / 2)
+        farthest_px = min(self._camera.fx * self._camera.baseline_m / NEAREST_M, self._calibration.width / 2)
         measure = partial(disparities, left, like(right, left), farthest=farthest_px)
         return self._take(left, measure, is_flat(right))
 
@@ -92,7 +94,9 @@ class StereoOdometry:
         """
         self._check(left, "left")
         self._check(depth_m, "depth")
-        return self._take(left, partial(_disparities_of_depth, depth_m, self._camera[0] * self._camera[4]), False)
+        return self._take(
+            left, partial(_disparities_of_depth, depth_m, self._camera.fx * self._camera.baseline_m), False
+        )
 
     def skip(self, reason: str) -> Motion:
         """Take a frame whose picture cannot be read."""

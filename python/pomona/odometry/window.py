@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,18 @@ __all__ = ["SIGMA_DISPARITY_PX", "SIGMA_PX", "Camera", "Window"]
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-Camera = tuple[float, float, float, float, float]
-"""fx, fy, cx, cy in OpenCV's pixels, baseline in metres."""
+
+class Camera(NamedTuple):
+    """A camera in OpenCV's pixels, baseline in metres."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    baseline_m: float
+
 
 SIGMA_PX = 0.5
 SIGMA_DISPARITY_PX = 0.5
@@ -192,8 +203,8 @@ def whitenings(seen: Array) -> Array:
 
 def triangulated(camera: Camera, seen: Array) -> tuple[Array, Array]:
     """Places (N, 3) in the camera of u, v, disparity (N, 3), and their covariances (N, 3, 3)."""
-    fx, fy, cx, cy, baseline = camera
-    z = fx * baseline / seen[:, 2]
+    fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+    z = fx * camera.baseline_m / seen[:, 2]
     x, y = (seen[:, 0] - cx) / fx, (seen[:, 1] - cy) / fy
     places = np.stack([x * z, y * z, z], axis=1)
     slope = np.zeros((len(seen), 3, 3))

@@ -36,7 +36,7 @@ class StereoDepth:
 
     def __init__(self, calibration: Calibration, *, nearest_m: float = NEAREST_M) -> None:
         self._calibration, self._nearest_m = calibration, nearest_m
-        self._focal_baseline_px_m = focal_baseline_px_m(calibration)
+        focal_baseline_px_m(calibration)
 
     def __call__(self, left: Picture, right: Picture, boxes_px: NDArray[np.float64]) -> FruitDepth:
         """Measure depth at boxes.
@@ -59,7 +59,6 @@ class StereoDepth:
             like(right, left),
             np.asarray(boxes_px, np.float64).reshape(-1, 4),
             self._calibration,
-            focal_baseline_px_m=self._focal_baseline_px_m,
             nearest_m=self._nearest_m,
         )
         disparity_px, disparity_sigma_px, support = np.ascontiguousarray(numbers.T)

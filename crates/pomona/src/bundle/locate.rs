@@ -4,10 +4,12 @@
 //! `StereoScan`, 2011: no quartic, no four solutions, and the expected pose is always near). The pose on which most
 //! matches agree wins; its matches then fix it with the points' own uncertainty in the adjustment.
 
-use super::pose::{Pose, moved, skew};
-use super::problem::{Measured, Observation, Problem, State, StereoCamera};
+use super::problem::{Measured, Observation, Problem, State};
+use super::steps::{moved, skew};
 use super::{Settings, adjust};
+use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::pose::Pose;
 use crate::ransac::SplitMix;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Point3, Vector2, Vector3, Vector6};
 
@@ -73,7 +75,7 @@ const ROUNDS: usize = 3;
 /// # Errors
 /// Arrays of different lengths, or numbers that are not finite.
 pub fn locate(
-    camera: &StereoCamera,
+    camera: &Camera,
     known: &KnownPoints,
     expected: &Pose,
     settings: &LocateSettings,
@@ -103,7 +105,7 @@ pub fn locate(
 }
 
 /// The best pose of many samples of three; the expected pose itself is the first candidate.
-fn consensus(camera: &StereoCamera, known: &KnownPoints, expected: &Pose, settings: &LocateSettings) -> Option<Pose> {
+fn consensus(camera: &Camera, known: &KnownPoints, expected: &Pose, settings: &LocateSettings) -> Option<Pose> {
     let n = known.points.len();
     if n < 4 {
         return None;
@@ -131,18 +133,18 @@ fn samples_needed(share: f64, settings: &LocateSettings) -> usize {
 }
 
 /// Predicted u, v of a point, with its slopes by the place in the camera and by the pose.
-fn predicted(camera: &StereoCamera, pose: &Pose, point: &Point3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-    let (seen, slope) = camera.project(&pose.inverse_transform_point(point).coords)?;
+fn predicted(camera: &Camera, pose: &Pose, point: &Point3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+    let (seen, slope) = camera.project_pair(&pose.to_camera(&point.coords))?;
     Some((seen.fixed_rows::<2>(0).into_owned(), slope.fixed_rows::<2>(0).into_owned()))
 }
 
-fn pose_of_three(camera: &StereoCamera, known: &KnownPoints, start: &Pose, sample: [usize; 3]) -> Option<Pose> {
+fn pose_of_three(camera: &Camera, known: &KnownPoints, start: &Pose, sample: [usize; 3]) -> Option<Pose> {
     let mut pose = *start;
     for _ in 0..STEPS {
         let (mut matrix, mut right) = (Matrix6::<f64>::zeros(), Vector6::zeros());
         for i in sample {
             let (seen, slope) = predicted(camera, &pose, &known.points[i])?;
-            let place = pose.inverse_transform_point(&known.points[i]).coords;
+            let place = pose.to_camera(&known.points[i].coords);
             let mut by_pose = Matrix2x6::zeros();
             by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&-slope);
             by_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(slope * skew(&place)));
@@ -162,7 +164,7 @@ fn pose_of_three(camera: &StereoCamera, known: &KnownPoints, start: &Pose, sampl
 }
 
 /// Squared Mahalanobis distance of a match, the point's own uncertainty included.
-fn squared_error(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, i: usize, sigma_px: f64) -> f64 {
+fn squared_error(camera: &Camera, known: &KnownPoints, pose: &Pose, i: usize, sigma_px: f64) -> f64 {
     let Some((seen, slope)) = predicted(camera, pose, &known.points[i]) else { return f64::INFINITY };
     let turned = slope * pose.rotation.matrix().transpose();
     let covariance = turned * known.covariances[i] * turned.transpose() + Matrix2::identity() * sigma_px.powi(2);
@@ -171,7 +173,7 @@ fn squared_error(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, i: usi
 }
 
 /// Truncated squared distances (MSAC) and the number of agreeing matches.
-fn cost(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> (f64, usize) {
+fn cost(camera: &Camera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> (f64, usize) {
     let (mut cost, mut count) = (0.0, 0);
     for i in 0..known.points.len() {
         let squared = squared_error(camera, known, pose, i, settings.sigma_px);
@@ -181,7 +183,7 @@ fn cost(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, settings: &Loca
     (cost, count)
 }
 
-fn agreeing(camera: &StereoCamera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> Vec<bool> {
+fn agreeing(camera: &Camera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> Vec<bool> {
     let agrees = |i| squared_error(camera, known, pose, i, settings.sigma_px) <= settings.gate;
     (0..known.points.len()).map(|i| agrees(i) && known.covariances[i].cholesky().is_some()).collect()
 }
@@ -194,7 +196,7 @@ fn whitening(covariance: &Matrix3<f64>) -> Option<Matrix3<f64>> {
 /// Adjusts the pose to the agreeing matches. What is known of a point is a place seen from a pose that stays: the
 /// session's origin.
 fn refined(
-    camera: &StereoCamera,
+    camera: &Camera,
     known: &KnownPoints,
     pose: &Pose,
     inliers: &[bool],
@@ -213,7 +215,7 @@ fn refined(
     }
     let problem = Problem { camera: *camera, fixed: vec![true, false], observations, relative_poses: Vec::new() };
     let points = rows.iter().map(|&i| known.points[i]).collect();
-    let state = State { poses: vec![Pose::identity(), *pose], points };
+    let state = State { poses: vec![Pose::IDENTITY, *pose], points };
     let found = adjust(&problem, state, &Settings { max_steps: 10, ..Settings::default() })?;
     let information = found.relative_information(&[(0, 1)])[0].unwrap_or_else(Matrix6::zeros);
     Ok((found.state.poses[1], information))

@@ -17,8 +17,8 @@ mod envelope;
 mod locate;
 mod normal;
 mod ordering;
-mod pose;
 mod problem;
+mod steps;
 
 use crate::error::{Error, Result};
 use envelope::Envelope;
@@ -26,8 +26,7 @@ use nalgebra::{Matrix3, Matrix6};
 use normal::Plan;
 
 pub use locate::{KnownPoints, LocateSettings, Located, locate};
-pub use pose::Pose;
-pub use problem::{Measured, Observation, Problem, RelativePose, State, StereoCamera};
+pub use problem::{Measured, Observation, Problem, RelativePose, State};
 
 /// When an adjustment ends and how it weighs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,8 +145,8 @@ impl Adjustment {
     }
 
     fn information(&self, covariances: &Envelope, (first, second): (usize, usize)) -> Option<Matrix6<f64>> {
-        let predicted = self.state.poses[first].inv_mul(&self.state.poses[second]);
-        let carried = pose::carried(&predicted);
+        let predicted = self.state.poses[second].seen_from(&self.state.poses[first]);
+        let carried = steps::carried(&predicted);
         let covariance = match (self.places[first], self.places[second]) {
             (None, None) => return None,
             (None, Some(second)) => *covariances.block(second, second),

@@ -7,8 +7,8 @@
 use super::Settings;
 use super::envelope::Envelope;
 use super::ordering::Order;
-use super::pose::moved;
 use super::problem::{Measured, Observation, Problem, State};
+use super::steps::moved;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// Observations by point, and the order of the poses: what stays the same from step to step.

@@ -127,8 +127,9 @@ fn cuthill_mckee(graph: &Graph, free: &[usize]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::{Measured, Observation, StereoCamera};
+    use super::super::problem::{Measured, Observation};
     use super::*;
+    use crate::camera::Camera;
     use nalgebra::{Matrix3, Vector3};
 
     /// `n` poses there and `n` back along `n` places, each seeing the points of three places.
@@ -146,12 +147,7 @@ mod tests {
             .collect();
         let mut fixed = vec![false; 2 * n];
         fixed[0] = true;
-        Problem {
-            camera: StereoCamera { focal_px: [1.0; 2], centre_px: [0.0; 2], baseline_m: 1.0 },
-            fixed,
-            observations,
-            relative_poses: Vec::new(),
-        }
+        Problem { camera: Camera::UNIT, fixed, observations, relative_poses: Vec::new() }
     }
 
     #[test]

@@ -1,38 +1,9 @@
 //! What was measured, and how far a state of poses and points is from it.
 
-use super::pose::{Pose, carried, inverse_right_jacobian, logarithm, skew};
+use super::steps::{carried, inverse_right_jacobian, logarithm, skew};
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, Vector3, Vector6};
-
-/// A rectified stereo camera. A point (x, y, z) of the left camera is seen at u = fx x / z + cx, v = fy y / z + cy, with
-/// the disparity d = fx baseline / z.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StereoCamera {
-    /// Focal lengths, pixels.
-    pub focal_px: [f64; 2],
-    /// Principal point, pixels.
-    pub centre_px: [f64; 2],
-    /// Distance of the right camera, metres.
-    pub baseline_m: f64,
-}
-
-impl StereoCamera {
-    /// (u, v, d) of a point in front of the camera, with its derivative.
-    #[inline]
-    pub(super) fn project(&self, point: &Vector3<f64>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-        if point.z <= NEAREST_M {
-            return None;
-        }
-        let ([fx, fy], inverse) = (self.focal_px, 1.0 / point.z);
-        let (x, y) = (point.x * inverse, point.y * inverse);
-        let reach = fx * self.baseline_m;
-        let seen = Vector3::new(fx * x + self.centre_px[0], fy * y + self.centre_px[1], reach * inverse);
-        let slope = Matrix3::new(fx, 0.0, -fx * x, 0.0, fy, -fy * y, 0.0, 0.0, -reach * inverse) * inverse;
-        Some((seen, slope))
-    }
-}
-
-/// Nearer than a centimetre nothing is in focus, and the projection has no use.
-const NEAREST_M: f64 = 0.01;
 
 /// What one camera says of one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,8 +43,8 @@ pub struct RelativePose {
 /// Measurements of one adjustment. All rows are valid: [`super::adjust`] checks them.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// The camera of all poses.
-    pub camera: StereoCamera,
+    /// The camera of all poses. A disparity needs its baseline.
+    pub camera: Camera,
     /// Which poses stay as they are. Without relative poses or places to hold the frame, at least one has to.
     pub fixed: Vec<bool>,
     /// What was seen.
@@ -102,15 +73,15 @@ impl Observation {
     fn place_in_camera(&self, state: &State) -> (Vector3<f64>, Matrix3<f64>) {
         let pose = &state.poses[self.pose];
         let camera_from_session = pose.rotation.matrix().transpose();
-        (camera_from_session * (state.points[self.point].coords - pose.translation.vector), camera_from_session)
+        (camera_from_session * (state.points[self.point].coords - pose.translation), camera_from_session)
     }
 
     /// Squared Mahalanobis distance to the state, `None` behind the camera.
     #[inline]
-    pub(super) fn squared_error(&self, camera: &StereoCamera, state: &State) -> Option<f64> {
+    pub(super) fn squared_error(&self, camera: &Camera, state: &State) -> Option<f64> {
         let (place, _) = self.place_in_camera(state);
         let error = match self.measured {
-            Measured::Picture(seen) => camera.project(&place)?.0 - seen,
+            Measured::Picture(seen) => camera.project_pair(&place)?.0 - seen,
             Measured::Place(seen) => place - seen,
         };
         Some((self.whitening * error).norm_squared())
@@ -120,11 +91,11 @@ impl Observation {
     ///
     /// A step (rho, omega) of the camera moves a point p in it by -rho - omega x p.
     #[inline]
-    pub(super) fn linear(&self, camera: &StereoCamera, state: &State) -> Option<Linear> {
+    pub(super) fn linear(&self, camera: &Camera, state: &State) -> Option<Linear> {
         let (place, camera_from_session) = self.place_in_camera(state);
         let (error, slope) = match self.measured {
             Measured::Picture(seen) => {
-                let (predicted, slope) = camera.project(&place)?;
+                let (predicted, slope) = camera.project_pair(&place)?;
                 (predicted - seen, self.whitening * slope)
             }
             Measured::Place(seen) => (place - seen, self.whitening),
@@ -138,8 +109,8 @@ impl Observation {
 
 impl RelativePose {
     fn predicted(&self, state: &State) -> (Pose, Vector6<f64>) {
-        let predicted = state.poses[self.first].inv_mul(&state.poses[self.second]);
-        (predicted, logarithm(&self.first_from_second.inv_mul(&predicted)))
+        let predicted = state.poses[self.second].seen_from(&state.poses[self.first]);
+        (predicted, logarithm(&predicted.seen_from(&self.first_from_second)))
     }
 
     /// Squared Mahalanobis distance to the state.
@@ -151,7 +122,7 @@ impl RelativePose {
     /// The residual and its derivatives by the first and the second pose.
     pub(super) fn linear(&self, state: &State) -> (Vector6<f64>, Matrix6<f64>, Matrix6<f64>) {
         let (predicted, error) = self.predicted(state);
-        let turned = self.first_from_second.inv_mul(&predicted).rotation;
+        let turned = predicted.seen_from(&self.first_from_second).rotation;
         let mut by_second = Matrix6::zeros();
         by_second.fixed_view_mut::<3, 3>(0, 0).copy_from(turned.matrix());
         by_second
@@ -163,18 +134,20 @@ impl RelativePose {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pose::moved;
+    use super::super::steps::moved;
     use super::*;
-    use nalgebra::{Rotation3, Translation3};
+    use nalgebra::Rotation3;
 
     fn state() -> State {
-        let first = Pose::from_parts(Translation3::new(0.1, 0.2, -0.3), Rotation3::from_euler_angles(0.3, -0.2, 0.1));
-        let second = Pose::from_parts(Translation3::new(0.4, 0.1, -0.2), Rotation3::from_euler_angles(0.2, 0.1, 0.3));
+        let first =
+            Pose { rotation: Rotation3::from_euler_angles(0.3, -0.2, 0.1), translation: Vector3::new(0.1, 0.2, -0.3) };
+        let second =
+            Pose { rotation: Rotation3::from_euler_angles(0.2, 0.1, 0.3), translation: Vector3::new(0.4, 0.1, -0.2) };
         State { poses: vec![first, second], points: vec![Point3::new(0.3, -0.4, 2.0)] }
     }
 
-    fn camera() -> StereoCamera {
-        StereoCamera { focal_px: [417.0, 420.0], centre_px: [320.0, 180.0], baseline_m: 0.12 }
+    fn camera() -> Camera {
+        Camera { width: 640, height: 360, fx: 417.0, fy: 420.0, cx: 320.0, cy: 180.0, baseline_m: Some(0.12) }
     }
 
     /// Derivative of `residual` by a step of one pose, by central differences.
@@ -221,17 +194,12 @@ mod tests {
     fn derivatives_of_relative_poses_are_those_of_differences() {
         let state = state();
         let first_from_second =
-            Pose::from_parts(Translation3::new(0.2, -0.1, 0.1), Rotation3::from_euler_angles(0.0, 0.2, 0.1));
+            Pose { rotation: Rotation3::from_euler_angles(0.0, 0.2, 0.1), translation: Vector3::new(0.2, -0.1, 0.1) };
         let measured = RelativePose { first: 0, second: 1, first_from_second, information: Matrix6::identity() };
         let (_, by_first, by_second) = measured.linear(&state);
         let residual = |state: &State| measured.linear(state).0;
         // The inverse right Jacobian is cut after its second term: 1e-4 at these 20 degrees.
         assert!((by_first - by_pose(&state, 0, residual)).norm() < 1e-3);
         assert!((by_second - by_pose(&state, 1, residual)).norm() < 1e-3);
-    }
-
-    #[test]
-    fn nothing_is_seen_behind_the_camera() {
-        assert!(camera().project(&Vector3::new(0.1, 0.1, -1.0)).is_none());
     }
 }

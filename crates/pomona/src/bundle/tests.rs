@@ -1,8 +1,10 @@
 //! Adjustments of made-up drives whose truth is known.
 
 use super::*;
+use crate::camera::Camera;
+use crate::pose::Pose;
 use crate::ransac::SplitMix;
-use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 struct Random(SplitMix);
 
@@ -20,8 +22,8 @@ impl Random {
 
 const SIGMA_PX: f64 = 0.5;
 
-fn camera() -> StereoCamera {
-    StereoCamera { focal_px: [417.0, 417.0], centre_px: [320.0, 180.0], baseline_m: 0.12 }
+fn camera() -> Camera {
+    Camera { width: 640, height: 360, fx: 417.0, fy: 417.0, cx: 320.0, cy: 180.0, baseline_m: Some(0.12) }
 }
 
 /// A camera that looks sideways at a row of points 1 to 3 m away and drives 0.2 m from pose to pose.
@@ -29,7 +31,10 @@ fn drive(random: &mut Random, n_poses: usize) -> State {
     let poses = (0..n_poses)
         .map(|i| {
             let turn = Vector3::from_fn(|_, _| 0.03 * random.normal());
-            Pose::from_parts(Translation3::new(0.2 * i as f64, 0.01 * random.normal(), 0.0), Rotation3::new(turn))
+            Pose {
+                rotation: Rotation3::new(turn),
+                translation: Vector3::new(0.2 * i as f64, 0.01 * random.normal(), 0.0),
+            }
         })
         .collect();
     let points = (0..30 * n_poses)
@@ -47,7 +52,7 @@ fn pictures(random: &mut Random, truth: &State, wrong: f64) -> Vec<Observation> 
     let mut all = Vec::new();
     for (pose, session_from_camera) in truth.poses.iter().enumerate() {
         for (point, place) in truth.points.iter().enumerate() {
-            let Some((seen, _)) = camera.project(&session_from_camera.inverse_transform_point(place).coords) else {
+            let Some((seen, _)) = camera.project_pair(&session_from_camera.to_camera(&place.coords)) else {
                 continue;
             };
             if !(0.0..640.0).contains(&seen.x) || !(0.0..360.0).contains(&seen.y) {
@@ -66,7 +71,7 @@ fn disturbed(random: &mut Random, truth: &State, fixed: &[bool], shift: f64) -> 
     let mut state = truth.clone();
     for (pose, _) in state.poses.iter_mut().zip(fixed).filter(|(_, fixed)| !**fixed) {
         let xi = Vector6::from_fn(|axis, _| random.normal() * if axis < 3 { shift } else { shift / 3.0 });
-        *pose = pose::moved(pose, &xi);
+        *pose = steps::moved(pose, &xi);
     }
     for point in &mut state.points {
         *point += Vector3::from_fn(|_, _| shift * random.normal());
@@ -80,7 +85,7 @@ fn pictured_problem(random: &mut Random, truth: &State, wrong: f64) -> Problem {
 }
 
 fn errors(found: &Pose, truth: &Pose) -> Vector6<f64> {
-    pose::logarithm(&truth.inv_mul(found))
+    steps::logarithm(&found.seen_from(truth))
 }
 
 #[test]
@@ -111,7 +116,7 @@ fn covariances_are_those_of_the_errors() {
         let found = adjust(&problem, truth.clone(), &plain).expect("a valid problem");
         let pairs = [(0, 1), (1, 2), (2, 3)];
         for ((first, second), information) in pairs.iter().zip(found.relative_information(&pairs)) {
-            let relative = |state: &State| state.poses[*first].inv_mul(&state.poses[*second]);
+            let relative = |state: &State| state.poses[*second].seen_from(&state.poses[*first]);
             let error = errors(&relative(&found.state), &relative(&truth));
             sum += error.dot(&(information.expect("neighbours share points") * error));
             n += 1.0;
@@ -134,8 +139,8 @@ fn sightings_of_the_same_fruit_close_a_loop() {
     // Odometry drifts by 2 cm a step there and back; fruits seen again on the way back bring it home.
     let mut random = Random(SplitMix(3));
     let (there, n) = (30, 60);
-    let truth: Vec<Pose> =
-        (0..n).map(|i| Pose::translation(0.2 * f64::from(if i < there { i } else { n - 1 - i }), 0.0, 0.0)).collect();
+    let place = |i: i32| Vector3::new(0.2 * f64::from(if i < there { i } else { n - 1 - i }), 0.0, 0.0);
+    let truth: Vec<Pose> = (0..n).map(|i| Pose { translation: place(i), ..Pose::IDENTITY }).collect();
     let fruits: Vec<Point3<f64>> =
         (0..90).map(|i| Point3::new(f64::from(i) / 15.0, random.uniform() - 0.5, 1.0 + random.uniform())).collect();
     let truth = State { poses: truth, points: fruits };
@@ -144,7 +149,7 @@ fn sightings_of_the_same_fruit_close_a_loop() {
     let mut observations = Vec::new();
     for (pose, session_from_camera) in truth.poses.iter().enumerate() {
         for (point, fruit) in truth.points.iter().enumerate() {
-            let place = session_from_camera.inverse_transform_point(fruit).coords;
+            let place = session_from_camera.to_camera(&fruit.coords);
             if place.x.abs() < 0.7 {
                 let seen = place + spread * Vector3::from_fn(|_, _| random.normal());
                 observations.push(Observation { pose, point, measured: Measured::Place(seen), whitening });
@@ -157,9 +162,9 @@ fn sightings_of_the_same_fruit_close_a_loop() {
     let mut relative_poses = Vec::new();
     for second in 1..truth.poses.len() {
         let noise = deviations.map(|sigma| sigma * random.normal());
-        let first_from_second = pose::moved(&truth.poses[second - 1].inv_mul(&truth.poses[second]), &noise);
+        let first_from_second = steps::moved(&truth.poses[second].seen_from(&truth.poses[second - 1]), &noise);
         relative_poses.push(RelativePose { first: second - 1, second, first_from_second, information });
-        start.poses.push(start.poses[second - 1] * first_from_second);
+        start.poses.push(start.poses[second - 1].after(&first_from_second));
     }
     let mut fixed = vec![false; truth.poses.len()];
     fixed[0] = true;
@@ -181,14 +186,14 @@ fn a_picture_is_located_among_many_wrong_matches() {
     let mut known = KnownPoints { points: Vec::new(), covariances: Vec::new(), pixels: Vec::new() };
     for i in 0..200 {
         let place = Vector3::new(1.4 * random.uniform() - 0.7, random.uniform() - 0.5, 1.0 + 2.0 * random.uniform());
-        let (seen, _) = camera.project(&place).expect("in front");
+        let (seen, _) = camera.project_pair(&place).expect("in front");
         let wrong = if i < 140 { 40.0 } else { SIGMA_PX };
-        known.points.push(truth * Point3::from(place));
+        known.points.push(Point3::from(truth.to_session(&place)));
         known.covariances.push(Matrix3::identity() * 1e-6);
         known.pixels.push(Vector2::new(seen.x + wrong * random.normal(), seen.y + wrong * random.normal()));
     }
     let turn = UnitQuaternion::from_euler_angles(0.02, -0.05, 0.03).to_rotation_matrix();
-    let expected = truth * Pose::from_parts(Translation3::new(0.15, -0.05, 0.1), turn);
+    let expected = truth.after(&Pose { rotation: turn, translation: Vector3::new(0.15, -0.05, 0.1) });
     let found =
         locate(&camera, &known, &expected, &LocateSettings::default()).expect("valid").expect("60 true matches");
     let error = errors(&found.pose, &truth);

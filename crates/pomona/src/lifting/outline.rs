@@ -200,7 +200,8 @@ mod tests {
     use nalgebra::Vector3;
     use proptest::prelude::*;
 
-    const CAMERA: Camera = Camera { width: 640, height: 480, fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 };
+    const CAMERA: Camera =
+        Camera { width: 640, height: 480, fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0, baseline_m: None };
     const FREE: Covered = [false; 4];
 
     /// Smallest box around the outline of a sphere: extremes of the circle where rays from the camera touch it.

@@ -47,10 +47,8 @@ const BESIDE_PX: usize = 5;
 /// A rectified pair of cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rig {
-    /// The left one.
+    /// The left one, with its baseline.
     pub camera: Camera,
-    /// Focal length times baseline: the disparity at one metre.
-    pub focal_baseline_px_m: f64,
     /// Nothing nearer is looked for.
     pub nearest_m: f64,
 }
@@ -59,8 +57,9 @@ impl Rig {
     /// Disparities that are tried: the first, and one after the last.
     fn disparities(&self) -> (usize, usize) {
         // No disparity is wider than the picture, whatever the baseline.
-        let first = ((self.focal_baseline_px_m / FARTHEST_M).ceil().max(1.0) as usize).min(self.camera.width.max(1));
-        let end = ((self.focal_baseline_px_m / self.nearest_m).ceil() as usize).saturating_add(1);
+        let reach = self.camera.focal_baseline_px_m();
+        let first = ((reach / FARTHEST_M).ceil().max(1.0) as usize).min(self.camera.width.max(1));
+        let end = ((reach / self.nearest_m).ceil() as usize).saturating_add(1);
         (first, end.clamp(first + 2 * VALLEY_PX + 2, self.camera.width.max(first + 2 * VALLEY_PX + 2)))
     }
 }
@@ -114,7 +113,7 @@ pub fn read(left: Picture, right: Picture, boxes_px: &[[f64; 4]], rig: &Rig) -> 
         .map(|(&box_px, &pixels)| {
             let outline = Outline::of_box(box_px, camera, [false; 4])?;
             let disc = Disc::new(left, camera, pixels, &outline, &colours)?;
-            Some(Candidate::new(disc, &rights, first, end, rig.focal_baseline_px_m))
+            Some(Candidate::new(disc, &rights, first, end, camera.focal_baseline_px_m()))
         })
         .collect();
     let sizes = Sizes::of(candidates.iter().flatten().filter_map(Candidate::sure_diameter_m));
@@ -207,7 +206,7 @@ fn best(costs: &[f64]) -> (usize, f64) {
 /// Depth of the windows; where they overlap, a pixel in a box is of that box's window.
 fn picture_of(windows: &[Option<Surroundings>], inside: &[PixelBox], rig: &Rig) -> Vec<f32> {
     let mut depth_m = vec![0.0; rig.camera.width * rig.camera.height];
-    let scale = rig.focal_baseline_px_m as f32;
+    let scale = rig.camera.focal_baseline_px_m() as f32;
     let mut paint = |window: &Surroundings, wanted: &dyn Fn(usize, usize, f32) -> bool| {
         for ((column, row), disparity_px) in window.pixels.pixels().zip(&window.disparities_px) {
             let pixel = &mut depth_m[row * rig.camera.width + column];

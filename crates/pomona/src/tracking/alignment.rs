@@ -12,12 +12,13 @@
 //! nothing that noise would not say, and nothing is moved.
 
 use super::association::Association;
-use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
 use super::known::Known;
 use super::likelihood::Residual;
 use super::prediction::{Appearance, Prediction};
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix6, Rotation3, SMatrix, Vector3, Vector6};
+use crate::camera::Camera;
+use crate::pose::Pose;
+use nalgebra::{Matrix2, Matrix2x3, Matrix6, Rotation3, SMatrix, Vector3, Vector6};
 
 /// Assigned fruits without which nothing is said: twice as many numbers as a motion has.
 const LEAST_FRUITS: usize = 6;
@@ -131,7 +132,7 @@ fn fit(pulls: &[Pull], config: &TrackingConfig) -> Option<(Vector6<f64>, f64)> {
 
 /// The camera's pose when what it sees moves by `motion`.
 fn moved(pose: &Pose, motion: &Vector6<f64>) -> Pose {
-    let turn: Matrix3<f64> = Rotation3::new(motion.fixed_rows::<3>(3).into_owned()).into_inner();
+    let turn = Rotation3::new(motion.fixed_rows::<3>(3).into_owned());
     let shift: Vector3<f64> = motion.fixed_rows::<3>(0).into();
     // session_from_camera (a, w)^-1
     pose.after(&Pose { rotation: turn, translation: shift }.inverse())

@@ -23,8 +23,9 @@
 //! where places without a box are measured, and w and the fruits' normal distribution are those that explain all boxes
 //! best. Where fruits look like leaves both distributions are alike and p is w for all: nothing is dropped.
 
-use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::Vector3;
 
 /// Tracks of which it is asked how long they stay in view.
@@ -243,7 +244,8 @@ impl Normal {
 mod tests {
     use super::*;
 
-    const CAMERA: Camera = Camera { focal_px: [400.0; 2], principal_px: [320.0, 180.0], size_px: [640.0, 360.0] };
+    const CAMERA: Camera =
+        Camera { width: 640, height: 360, fx: 400.0, fy: 400.0, cx: 320.0, cy: 180.0, baseline_m: None };
     const NO_COLOUR: Colours<'static> = Colours { boxes: &[], elsewhere: &[] };
 
     /// Poses along a row, `step_m` apart, and tracks in its middle with these boxes and glimpses.

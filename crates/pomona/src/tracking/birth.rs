@@ -1,9 +1,10 @@
 //! A box that no known fruit explains becomes one.
 
-use super::camera::{Camera, Pose};
 use super::landmark::{Doubt, Estimate, Size, symmetric};
 use super::observation::Observation;
 use super::unknown::{Conditions, Unknown};
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::{Matrix3, Vector3};
 
 /// Scores are confidences of detectors, not probabilities: they are not trusted beyond these odds of 9 to 1.

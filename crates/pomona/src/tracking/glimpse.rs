@@ -5,9 +5,9 @@
 //! like fruit the recording says itself: as much as in three of four fruits that have a box, and more than in nearly all
 //! places that have none. Where fruits have the colour of leaves, that is never.
 
-use super::camera::Interval;
 use super::observation::Observation;
 use super::prediction::Appearance;
+use super::sphere::Interval;
 use crate::appearance::{FRUIT, FruitColour};
 use crate::camera::PixelBox;
 use crate::stereo::Picture;
@@ -202,10 +202,11 @@ fn shown(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::Camera;
+    use crate::camera::Camera;
     use crate::tracking::observation::{Boxes, LiftedBoxes, observations};
 
-    const CAMERA: Camera = Camera { focal_px: [300.0; 2], principal_px: [160.0, 90.0], size_px: [320.0, 180.0] };
+    const CAMERA: Camera =
+        Camera { width: 320, height: 180, fx: 300.0, fy: 300.0, cx: 160.0, cy: 90.0, baseline_m: None };
 
     fn places() -> Vec<[f64; 4]> {
         let place = |k: usize| [16.0 + 60.0 * (k % 5) as f64, 20.0 + 60.0 * (k / 5) as f64];

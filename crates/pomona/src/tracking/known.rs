@@ -1,13 +1,14 @@
 //! The fruits known so far, and where they are.
 
 use super::birth::Birth;
-use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
 use super::landmark::Landmark;
 use super::likelihood::{Residual, Weighed};
 use super::merging::{Body, one_fruit_log_odds};
 use super::prediction::{Prediction, predict};
 use super::space::Space;
+use crate::camera::Camera;
+use crate::pose::Pose;
 
 /// Nats by which one of two places that a fruit may have beats the other for good.
 const DECIDED: f64 = 3.0;

@@ -1,12 +1,13 @@
 //! A fruit that is known: where it is, how large, and what speaks for it.
 
 use super::birth::Birth;
-use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
 use super::known::Instant;
 use super::likelihood::Residual;
 use super::observation::Lift;
 use super::prediction::Appearance;
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 /// Frames of which it is remembered whether they saw a fruit: more than a fruit stays in view at walking pace.

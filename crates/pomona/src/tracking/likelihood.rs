@@ -12,11 +12,11 @@
 //! either side, so the middle of what shows lies anywhere within half of it. An edge that the picture cuts says nothing;
 //! then the other edge places the fruit.
 
-use super::camera::Camera;
 use super::config::TrackingConfig;
 use super::observation::{Observation, Side};
 use super::prediction::{Appearance, Prediction};
 use super::unknown::{Conditions, NEW_LN_SIZES, Unknown};
+use crate::camera::Camera;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::PI;
 
@@ -139,7 +139,7 @@ fn along_axis(axis: usize, appearance: &Appearance, side: &Side, camera: &Camera
             let lack = (predicted.half() - side.edges.half()).max(0.0);
             Along { value, variance: edge2 / 2.0, lack2: lack * lack / 3.0 }
         }
-        [true, true] => Along { value: 0.0, variance: camera.size_px[axis].powi(2), lack2: 0.0 },
+        [true, true] => Along { value: 0.0, variance: camera.size_px()[axis].powi(2), lack2: 0.0 },
         [low_is_cut, _] => {
             let value = if low_is_cut { side.edges.high - predicted.high } else { side.edges.low - predicted.low };
             Along { value, variance: edge2 + (config.hidden_mean * predicted.half()).powi(2), lack2: 0.0 }

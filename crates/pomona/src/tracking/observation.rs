@@ -1,6 +1,7 @@
 //! What one frame shows: boxes, and the depth of those that have one.
 
-use super::camera::{Camera, Interval};
+use super::sphere::Interval;
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
@@ -131,7 +132,7 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
 
 fn sides(camera: &Camera, [xmin, ymin, xmax, ymax]: [f64; 4]) -> [Side; 2] {
     let side = |axis: usize, low: f64, high: f64| {
-        let size = camera.size_px[axis];
+        let size = camera.size_px()[axis];
         let edges = Interval { low: low.max(0.0), high: high.min(size) };
         let (middle, ratio) = camera.middle_and_ratio(axis, edges);
         Side { edges, middle, ratio, cut: [low <= PICTURE_EDGE_PX, high >= size - PICTURE_EDGE_PX] }

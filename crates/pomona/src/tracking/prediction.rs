@@ -1,8 +1,10 @@
 //! How a known fruit should look in a new frame.
 
-use super::camera::{Camera, Interval, Pose};
 use super::config::TrackingConfig;
 use super::landmark::{Estimate, Landmark};
+use super::sphere::Interval;
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::{Matrix3, Vector3};
 
 /// Part of the radius by which shape and leaves move the middle of an outline, alike in neighbouring frames, so that
@@ -64,7 +66,7 @@ fn appearance(
     }
     let jacobian = camera.projection_jacobian(&in_camera);
     let place = pose.covariance_to_camera(&estimate.covariance) + Matrix3::identity() * place_variance;
-    let turn = |axis: usize| (camera.focal_px[axis] * config.pose_sigma_rad).powi(2);
+    let turn = |axis: usize| (camera.focal_px()[axis] * config.pose_sigma_rad).powi(2);
     let covariance =
         jacobian * place * jacobian.transpose() + Matrix3::from_diagonal(&Vector3::new(turn(0), turn(1), 0.0));
     let seen = camera.project(&in_camera);

@@ -5,13 +5,13 @@
 //! to fruits that are well known by now, and with that the frame is settled. What is kept is bounded by the lag.
 
 use super::association::associate;
-use super::camera::Pose;
 use super::known::{Instant, Known};
 use super::landmark::Landmark;
 use super::observation::Observation;
 use super::prediction::Prediction;
 use super::tracks::Sighting;
 use super::unknown::{Conditions, unknown};
+use crate::pose::Pose;
 
 /// Frames that must have seen a fruit for it to claim boxes of the past: two make its place, the third confirms it.
 const WELL_KNOWN: usize = 3;

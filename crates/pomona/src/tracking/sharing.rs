@@ -3,10 +3,10 @@
 //! Neither may start a fruit, and a box around two must not move either of them.
 
 use super::association::Association;
-use super::camera::Interval;
 use super::config::TrackingConfig;
 use super::observation::Observation;
 use super::prediction::{Appearance, Prediction};
+use super::sphere::Interval;
 
 /// Overlap of two boxes over the smaller one above which they are not two pieces beside each other.
 const BESIDE: f64 = 0.2;

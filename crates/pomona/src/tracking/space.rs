@@ -1,6 +1,7 @@
 //! Which fruits are near the view: a grid of cells, so that a frame costs what it shows and not what was seen before.
 
-use super::camera::{Camera, Pose};
+use crate::camera::Camera;
+use crate::pose::Pose;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -53,7 +54,7 @@ impl Space {
     /// Fruits in cells that touch the box around the camera's pyramid, in ascending order.
     pub fn near_view(&self, camera: &Camera, pose: &Pose) -> Vec<usize> {
         let depth_m = MARGIN * self.reach_m + CELL_M;
-        let [width, height] = camera.size_px;
+        let [width, height] = camera.size_px();
         let mut corners = vec![pose.translation];
         for (x, y) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
             corners.push(pose.to_session(&camera.unproject(&Vector3::new(x, y, depth_m))));

@@ -3,7 +3,6 @@
 use super::alignment::aligned;
 use super::association::{Association, associate};
 use super::birth::birth;
-use super::camera::{Camera, Pose};
 use super::config::TrackingConfig;
 use super::glimpse::{Expected, Glimpses, OwnedPicture};
 use super::known::{Instant, Known};
@@ -16,7 +15,9 @@ use super::sharing::{Role, roles};
 use super::tracks::{Sighting, Tracks, tracks};
 use super::trust::Reliability;
 use super::unknown::{Conditions, Unknown, unknown};
+use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::pose::Pose;
 use crate::stereo::Picture;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, VecDeque};

@@ -1,10 +1,10 @@
 //! A box by itself: what it would be if it showed something new.
 
-use super::camera::Camera;
 use super::config::TrackingConfig;
 use super::landmark::Size;
 use super::observation::Observation;
 use super::trust::{Reliability, Trust};
+use crate::camera::Camera;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
@@ -40,7 +40,7 @@ pub(crate) struct Unknown {
 /// New boxes lie anywhere in the picture, have any size, and the depth that fruits of common size have, or a wrong one.
 pub(crate) fn unknown(observation: &Observation, conditions: &Conditions<'_>) -> Unknown {
     let Conditions { camera, config, .. } = conditions;
-    let [width, height] = camera.size_px;
+    let [width, height] = camera.size_px();
     let anywhere = ((config.new_per_frame + config.false_per_frame) / (width * height) / NEW_LN_SIZES).ln();
     let by_size = conditions.size.and_then(|size| by_size(observation, size, camera, config));
     let Some(lift) = &observation.lift else {
@@ -74,7 +74,7 @@ fn by_size(
     let whole = |axis: usize| sides[axis].whole().then_some(sides[axis].ratio);
     let ratio = [whole(0), whole(1)].into_iter().flatten().max_by(f64::total_cmp)?;
     let z = size.ln_radius.exp() / ratio;
-    let edges = config.edge_sigma_px / (camera.focal_px[0] * ratio);
+    let edges = config.edge_sigma_px / (camera.fx * ratio);
     let ln_z_variance = size.variance + config.hidden_mean.powi(2) + edges * edges / 2.0;
     let mut seen = Vector3::new(0.0, 0.0, z);
     let mut covariance = Matrix3::zeros();
@@ -90,7 +90,7 @@ fn by_size(
 /// Middle of the fruit along one axis and its variance, pixels: from both edges, or from the one that is in the picture.
 fn middle(axis: usize, observation: &Observation, ratio: f64, camera: &Camera, config: &TrackingConfig) -> (f64, f64) {
     let side = &observation.sides[axis];
-    let half = ratio * camera.focal_px[axis];
+    let half = ratio * camera.focal_px()[axis];
     let edge2 = config.edge_sigma_px.powi(2);
     if side.whole() {
         let lack = (half - side.edges.half()).max(0.0);

@@ -1,10 +1,12 @@
 //! A made-up row of fruits, and a camera that drives along it.
 
 use pomona::nalgebra::{Matrix3, Matrix4, Vector3};
-use pomona::tracking::{Boxes, Camera, LiftedBoxes, Pose, Tracker, TrackingConfig};
+use pomona::tracking::{Boxes, LiftedBoxes, Tracker, TrackingConfig};
+use pomona::{Camera, Pose};
 
 /// 640 x 360, f = 417 px.
-pub const CAMERA: Camera = Camera { focal_px: [417.0, 417.0], principal_px: [320.0, 180.0], size_px: [640.0, 360.0] };
+pub const CAMERA: Camera =
+    Camera { width: 640, height: 360, fx: 417.0, fy: 417.0, cx: 320.0, cy: 180.0, baseline_m: None };
 /// All fruits are alike.
 pub const RADIUS_M: f64 = 0.035;
 /// Way of the camera between two frames.
@@ -40,7 +42,7 @@ pub struct Seen {
 impl Seen {
     pub fn lifted_box(&mut self, edges_px: [f64; 4], centre: Vector3<f64>, sigma_z_m: f64, radius_m: f64) {
         let ray = centre / centre.z;
-        let across = (centre.z / CAMERA.focal_px[0]).powi(2) / 2.0;
+        let across = (centre.z / CAMERA.fx).powi(2) / 2.0;
         self.rows.push(self.edges_px.len());
         self.edges_px.push(edges_px);
         self.centres.push(centre);
@@ -81,7 +83,7 @@ pub fn outline(in_camera: &Vector3<f64>) -> Option<[f64; 4]> {
     let edges = |axis: usize| {
         let theta = in_camera[axis].atan2(in_camera.z);
         let alpha = (RADIUS_M / in_camera[axis].hypot(in_camera.z)).asin();
-        let edge = |angle: f64| 417.0 * angle.tan() + CAMERA.principal_px[axis];
+        let edge = |angle: f64| 417.0 * angle.tan() + CAMERA.principal_px()[axis];
         (edge(theta - alpha), edge(theta + alpha))
     };
     let ((xmin, xmax), (ymin, ymax)) = (edges(0), edges(1));

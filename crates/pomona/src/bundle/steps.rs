@@ -1,12 +1,10 @@
-//! Rigid poses and their small changes.
+//! Small changes of poses.
 //!
 //! A pose `session_from_camera` = (R, t) is changed on its right by xi = (rho, omega), metres and radians in the frame
 //! of the camera: R <- R exp(omega), t <- t + R rho. So a step means the same wherever the session's origin lies.
 
-use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Rotation3, Translation3, Vector3, Vector6};
-
-/// `session_from_camera`: takes points of the camera into the session.
-pub type Pose = IsometryMatrix3<f64>;
+use crate::pose::Pose;
+use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
 /// The matrix of the cross product: `skew(a) * b` is a x b.
 #[inline]
@@ -22,13 +20,13 @@ pub(super) fn moved(pose: &Pose, xi: &Vector6<f64>) -> Pose {
     // Rounding adds up over thousands of steps; one Newton step of the polar decomposition takes it out again.
     let matrix = *rotation.matrix();
     rotation = Rotation3::from_matrix_unchecked(matrix * (Matrix3::identity() * 3.0 - matrix.tr_mul(&matrix)) * 0.5);
-    Pose::from_parts(Translation3::from(pose.translation.vector + pose.rotation * rho), rotation)
+    Pose { rotation, translation: pose.translation + pose.rotation * rho }
 }
 
 /// Residual (t, log R) of a measured relative pose, `error` = measured^-1 predicted.
 #[inline]
 pub(super) fn logarithm(error: &Pose) -> Vector6<f64> {
-    let (t, r) = (error.translation.vector, error.rotation.scaled_axis());
+    let (t, r) = (error.translation, error.rotation.scaled_axis());
     Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
 }
 
@@ -39,7 +37,7 @@ pub(super) fn carried(second_in_first: &Pose) -> Matrix6<f64> {
     let turned = second_in_first.rotation.matrix().transpose();
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
-    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-turned * skew(&second_in_first.translation.vector)));
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-turned * skew(&second_in_first.translation)));
     matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&turned);
     matrix
 }
@@ -58,9 +56,9 @@ mod tests {
     #[test]
     fn a_step_of_the_first_camera_is_carried_to_the_second() {
         let second_in_first =
-            Pose::from_parts(Translation3::new(0.3, -0.2, 0.5), Rotation3::from_euler_angles(0.2, -0.4, 0.6));
+            Pose { rotation: Rotation3::from_euler_angles(0.2, -0.4, 0.6), translation: Vector3::new(0.3, -0.2, 0.5) };
         let xi = Vector6::new(1e-6, -2e-6, 3e-6, 2e-6, 1e-6, -1e-6);
-        let direct = moved(&Pose::identity(), &xi).inverse() * second_in_first;
+        let direct = second_in_first.seen_from(&moved(&Pose::IDENTITY, &xi));
         let carried = moved(&second_in_first, &-(carried(&second_in_first) * xi));
         assert!((direct.to_matrix() - carried.to_matrix()).norm() < 1e-11);
     }
@@ -68,7 +66,7 @@ mod tests {
     #[test]
     fn ten_thousand_steps_leave_a_rotation() {
         let step = Vector6::new(0.01, 0.0, 0.0, 0.02, -0.03, 0.01);
-        let end = (0..10_000).fold(Pose::identity(), |pose, _| moved(&pose, &step));
+        let end = (0..10_000).fold(Pose::IDENTITY, |pose, _| moved(&pose, &step));
         let rotation = end.rotation.matrix();
         assert!((rotation.tr_mul(rotation) - Matrix3::identity()).norm() < 1e-12);
     }
