@@ -9,8 +9,8 @@ import pytest
 
 from pomona import PomonaError
 from pomona.recording import open_recording
-from pomona.recording.rig_files import find_optics
-from pomona.recording.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.calibration.rig_files.yaml_subset import read_documents
 
 SIZE = (640, 480)
 LEFT = np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]])

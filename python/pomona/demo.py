@@ -15,8 +15,8 @@ from pomona.likes import PAIRS, PICTURE
 from pomona.orchard import OrchardMap, add_session, load_session, write_session
 from pomona.pairs import write_pairs
 from pomona.plot import draw_match, save_picture
-from pomona.synth.cells import Cell
 from pomona.synth.clouds import scene_pair
+from pomona.synth.named_cells import Cell
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud

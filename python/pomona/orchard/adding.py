@@ -18,10 +18,10 @@ from pomona.orchard import schema
 from pomona.orchard.failures import WrongContentError
 from pomona.orchard.numbering import last_ids
 from pomona.orchard.opening import TIMEOUT_S, Waiting, blank, writing
-from pomona.orchard.reading import fruits_in_map
 from pomona.orchard.replay import in_view_unseen
 from pomona.orchard.rows import columns_of
 from pomona.orchard.session import Session
+from pomona.orchard.stored_sessions import fruits_in_map
 from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
 from pomona.settings import Settings
 

@@ -14,14 +14,14 @@ from pomona import geopackage
 from pomona.errors import PomonaError
 from pomona.orchard.session import FARTHEST_M, iso_date
 
-__all__ = ["COLUMNS", "Kind", "finite_json", "similarity"]
+__all__ = ["COLUMNS", "CellKind", "finite_json", "similarity"]
 
 RIGID_TOLERANCE = 1e-6
 """How far the axes of a transform may be from right angles and one length; rounding is at 1e-15."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class CellKind:
     """What a column holds.
 
     Attributes
@@ -54,23 +54,23 @@ class Kind:
         return [row for row, cell in enumerate(cells) if not self.are_right((cell,))]
 
 
-def _or_null(kind: Kind) -> Kind:
-    return Kind(f"{kind.expected}, or null", kind.type, kind.hold, may_be_null=True)
+def _or_null(kind: CellKind) -> CellKind:
+    return CellKind(f"{kind.expected}, or null", kind.type, kind.hold, may_be_null=True)
 
 
-def _whole(expected: str, least: int) -> Kind:
-    return Kind(expected, int, lambda cells: min(cells) >= least)
+def _whole(expected: str, least: int) -> CellKind:
+    return CellKind(expected, int, lambda cells: min(cells) >= least)
 
 
-def _number(expected: str, least: float, most: float) -> Kind:
-    return Kind(expected, float, lambda cells: bool(least <= min(cells) and max(cells) <= most))
+def _number(expected: str, least: float, most: float) -> CellKind:
+    return CellKind(expected, float, lambda cells: bool(least <= min(cells) and max(cells) <= most))
 
 
-def _text(expected: str, is_right: Callable[[str], bool] = bool) -> Kind:
-    return Kind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, set(cells))))
+def _text(expected: str, is_right: Callable[[str], bool] = bool) -> CellKind:
+    return CellKind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, set(cells))))
 
 
-def _json(expected: str, is_right: Callable[[Any], bool]) -> Kind:
+def _json(expected: str, is_right: Callable[[Any], bool]) -> CellKind:
     return _text(expected, lambda text: is_right(finite_json(text)))
 
 
@@ -136,7 +136,7 @@ DATE = _text("ISO 8601 local time as 2021-09-27 or 2021-09-27T11:40:12", _is_dat
 OBJECT = _json("a JSON object", lambda value: isinstance(value, dict))
 HASHES = _json("a JSON object of texts", _texts_by_name)
 TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
-POINT = Kind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
+POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
 FINITE = _number("a finite number", -np.finfo(float).max, np.finfo(float).max)
 SQUARE = _number("square metres", -(FARTHEST_M**2), FARTHEST_M**2)
 NUMBER = _number("a number", -np.inf, np.inf)
@@ -145,7 +145,7 @@ DIAMETER = _number("metres above 0", np.finfo(float).tiny, FARTHEST_M)
 SHARE = _number("a number from 0 to 1", 0.0, 1.0)
 UNIT = _number("a number from -1 to 1", -1.0 - RIGID_TOLERANCE, 1.0 + RIGID_TOLERANCE)
 
-COLUMNS: Mapping[str, Mapping[str, Kind]] = {
+COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
     "pomona_format": {"id": ID, "format_version": WHOLE, "kind": TEXT, "program_version": TEXT},
     "sessions": {
         "id": ID,

@@ -15,8 +15,8 @@ from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.orchard.cells import finite_json
 from pomona.orchard.opening import snapshot
-from pomona.orchard.reading import fruits_in_map
 from pomona.orchard.rows import columns_of
+from pomona.orchard.stored_sessions import fruits_in_map
 
 __all__ = ["Observations", "OrchardMap", "Visit"]
 

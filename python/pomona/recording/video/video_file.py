@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.picture_size import MOST_PIXELS, require_size
-from pomona.recording.video_runs import VideoPicture, key_row, wanted_pictures
+from pomona.recording.video.video_runs import VideoPicture, key_row, wanted_pictures
 
 if TYPE_CHECKING:
     from av.container import InputContainer

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pomona.errors import PomonaError
-from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files.fields import array_of, distortion_of, size_of
-from pomona.recording.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.calibration.rig_files.fields import array_of, distortion_of, size_of
+from pomona.recording.calibration.rig_files.yaml_subset import read_documents
 
 __all__ = ["read", "recognises"]
 
@@ -51,7 +51,7 @@ def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
     return Rig(paths=(*plain, *shifted), left=cameras[plain[0]], right=right)
 
 
-def _camera(path: Path) -> Camera:
+def _camera(path: Path) -> RigCamera:
     messages = read_documents(path)
     # A topic that was printed for a while says the same again and again, apart from its header.
     said = [{name: value for name, value in message.items() if name != "header"} for message in messages]
@@ -62,7 +62,7 @@ def _camera(path: Path) -> Camera:
     distortion, fisheye = distortion_of(
         where, said[0]["distortion_model"] or None, array_of(where, {**fields, "D": fields["D"] or []}, "D", (-1,))
     )
-    return Camera(
+    return RigCamera(
         matrix=array_of(where, fields, "K", (3, 3)),
         distortion=distortion,
         fisheye=fisheye,

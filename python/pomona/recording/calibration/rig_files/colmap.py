@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text, shown
+from pomona.recording.calibration.rig import Rig, RigCamera, camera_matrix
 from pomona.recording.picture_size import require_size
 from pomona.recording.poses import transforms
-from pomona.recording.rig import Camera, Rig, camera_matrix
 
 __all__ = ["read"]
 
@@ -54,7 +54,7 @@ def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
             yield f"{path}: line {number}", line.split()
 
 
-def _camera(where: str, words: list[str]) -> Camera:
+def _camera(where: str, words: list[str]) -> RigCamera:
     model = words[1] if len(words) > 1 else "nothing"
     if model not in MODELS:
         raise PomonaError(f"{where}: found the camera model {shown(model)}, expected one of {', '.join(MODELS)}")
@@ -67,9 +67,9 @@ def _camera(where: str, words: list[str]) -> Camera:
     fisheye = model == "OPENCV_FISHEYE"
     kept = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2")
     distortion = np.array([value.get(name, 0.0) for name in kept]) if "k1" in value else np.zeros(0)
-    # COLMAP counts from the corner of the first pixel, as we do; a Camera counts from its centre.
+    # COLMAP counts from the corner of the first pixel, as we do; a RigCamera counts from its centre.
     matrix = camera_matrix(fx, fy, value["cx"] - 0.5, value["cy"] - 0.5)
-    return Camera(matrix, distortion, fisheye, require_size(where, (int(numbers[0]), int(numbers[1]))))
+    return RigCamera(matrix, distortion, fisheye, require_size(where, (int(numbers[0]), int(numbers[1]))))
 
 
 def _pose(where: str, words: list[str]) -> NDArray[np.float64]:

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.reading import parsed_json, read_text, shown
 from pomona.recording.calibration import Calibration
+from pomona.recording.calibration.rectification import Optics
+from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.pictures import UnreadablePictureError, numbered_pictures, picture_size
 from pomona.recording.poses import read_tum
-from pomona.recording.rectification import Optics
 from pomona.recording.rectified_pictures import read_rectified, size_of_first
-from pomona.recording.rig_files import find_optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["FolderRecording"]

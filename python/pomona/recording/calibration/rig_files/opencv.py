@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files.fields import array_of, checked_size, distortion_of, size_of
-from pomona.recording.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.calibration.rig_files.fields import array_of, checked_size, distortion_of, size_of
+from pomona.recording.calibration.rig_files.yaml_subset import read_documents
 
 __all__ = ["read", "recognises"]
 
@@ -51,14 +51,14 @@ def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
     return Rig(paths, left, right, right_from_left)
 
 
-def _camera(where: str, fields: Mapping[str, Any], side: str, size_px: tuple[int, int] | None) -> Camera:
+def _camera(where: str, fields: Mapping[str, Any], side: str, size_px: tuple[int, int] | None) -> RigCamera:
     matrix, distortion = (
         next((name for name in MATRICES[kind] if name in fields), MATRICES[kind][0])
         for kind in (side, f"{side} distortion")
     )
     coefficients = array_of(where, fields, distortion, (-1,)) if distortion in fields else np.zeros(0)
     coefficients, _ = distortion_of(where, None, coefficients)
-    return Camera(array_of(where, fields, matrix, (3, 3)), coefficients, size_px=size_px)
+    return RigCamera(array_of(where, fields, matrix, (3, 3)), coefficients, size_px=size_px)
 
 
 def _size_px_of(where: str, fields: Mapping[str, Any]) -> tuple[int, int] | None:

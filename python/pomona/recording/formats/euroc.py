@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.reading import number_in, read_text, shown, whole_number
-from pomona.recording.listed import ListedRecording
+from pomona.recording.calibration.rectification import rectified
+from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.calibration.rig_files.fields import array_of
+from pomona.recording.calibration.rig_files.kalibr import pinhole
+from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pictures import picture_inside
 from pomona.recording.poses import transforms
 from pomona.recording.poses_in_time import posed_rows, poses_at
-from pomona.recording.rectification import rectified
 from pomona.recording.rectified_pictures import size_of_first
-from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files import find_optics
-from pomona.recording.rig_files.fields import array_of
-from pomona.recording.rig_files.kalibr import pinhole
-from pomona.recording.rig_files.yaml_subset import read_documents
 from pomona.trajectory import Trajectory
 
 __all__ = ["open_euroc", "recognises"]
@@ -128,7 +128,7 @@ def _rig(root: Path) -> tuple[NDArray[np.float64], Rig]:
     return body_from_left, Rig(paths, left, right, right_from_left)
 
 
-def _sensor(path: Path) -> tuple[Camera, NDArray[np.float64]]:
+def _sensor(path: Path) -> tuple[RigCamera, NDArray[np.float64]]:
     fields: dict[str, Any] = read_documents(path)[0]
     # T_BS is body_from_sensor.
     return pinhole(str(path), fields, "distortion_coefficients"), array_of(str(path), fields, "T_BS", (4, 4))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pomona import _core
 from pomona.errors import PomonaError
 
-__all__ = ["Motions", "Refined", "Sightings", "refine"]
+__all__ = ["Motions", "Refined", "SeenFruits", "refine"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -28,7 +28,7 @@ NO_CAMERA = (1.0, 1.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class SeenFruits:
     """Fruits seen in frames.
 
     Attributes
@@ -95,14 +95,14 @@ class Refined:
     squared_errors: Array
 
 
-def refine(session_from_camera: Array, sightings: Sightings, motions: Motions | None = None) -> Refined:
+def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions | None = None) -> Refined:
     """Adjust the poses and fruits of one part of a session, robustly (Cauchy's loss on sightings).
 
     Parameters
     ----------
     session_from_camera : (F, 4, 4) float64
         Poses to begin with. Frames that hang together neither by motions nor by fruits stay where they are.
-    sightings : Sightings
+    sightings : SeenFruits
         Which frame saw which fruit where.
     motions : Motions, optional
         What was measured between frames. Without them the poses are trusted, and only the fruits are adjusted.
@@ -147,7 +147,7 @@ def refine(session_from_camera: Array, sightings: Sightings, motions: Motions | 
     return Refined(adjusted, centres, covariances, squared_errors)
 
 
-def _check(poses: Array, sightings: Sightings) -> None:
+def _check(poses: Array, sightings: SeenFruits) -> None:
     """Refuse what the adjustment would not name."""
     n = len(sightings)
     shapes = (sightings.fruits.shape, sightings.centres_in_camera.shape, sightings.covariances.shape)
@@ -170,7 +170,7 @@ def _whitenings(covariances: Array) -> Array:
         raise PomonaError("refinement: found a covariance that is not positive definite") from None
 
 
-def _medians(poses: Array, sightings: Sightings) -> Array:
+def _medians(poses: Array, sightings: SeenFruits) -> Array:
     """Where to begin: the median of each fruit's sightings."""
     seen_from = poses[sightings.frames]
     places = np.einsum("sij,sj->si", seen_from[:, :3, :3], sightings.centres_in_camera) + seen_from[:, :3, 3]

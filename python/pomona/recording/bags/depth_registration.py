@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
-from pomona.recording.rig import Camera
+from pomona.recording.calibration.rig import RigCamera
 
 __all__ = ["Registration", "is_aligned"]
 
@@ -16,7 +16,7 @@ SAME_PX, SAME_M = 0.5, 0.001
 """Cameras that agree to half a pixel, a millimetre and half a pixel's angle are one."""
 
 
-def is_aligned(depth: Camera, left: Camera, left_from_depth: NDArray[np.float64] | None) -> bool:
+def is_aligned(depth: RigCamera, left: RigCamera, left_from_depth: NDArray[np.float64] | None) -> bool:
     """Whether depth lies in the left picture as it is; without a known transform the cameras' matrices decide."""
     same_camera = depth.size_px == left.size_px and np.abs(depth.matrix - left.matrix).max() <= SAME_PX
     if left_from_depth is None:
@@ -48,7 +48,7 @@ class Registration:
 
     @classmethod
     def between(
-        cls, depth: Camera, size_px: tuple[int, int], calibration: Calibration, left_from_depth: NDArray[np.float64]
+        cls, depth: RigCamera, size_px: tuple[int, int], calibration: Calibration, left_from_depth: NDArray[np.float64]
     ) -> Registration:
         """Prepare it for a depth camera and pictures of a size."""
         import cv2

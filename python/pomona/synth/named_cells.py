@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pomona.synth.row import RowShape
+from pomona.synth.planting import RowShape
 
 Scene = Literal["row", "twins", "grid", "plane", "six"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text
-from pomona.recording.rig import Camera, Rig, camera_matrix
+from pomona.recording.calibration.rig import Rig, RigCamera, camera_matrix
 
 __all__ = ["read"]
 
@@ -63,11 +63,11 @@ def _stereo_keys(sections: configparser.ConfigParser, name: str) -> tuple[str, .
     return ("Baseline", *ways, f"RX_{name}", f"CV_{name}", f"RZ_{name}")
 
 
-def _camera(path: Path, sections: configparser.ConfigParser, section: str, size_px: tuple[int, int]) -> Camera:
+def _camera(path: Path, sections: configparser.ConfigParser, section: str, size_px: tuple[int, int]) -> RigCamera:
     fx, fy, cx, cy = (_number(path, sections, section, key) for key in ("fx", "fy", "cx", "cy"))
     distortion = [_number(path, sections, section, key) for key in ("k1", "k2")]
     distortion += [_number(path, sections, section, key, 0.0) for key in ("p1", "p2", "k3")]
-    return Camera(camera_matrix(fx, fy, cx, cy), np.array(distortion), size_px=size_px)
+    return RigCamera(camera_matrix(fx, fy, cx, cy), np.array(distortion), size_px=size_px)
 
 
 def _number(

@@ -10,9 +10,9 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.reading import shown
-from pomona.recording.rig import Camera, Rig, camera_matrix
-from pomona.recording.rig_files.fields import array_of, checked_size, distortion_of
-from pomona.recording.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig import Rig, RigCamera, camera_matrix
+from pomona.recording.calibration.rig_files.fields import array_of, checked_size, distortion_of
+from pomona.recording.calibration.rig_files.yaml_subset import read_documents
 
 __all__ = ["pinhole", "read", "recognises"]
 
@@ -35,7 +35,7 @@ def read(paths: tuple[Path, ...], _size_px: tuple[int, int]) -> Rig:
     return Rig((path,), left, right, array_of(f"{path}: cam1", chain["cam1"], "T_cn_cnm1", (4, 4)))
 
 
-def pinhole(where: str, fields: Mapping[str, Any], coefficients: str) -> Camera:
+def pinhole(where: str, fields: Mapping[str, Any], coefficients: str) -> RigCamera:
     """Read a pinhole as Kalibr and EuRoC write it: intrinsics fx fy cx cy, distortion, resolution."""
     if fields.get("camera_model", "pinhole") != "pinhole":
         raise PomonaError(f"{where}: camera_model: found {shown(fields['camera_model'])}, expected 'pinhole'")
@@ -44,4 +44,4 @@ def pinhole(where: str, fields: Mapping[str, Any], coefficients: str) -> Camera:
     values = array_of(where, fields, coefficients, (-1,)) if coefficients in fields else np.zeros(0)
     distortion, fisheye = distortion_of(where, model, values)
     size_px = checked_size(where, array_of(where, fields, "resolution", (2,)).tolist())
-    return Camera(camera_matrix(fx, fy, cx, cy), distortion, fisheye, size_px)
+    return RigCamera(camera_matrix(fx, fy, cx, cy), distortion, fisheye, size_px)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.frame import Frame, Recording
-from pomona.recording.part import PartOfRecording
+from pomona.recording.part_of_recording import PartOfRecording
 from pomona.trajectory import Trajectory
 
 __all__ = ["SelectedRecording", "selected"]

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.calibration import Calibration
+from pomona.recording.calibration.rectification import Optics
+from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.pairing import half_period, mutually_nearest
-from pomona.recording.rectification import Optics
-from pomona.recording.rig_files import find_optics
-from pomona.recording.video_file import VideoFile
-from pomona.recording.video_runs import VideoPicture
+from pomona.recording.video.video_file import VideoFile
+from pomona.recording.video.video_runs import VideoPicture
 
 __all__ = ["VIDEO_SUFFIXES", "VideoRecording", "left_and_right", "open_video"]
 

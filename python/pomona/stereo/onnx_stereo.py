@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.depth import FruitDepth
 from pomona.detect.onnx.network import input_size, open_session, reason_of
 from pomona.errors import PomonaError
 from pomona.reading import shown
 from pomona.recording.calibration import Calibration
+from pomona.stereo.fruit_depth import FruitDepth
 from pomona.stereo.pair import Picture, depth_of_disparity, focal_baseline_px_m, in_colour
 
 __all__ = ["OnnxStereo", "Values"]

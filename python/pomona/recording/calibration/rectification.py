@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.recording.calibration import Calibration, checked_baseline_m
-from pomona.recording.rig import Camera, Rig
+from pomona.recording.calibration.pinhole import Calibration, checked_baseline_m
+from pomona.recording.calibration.rig import Rig, RigCamera
 
 __all__ = ["Optics", "rectified"]
 
@@ -142,7 +142,7 @@ def _calibration(
     )
 
 
-def _bouguet(rig: Rig, right: Camera, size_px: tuple[int, int]) -> tuple[NDArray[np.float64], ...]:
+def _bouguet(rig: Rig, right: RigCamera, size_px: tuple[int, int]) -> tuple[NDArray[np.float64], ...]:
     """Give rotation and projection of left and right."""
     import cv2
 
@@ -171,7 +171,9 @@ def _bouguet(rig: Rig, right: Camera, size_px: tuple[int, int]) -> tuple[NDArray
     return left_rotation, left_projection, right_rotation, right_projection
 
 
-def _aligned(left: Camera, right: Camera, rotation: NDArray[np.float64], translation_m: NDArray[np.float64]) -> bool:
+def _aligned(
+    left: RigCamera, right: RigCamera, rotation: NDArray[np.float64], translation_m: NDArray[np.float64]
+) -> bool:
     """Whether the cameras are rectified as they stand."""
     straight = not left.distortion.any() and not right.distortion.any()
     turn_px = left.matrix[0, 0] * float(np.abs(rotation - np.eye(3)).max())
@@ -180,14 +182,14 @@ def _aligned(left: Camera, right: Camera, rotation: NDArray[np.float64], transla
     return straight and max(turn_px, skew_px, unlike_px) < SAME_PX
 
 
-def _coefficients(camera: Camera) -> NDArray[np.float64]:
+def _coefficients(camera: RigCamera) -> NDArray[np.float64]:
     if len(camera.distortion):
         return camera.distortion
     return np.zeros(4 if camera.fisheye else 5)
 
 
 def _maps(
-    camera: Camera, rotation: NDArray[np.float64], projection: NDArray[np.float64], size_px: tuple[int, int]
+    camera: RigCamera, rotation: NDArray[np.float64], projection: NDArray[np.float64], size_px: tuple[int, int]
 ) -> Maps | None:
     import cv2
 

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.recording.bags.mcap_file import McapFile
 from pomona.recording.bags.message_file import counted
+from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.dates import date_of_ns
 from pomona.recording.picture_size import MOST_PIXELS, require_size
-from pomona.recording.rig_files import find_optics
-from pomona.recording.video import VideoRecording
-from pomona.recording.video_file import missing_pyav
-from pomona.recording.video_runs import VideoPicture, key_row, wanted_pictures
+from pomona.recording.video.stereo_video import VideoRecording
+from pomona.recording.video.video_file import missing_pyav
+from pomona.recording.video.video_runs import VideoPicture, key_row, wanted_pictures
 
 if TYPE_CHECKING:
     from av.video.frame import VideoFrame

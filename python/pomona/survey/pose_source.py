@@ -11,17 +11,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona import refinement
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.odometry import Motion, OdometryTrajectory, StereoOdometry
 from pomona.recording import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
-from pomona.refinement import refine
 from pomona.survey.prefetch import Kind
+from pomona.survey.refinement import Motions, SeenFruits, refine
 from pomona.survey.sightings import Sightings
 from pomona.survey.thinning import between_keys, followed, stride
 
-__all__ = ["Camera", "Place", "camera_of"]
+__all__ = ["Place", "PoseSource", "pose_source_of"]
 
 
 OFF_PX = 0.5
@@ -50,7 +49,7 @@ class Place:
     broken: str | None = None
 
 
-class Camera(Protocol):
+class PoseSource(Protocol):
     """Gives the place of each frame, in order."""
 
     needs: tuple[Kind, ...]
@@ -76,7 +75,7 @@ class Camera(Protocol):
         """
 
 
-def camera_of(recording: Recording, *, odometry: bool = False) -> Camera:
+def pose_source_of(recording: Recording, *, odometry: bool = False) -> PoseSource:
     """Choose where poses come from.
 
     Parameters
@@ -187,11 +186,11 @@ class _Followed:
         return way
 
 
-def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int64]) -> refinement.Sightings:
+def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int64]) -> SeenFruits:
     """Sightings of fruits for the refinement; fruits seen once hold nothing together."""
     views = np.bincount(fruits[fruits >= 0], minlength=1)
     kept = np.flatnonzero((fruits >= 0) & (views[np.maximum(fruits, 0)] > 1))
-    return refinement.Sightings(
+    return SeenFruits(
         frames=rows[sightings.rows[kept]],
         fruits=np.unique(fruits[kept], return_inverse=True)[1],
         centres_in_camera=sightings.centres_in_camera[kept],
@@ -199,10 +198,10 @@ def _seen(sightings: Sightings, fruits: NDArray[np.int64], rows: NDArray[np.int6
     )
 
 
-def _seen_by(sightings: refinement.Sightings, keys: NDArray[np.int64]) -> refinement.Sightings:
+def _seen_by(sightings: SeenFruits, keys: NDArray[np.int64]) -> SeenFruits:
     """Sightings of some frames, which become the rows 0, 1, ... ."""
     kept = np.flatnonzero(np.isin(sightings.frames, keys))
-    return refinement.Sightings(
+    return SeenFruits(
         frames=np.searchsorted(keys, sightings.frames[kept]),
         fruits=np.unique(sightings.fruits[kept], return_inverse=True)[1],
         centres_in_camera=sightings.centres_in_camera[kept],
@@ -210,12 +209,12 @@ def _seen_by(sightings: refinement.Sightings, keys: NDArray[np.int64]) -> refine
     )
 
 
-def _between(way: OdometryTrajectory, rows: NDArray[np.int64]) -> refinement.Motions:
+def _between(way: OdometryTrajectory, rows: NDArray[np.int64]) -> Motions:
     """Motions between the frames of one part, by their rows in it."""
     row_of = np.full(len(way), -1, np.int64)
     row_of[rows] = np.arange(len(rows))
     ours = np.flatnonzero(row_of[way.first] >= 0)
-    return refinement.Motions(
+    return Motions(
         row_of[way.first[ours]], row_of[way.second[ours]], way.first_from_second[ours], way.information[ours]
     )
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
-from pomona.depth import Lifted
 from pomona.detect import Detections
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.survey.depth import Lifted
 
 __all__ = ["Belief", "TrackViews", "Tracker", "Tracks", "believed"]
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.reading import read_text, shown
-from pomona.recording.listed import ListedRecording
+from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pairing import mutually_nearest
 from pomona.recording.pictures import picture_inside
 from pomona.recording.poses import read_tum
 from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectified_pictures import size_of_first
-from pomona.recording.rig_files import find_optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["open_tum_rgbd", "recognises"]

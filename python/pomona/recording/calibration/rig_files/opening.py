@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pomona.errors import PomonaError
-from pomona.recording.calibration import Calibration
-from pomona.recording.rectification import Optics, rectified
-from pomona.recording.rig import Rig
+from pomona.recording.calibration.pinhole import Calibration
+from pomona.recording.calibration.rectification import Optics, rectified
+from pomona.recording.calibration.rig import Rig
 
 __all__ = ["find_optics"]
 
@@ -54,7 +54,7 @@ def find_optics(
     ((kind, paths),) = kinds.items()
     if kind == "json":
         return _ours(paths[0], size_px, stereo, depth_unit_m)
-    rig: Rig = importlib.import_module(f"pomona.recording.rig_files.{kind}").read(paths, size_px)
+    rig: Rig = importlib.import_module(f"pomona.recording.calibration.rig_files.{kind}").read(paths, size_px)
     return rectified(rig, size_px, stereo=stereo, depth_unit_m=depth_unit_m)
 
 
@@ -89,10 +89,10 @@ def _kind(path: Path, chosen: bool) -> str | None:
 
 
 def _yaml_kind(path: Path) -> str | None:
-    from pomona.recording.rig_files.yaml_subset import read_documents
+    from pomona.recording.calibration.rig_files.yaml_subset import read_documents
 
     fields: dict[str, Any] = read_documents(path)[0]
-    modules = ((kind, importlib.import_module(f"pomona.recording.rig_files.{kind}")) for kind in YAML_KINDS)
+    modules = ((kind, importlib.import_module(f"pomona.recording.calibration.rig_files.{kind}")) for kind in YAML_KINDS)
     return next((kind for kind, module in modules if module.recognises(fields)), None)
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
+from pomona.recording.calibration.rectification import Optics
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
-from pomona.recording.rectification import Optics
 from pomona.recording.rectified_pictures import read_rectified
 from pomona.trajectory import Trajectory
 

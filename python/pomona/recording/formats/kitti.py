@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text
-from pomona.recording.listed import ListedRecording
+from pomona.recording.calibration.rectification import Optics, rectified
+from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pictures import numbered_pictures
 from pomona.recording.poses import read_kitti
-from pomona.recording.rectification import Optics, rectified
 from pomona.recording.rectified_pictures import size_of_first
-from pomona.recording.rig import Camera, Rig
 from pomona.trajectory import Trajectory
 
 __all__ = ["open_kitti", "recognises"]
@@ -89,7 +89,7 @@ def _projections(path: Path, sides: tuple[str, str]) -> tuple[NDArray[np.float64
 
 
 def _optics(path: Path, left: NDArray[np.float64], right: NDArray[np.float64], size_px: tuple[int, int]) -> Optics:
-    cameras = [Camera(side[:, :3], np.zeros(0), rotation=np.eye(3), projection=side) for side in (left, right)]
+    cameras = [RigCamera(side[:, :3], np.zeros(0), rotation=np.eye(3), projection=side) for side in (left, right)]
     return rectified(Rig((path,), left=cameras[0], right=cameras[1]), size_px, stereo=True)
 
 

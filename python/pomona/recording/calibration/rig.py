@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["Camera", "Rig", "camera_matrix"]
+__all__ = ["Rig", "RigCamera", "camera_matrix"]
 
 
 def camera_matrix(fx: float, fy: float, cx: float, cy: float) -> NDArray[np.float64]:
@@ -19,7 +19,7 @@ def camera_matrix(fx: float, fy: float, cx: float, cy: float) -> NDArray[np.floa
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class RigCamera:
     """One camera. Picture coordinates are those of OpenCV here: (0, 0) is the **centre** of the top left pixel.
 
     Attributes
@@ -57,8 +57,8 @@ class Rig:
     """
 
     paths: tuple[Path, ...]
-    left: Camera
-    right: Camera | None = None
+    left: RigCamera
+    right: RigCamera | None = None
     right_from_left: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
