@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.opening import TIMEOUT_S, Waiting, writing
 from pomona.orchard.replay import ReplayedFruits, replayed, sighted
-from pomona.orchard.rows import columns_of
 from pomona.orchard.writing import nullable, update_layers
+from pomona.store.failures import WrongContentError
+from pomona.store.opening import TIMEOUT_S, Waiting, writing
+from pomona.store.rows import columns_of
 
 __all__ = ["Removed", "remove_session"]
 

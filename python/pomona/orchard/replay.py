@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.orchard.rows import columns_of
+from pomona.store.rows import columns_of
 
 __all__ = ["ReplayedFruits", "Sighted", "in_view_unseen", "replayed", "sighted"]
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from pomona.plot.arrows import Arrows
 from pomona.plot.fates import Fates
+from pomona.plot.projections import View, side_and_plan
 from pomona.plot.sheet import FAINT, INK, Sheet
 from pomona.plot.trees import Trees
-from pomona.plot.views import View, side_and_plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

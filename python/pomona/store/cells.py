@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.errors import PomonaError
-from pomona.orchard.session import FARTHEST_M, iso_date
+from pomona.store.values import FARTHEST_M, iso_date
 
 __all__ = ["COLUMNS", "CellKind", "finite_json", "similarity"]
 

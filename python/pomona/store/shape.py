@@ -15,9 +15,9 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from pomona import geopackage
-from pomona.orchard import schema
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.sql_text import is_column_list, made, names_in, words_of
+from pomona.store import schema
+from pomona.store.failures import WrongContentError
+from pomona.store.sql_text import is_column_list, made, names_in, words_of
 
 __all__ = ["Item", "expected", "items_of", "require_item", "require_ours"]
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from pomona import geopackage
 from pomona.errors import PomonaError
-from pomona.orchard import recovery, shape
-from pomona.orchard.failures import DAMAGED, WrongContentError, told
-from pomona.orchard.guard import guard, release, trust
-from pomona.orchard.rows import columns_of
-from pomona.orchard.schema import FORMAT_VERSION, Kind
+from pomona.store import recovery, shape
+from pomona.store.failures import DAMAGED, WrongContentError, told
+from pomona.store.guard import guard, release, trust
+from pomona.store.rows import columns_of
+from pomona.store.schema import FORMAT_VERSION, Kind
 
 __all__ = ["TIMEOUT_S", "Waiting", "blank", "snapshot", "writing"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.schema import LAYERS
+from pomona.store.failures import WrongContentError
+from pomona.store.schema import LAYERS
 
 __all__ = ["last_ids", "misnumbered"]
 

@@ -6,8 +6,8 @@ import sqlite3
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from pomona.orchard.cells import COLUMNS
-from pomona.orchard.failures import WrongContentError
+from pomona.store.cells import COLUMNS
+from pomona.store.failures import WrongContentError
 
 __all__ = ["columns_of", "misfits"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlite3
 import sys
 
-from pomona.orchard import shape
+from pomona.store import shape
 
 __all__ = ["guard", "release", "trust"]
 
