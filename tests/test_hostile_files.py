@@ -410,7 +410,16 @@ def test_calibrations_of_other_programs_are_not_trusted(tmp_path, name, content)
     refused(lambda: find_optics(tmp_path, (672, 376), stereo=False))
 
 
-@pytest.mark.parametrize("junk", [" # #" * 100_000 + '"', "a" + " " * 200_000 + "b", '"' * 100_001])
+@pytest.mark.parametrize(
+    "junk",
+    [
+        " # #" * 100_000 + '"',
+        "a" + " " * 200_000 + "b",
+        '"' * 100_001,
+        *("- " * 100_000, "? " * 100_000, "[" * 100_000, "{a: " * 100_000, "!a" * 100_000, "&a " * 100_000),
+        "\n" + "a: &a [x, x, x, x]\nb: &b [*a, *a, *a, *a]\nc: [*b, *b, *b, *b]\n",
+    ],
+)
 def test_a_line_of_yaml_is_walked_over_once(tmp_path, junk):
     code = "from pomona.recording.calibration.rig_files import find_optics; find_optics(path, (64, 48), stereo=False)"
     (tmp_path / "a.yaml").write_text(f"cam0: {junk}\n")

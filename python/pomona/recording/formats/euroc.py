@@ -19,7 +19,7 @@ from pomona.recording.calibration.rig import Rig, RigCamera
 from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.calibration.rig_files.fields import array_of
 from pomona.recording.calibration.rig_files.kalibr import pinhole
-from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pictures import picture_inside
 from pomona.recording.poses import transforms

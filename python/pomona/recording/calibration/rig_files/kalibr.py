@@ -12,7 +12,7 @@ from pomona.errors import PomonaError
 from pomona.reading import shown
 from pomona.recording.calibration.rig import Rig, RigCamera, camera_matrix
 from pomona.recording.calibration.rig_files.fields import array_of, checked_size, distortion_of
-from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 
 __all__ = ["pinhole", "read", "recognises"]
 

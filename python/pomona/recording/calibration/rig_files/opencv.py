@@ -10,7 +10,7 @@ import numpy as np
 
 from pomona.recording.calibration.rig import Rig, RigCamera
 from pomona.recording.calibration.rig_files.fields import array_of, checked_size, distortion_of, size_of
-from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 
 __all__ = ["read", "recognises"]
 

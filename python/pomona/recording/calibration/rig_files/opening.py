@@ -89,7 +89,7 @@ def _kind(path: Path, chosen: bool) -> str | None:
 
 
 def _yaml_kind(path: Path) -> str | None:
-    from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+    from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 
     fields: dict[str, Any] = read_documents(path)[0]
     modules = ((kind, importlib.import_module(f"pomona.recording.calibration.rig_files.{kind}")) for kind in YAML_KINDS)

@@ -9,7 +9,7 @@ from typing import Any
 from pomona.errors import PomonaError
 from pomona.recording.calibration.rig import Rig, RigCamera
 from pomona.recording.calibration.rig_files.fields import array_of, distortion_of, size_of
-from pomona.recording.calibration.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 
 __all__ = ["read", "recognises"]
 
