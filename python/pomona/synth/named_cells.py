@@ -127,6 +127,84 @@ ROW_CELLS = tuple(
     )
 )
 
+PLANTINGS = {
+    "trellis": RowShape(
+        wood="arms",
+        wires_m=(0.5, 1.0, 1.5, 2.0, 2.5),
+        reach_along_m=0.6,
+        scatter_m=(0.05, 0.05),
+        fruits_per_tree=(50, 90),
+        height_m=2.7,
+    ),
+    "vine": RowShape(
+        wood="arms",
+        wires_m=(0.9,),
+        reach_along_m=0.6,
+        spacing_m=1.2,
+        scatter_m=(0.05, 0.05),
+        fruits_per_tree=(20, 30),
+        cluster_sizes=(0.8, 0.2),
+        cluster_gap_m=(0.1, 0.14),
+        least_gap_m=0.09,
+        below_m=(0.05, 0.2),
+        height_m=1.8,
+    ),
+    "pergola": RowShape(
+        wood="roof",
+        wires_m=(2.0,),
+        spacing_m=1.5,
+        reach_along_m=0.75,
+        reach_depth_m=1.2,
+        branches=(10, 14),
+        scatter_m=(0.08, 0.1),
+        flatness=(1.0, 1.0, 0.5),
+        fruits_per_tree=(40, 80),
+        below_m=(0.05, 0.15),
+        height_m=2.2,
+    ),
+    "kiwifruit": RowShape(
+        wood="roof",
+        wires_m=(1.8,),
+        spacing_m=1.5,
+        reach_along_m=0.75,
+        reach_depth_m=1.2,
+        branches=(14, 18),
+        scatter_m=(0.05, 0.07),
+        flatness=(1.0, 1.0, 0.4),
+        fruits_per_tree=(160, 220),
+        cluster_sizes=(0.2, 0.25, 0.25, 0.15, 0.15),
+        cluster_gap_m=(0.055, 0.075),
+        least_gap_m=0.05,
+        below_m=(0.03, 0.1),
+        height_m=2.0,
+    ),
+    "spindle": RowShape(
+        spacing_m=1.0, height_m=3.2, branches=(16, 24), reach_along_m=0.4, reach_depth_m=0.35, fruits_per_tree=(80, 140)
+    ),
+    "hedge": RowShape(
+        spacing_m=0.8,
+        height_m=2.5,
+        branches=(10, 14),
+        reach_along_m=0.5,
+        reach_depth_m=0.2,
+        scatter_m=(0.06, 0.09),
+        fruits_per_tree=(50, 90),
+    ),
+}
+"""How trees are trained: walls of wires, a cordon with bunches below, roofs, thin trees and hedges."""
+
+PLANTING_CELLS = tuple(
+    cell
+    for name, row in PLANTINGS.items()
+    for cell in (
+        replace(_PART45, name=f"{name}-part45", row=row),
+        replace(_PART45, name=f"{name}-part45up", row=row, upright=True, seeded_as=f"{name}-part45"),
+        replace(_NOOV, name=f"{name}-noov", row=row),
+        replace(_NOOV, name=f"{name}-noovup", row=row, upright=True, seeded_as=f"{name}-noov"),
+    )
+)
+"""The same questions on every planting: two of five trees in common with 45 % hidden, and none."""
+
 _CLEAN = Cell("clean", hidden=0.0, false_rate=0.0, noise_m=0.01)
 
 ADVERSARIAL_CELLS = (
@@ -139,4 +217,6 @@ ADVERSARIAL_CELLS = (
 )
 """Symmetric, degenerate and tiny scenes: a confident wrong answer is the only failure."""
 
-CELLS: dict[str, Cell] = {cell.name: cell for cell in (*PAPER_CELLS, *VARIANT_CELLS, *ROW_CELLS, *ADVERSARIAL_CELLS)}
+CELLS: dict[str, Cell] = {
+    cell.name: cell for cell in (*PAPER_CELLS, *VARIANT_CELLS, *ROW_CELLS, *PLANTING_CELLS, *ADVERSARIAL_CELLS)
+}

@@ -1,17 +1,21 @@
 """A row of fruit trees as a statistical model: where its fruits hang.
 
-Row frame: x along the row, y in depth (across it), z up, metres; tree i stands at x = i * spacing.
+Row frame: x along the row, y in depth (across it), z up, metres; tree i stands at x = i * spacing. Three kinds
+of wood bear the fruits: free branches of a tree, arms tied along wires (trellis, vine), and canes laid over a roof
+(pergola, kiwifruit).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+Wood = Literal["branches", "arms", "roof"]
 
 # Candidate places tried for one fruit before it is left out of its cluster.
 _TRIES = 16
@@ -39,6 +43,14 @@ class RowShape:
         No two fruits of the row are closer.
     scatter_m
         Smallest and largest standard deviation, per axis, of a cluster about its branch.
+    flatness
+        Factors of the scatter along the row, in depth and upwards.
+    wood
+        Free branches; arms along wires, both ways from the trunk; canes over a roof, both ways across the row.
+    wires_m
+        Heights of the wires, or of the roof.
+    below_m
+        How far clusters hang below arms and canes, at least and at most.
     """
 
     spacing_m: float = 1.2
@@ -51,6 +63,10 @@ class RowShape:
     cluster_gap_m: tuple[float, float] = (0.07, 0.10)
     least_gap_m: float = 0.068
     scatter_m: tuple[float, float] = (0.08, 0.10)
+    flatness: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    wood: Wood = "branches"
+    wires_m: tuple[float, ...] = ()
+    below_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +128,10 @@ def _branches(
     rng: np.random.Generator, number: int, shape: RowShape
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Roots on the trunk at random heights, tips on the ellipse of the reach, up to 0.3 m higher."""
+    if shape.wood == "arms":
+        return _arms(number, shape)
+    if shape.wood == "roof":
+        return _canes(rng, number, shape)
     count = int(rng.integers(shape.branches[0], shape.branches[1] + 1))
     roots = np.zeros((count, 3))
     roots[:, 0] = number * shape.spacing_m
@@ -122,6 +142,26 @@ def _branches(
         axis=1,
     )
     return roots, roots + reach
+
+
+def _arms(number: int, shape: RowShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two arms along every wire, from the trunk to halfway to the next."""
+    heights = np.repeat(shape.wires_m, 2)
+    roots = np.stack([np.full(len(heights), number * shape.spacing_m), np.zeros(len(heights)), heights], axis=1)
+    along = np.tile([-shape.reach_along_m, shape.reach_along_m], len(shape.wires_m))
+    return roots, roots + along[:, None] * [1.0, 0.0, 0.0]
+
+
+def _canes(rng: np.random.Generator, number: int, shape: RowShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Canes side by side, from the middle of the roof to either side."""
+    count = int(rng.integers(shape.branches[0], shape.branches[1] + 1))
+    roots = np.zeros((count, 3))
+    roots[:, 0] = number * shape.spacing_m + rng.uniform(-shape.reach_along_m, shape.reach_along_m, count)
+    roots[:, 2] = rng.choice(shape.wires_m, count)
+    tips = roots.copy()
+    tips[:, 0] += rng.normal(0.0, 0.1, count)
+    tips[:, 1] = rng.choice([-1.0, 1.0], count) * rng.uniform(0.6, 1.0, count) * shape.reach_depth_m
+    return roots, tips
 
 
 def _hang_fruits(
@@ -146,6 +186,8 @@ def _hang_fruits(
         for _ in range(min(size, wanted - (count - start))):
             if count == first:
                 centre = roots[on] + fraction * (tips[on] - roots[on])
+                if shape.below_m[1] > 0.0:
+                    centre = centre - [0.0, 0.0, rng.uniform(*shape.below_m)]
                 sigma = rng.uniform(*shape.scatter_m)
                 places = centre + _flatten(rng.normal(0.0, sigma, (_TRIES, 3)), shape)
             else:
@@ -162,6 +204,7 @@ def _hang_fruits(
 
 
 def _flatten(offsets: NDArray[np.float64], shape: RowShape) -> NDArray[np.float64]:
-    """Keep the scatter in depth of a walled tree within the reach of its branches."""
-    offsets[:, 1] *= min(1.0, shape.reach_depth_m / max(shape.scatter_m))
-    return offsets
+    """Keep the scatter in depth of a walled tree within the reach of its branches, and of tied wood to its flatness."""
+    if shape.wood == "branches":
+        offsets[:, 1] *= min(1.0, shape.reach_depth_m / max(shape.scatter_m))
+    return np.asarray(offsets * shape.flatness)
