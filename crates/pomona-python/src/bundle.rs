@@ -8,7 +8,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pomona::bundle::{
-    Adjustment, KnownPoints, LocateSettings, Measured, Observation, Problem, RelativePose, Settings, State,
+    Adjustment, KnownPoints, LocateSettings, Measured, PointView, Problem, RelativePose, Settings, State,
     adjust as adjust_bundle, locate as locate_picture,
 };
 use pomona::nalgebra::{Matrix3, Matrix6, Vector2, Vector3};
@@ -34,7 +34,7 @@ pub struct Seen<'py> {
 }
 
 impl Seen<'_> {
-    fn append(&self, measured: fn(Vector3<f64>) -> Measured, all: &mut Vec<Observation>) -> PyResult<()> {
+    fn append(&self, measured: fn(Vector3<f64>) -> Measured, all: &mut Vec<PointView>) -> PyResult<()> {
         let (poses, seen) = (rows("poses", &self.poses)?, rows("points", &self.points)?);
         let values = points(&self.values)?;
         let whitenings = matrices(&self.whitenings)?;
@@ -42,7 +42,7 @@ impl Seen<'_> {
             return Err(wrong("observations: found arrays of different lengths"));
         }
         for (((pose, point), value), whitening) in poses.into_iter().zip(seen).zip(values).zip(whitenings) {
-            all.push(Observation { pose, point, measured: measured(value.coords), whitening });
+            all.push(PointView { pose, point, measured: measured(value.coords), whitening });
         }
         Ok(())
     }

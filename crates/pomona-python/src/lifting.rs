@@ -8,7 +8,7 @@ use numpy::{
 };
 use pomona::camera::DepthPicture;
 use pomona::lifting::fusion::{self, MeasuredCentre, MeasuredDiameter};
-use pomona::lifting::{self, Refusal, Sighting, Source};
+use pomona::lifting::{self, LiftedFruit, Refusal, Source};
 use pomona::nalgebra::Matrix3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -43,7 +43,7 @@ pub fn lift<'py>(
     let depth = depth_m.as_slice()?;
     let lifted = py.detach(|| lifting::lift(DepthPicture::new(depth, camera.width), &boxes, &sources, &camera));
     let outcomes = PyArray1::from_iter(py, lifted.iter().map(outcome));
-    let found: Vec<&Sighting> = lifted.iter().flatten().collect();
+    let found: Vec<&LiftedFruit> = lifted.iter().flatten().collect();
     let centres = PyArray1::from_iter(py, found.iter().flat_map(|one| one.centre.coords.iter().copied()));
     let covariances = PyArray1::from_iter(py, found.iter().flat_map(|one| one.covariance.iter().copied()));
     let numbers = PyArray1::from_iter(
@@ -54,7 +54,7 @@ pub fn lift<'py>(
     Ok((outcomes, centres.reshape([count, 3])?, covariances.reshape([count, 3, 3])?, numbers.reshape([count, 4])?))
 }
 
-fn outcome(lifted: &Result<Sighting, Refusal>) -> u8 {
+fn outcome(lifted: &Result<LiftedFruit, Refusal>) -> u8 {
     match lifted {
         Ok(_) => 0,
         Err(Refusal::Cut) => 1,

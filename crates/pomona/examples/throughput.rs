@@ -4,9 +4,9 @@
 //! map's index per second. One thread, the fastest of some repetitions.
 
 use nalgebra::Point3;
-use pomona::constellation::constellations;
-use pomona::descriptor::{Described, describe_all};
-use pomona::index::Index;
+use pomona::neighbours::index::Index;
+use pomona::paper::constellation::constellations;
+use pomona::paper::descriptor::{Described, describe_all};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -7,40 +7,35 @@
 //! Lengths are metres, angles radians, frames right-handed. A transform `map_from_query` takes points of the query
 //! into the map.
 
-pub mod appearance;
+pub mod answer;
 pub mod assignment;
 pub mod bundle;
 pub mod camera;
-pub mod clique;
 pub mod cloud;
-pub mod codebook;
-pub mod completion;
 mod conditioning;
 pub mod config;
-pub mod constellation;
-pub mod descriptor;
 pub mod error;
-mod evidence;
 pub mod geometry;
-pub mod index;
 pub mod lifting;
+pub mod look;
 pub mod matching;
 mod meanings;
-mod paper;
+pub mod neighbours;
+pub mod paper;
 pub mod pose;
-pub mod ransac;
+mod random;
 pub mod row_search;
 pub mod stereo;
 pub mod tracking;
 pub mod verified;
-pub mod voting;
 
+pub use answer::{Match, Pair, Registration, Verdict};
 pub use camera::Camera;
 pub use cloud::{FruitCloud, Views};
 pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
-pub use matching::{MapIndex, Match, Method, Pair, Registration, Request, Verdict, match_clouds};
+pub use matching::{MapIndex, Method, Request, match_clouds};
 pub use pose::Pose;
 pub use verified::VerifiedConfig;
 

@@ -26,7 +26,7 @@ use nalgebra::{Matrix3, Matrix6};
 use normal::Plan;
 
 pub use locate::{KnownPoints, LocateSettings, Located, locate};
-pub use problem::{Measured, Observation, Problem, RelativePose, State};
+pub use problem::{Measured, PointView, Problem, RelativePose, State};
 
 /// When an adjustment ends and how it weighs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +93,7 @@ pub fn adjust(problem: &Problem, initial: State, settings: &Settings) -> Result<
     }
     let cost = plan.cost(&state);
     let last = plan.normal(&state, 0.0);
-    let distance = |seen: &Observation| seen.squared_error(&problem.camera, &state).unwrap_or(f64::INFINITY);
+    let distance = |seen: &PointView| seen.squared_error(&problem.camera, &state).unwrap_or(f64::INFINITY);
     Ok(Adjustment {
         point_covariances: last.point_covariances(),
         squared_errors: problem.observations.iter().map(distance).collect(),
@@ -188,7 +188,7 @@ fn check(problem: &Problem, state: &State) -> Result<()> {
 }
 
 fn check_finite(problem: &Problem, state: &State) -> Result<()> {
-    let seen = |seen: &Observation| {
+    let seen = |seen: &PointView| {
         let (Measured::Picture(value) | Measured::Place(value)) = seen.measured;
         (seen.whitening.sum() + value.sum()).is_finite()
     };

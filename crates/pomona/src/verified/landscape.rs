@@ -2,10 +2,11 @@
 
 use super::cells::Cut;
 use super::chance::{Companions, crowding, kinship, local_density};
-use super::grid::{Grid, Support};
-use super::space::Tree;
-use super::vicinity::Vicinity;
+use super::support::Support;
 use crate::cloud::FruitCloud;
+use crate::neighbours::grid::Grid;
+use crate::neighbours::tree::Tree;
+use crate::neighbours::vicinity::Vicinity;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::sync::OnceLock;

@@ -11,35 +11,32 @@
 //!    probabilities (`association`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
-mod answer;
-mod association;
 mod cells;
 mod chance;
 mod codes;
+mod conclusion;
 mod decision;
+mod displacement;
 mod doubts;
+mod extent;
 #[cfg(test)]
 mod fixture;
-mod grid;
 mod growth;
 mod hypothesis;
 mod landscape;
-mod outline;
 mod overlap;
+mod pairing;
 mod patches;
-mod pose;
+mod placement;
 mod proposal;
 mod scatter;
 mod search;
 mod seeds;
 mod settlement;
-mod sharing;
 mod size;
-mod space;
+mod support;
 mod vertical;
-mod vicinity;
 
 pub use acceptance::VerifiedConfig;
-pub(crate) use decision::{MAX_FRUITS, Prepared, pairs_under, search};
-pub(crate) use grid::CellHasher;
+pub(crate) use decision::{MAX_FRUITS, VerifiedMap, pairs_under, search};
 pub(crate) use landscape::median;
