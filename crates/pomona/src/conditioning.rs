@@ -108,7 +108,7 @@ impl Conditioned {
             Some(found) if !self.rows.is_empty() && found > most_m => {
                 let reason =
                     format!("found {found} m, expected at most {most_m:.3} m, the spacing of the map's fruits");
-                Err(Error::Setting { name: "noise_m", reason })
+                Err(Error::Request { name: "noise_m", reason })
             }
             _ => Ok(noise_m.map(|noise_m| noise_m / self.unit)),
         }

@@ -142,7 +142,7 @@ impl MapIndex {
         request.validate()?;
         let PreparedMap::Verified(prepared) = &self.prepared else {
             let reason = "pairs under a known pose need an index of the verified method".to_owned();
-            return Err(Error::Setting { name: "method", reason });
+            return Err(Error::Request { name: "method", reason });
         };
         let query = Conditioned::new(query, self.scale);
         let pose = self.map.conditioned_pose(&query, pose);
@@ -154,25 +154,23 @@ impl MapIndex {
 }
 
 fn too_many(found: usize) -> Error {
-    let expected = crate::verified::MAX_FRUITS;
-    let reason = format!("found {found} fruits in one cloud, the verified method expects at most {expected}");
-    Error::Setting { name: "method", reason }
+    Error::TooManyFruits { found, most: crate::verified::MAX_FRUITS }
 }
 
 impl Request {
     fn validate(&self) -> Result<()> {
         if let Some(noise) = self.noise_m.filter(|noise| !(noise.is_finite() && *noise > 0.0)) {
             let reason = format!("found {noise}, expected a length above 0 m");
-            return Err(Error::Setting { name: "noise_m", reason });
+            return Err(Error::Request { name: "noise_m", reason });
         }
         if self.up.iter().flatten().any(|up| !(up.norm().is_finite() && up.norm() > 0.0)) {
             let reason = "expected a finite vector that is not zero".to_owned();
-            return Err(Error::Setting { name: "up", reason });
+            return Err(Error::Request { name: "up", reason });
         }
         if self.per_frame && self.method != Method::Paper {
             // The verified method bends with the row by itself.
             let reason = "expected the paper's method".to_owned();
-            return Err(Error::Setting { name: "per_frame", reason });
+            return Err(Error::Request { name: "per_frame", reason });
         }
         Ok(())
     }
@@ -184,4 +182,29 @@ impl Request {
 /// A cloud or a setting that is wrong. That there is no match is no error.
 pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, config: &Config) -> Result<Match> {
     MapIndex::new(map, request.method, request.scale, *config)?.answer(query, request)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::MAX_FRUITS;
+    use nalgebra::Point3;
+
+    #[test]
+    fn more_fruits_than_the_verified_method_holds_are_no_wrong_setting() {
+        let place = |row: usize| Point3::new((row % 1000) as f64, (row / 1000) as f64, 0.0);
+        let many = FruitCloud::from_positions((0..=MAX_FRUITS).map(place).collect());
+        let refused = MapIndex::new(&many, Method::Verified, Scale::Metric, Config::default());
+        assert_eq!(refused.err(), Some(Error::TooManyFruits { found: MAX_FRUITS + 1, most: MAX_FRUITS }));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_request_is_said_of_the_request() {
+        let cloud = FruitCloud::from_positions(vec![Point3::origin(); 3]);
+        let ask = |request: &Request| match_clouds(&cloud, &cloud, request, &Config::default()).map(|_| ());
+        let named = |answer| matches!(answer, Err(Error::Request { name, .. }) if name == "noise_m");
+        assert!(named(ask(&Request { noise_m: Some(-1.0), ..Request::default() })));
+        let up = Request { up: Some([Vector3::zeros(); 2]), ..Request::default() };
+        assert_eq!(ask(&up).unwrap_err().to_string(), "up: expected a finite vector that is not zero");
+    }
 }

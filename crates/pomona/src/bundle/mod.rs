@@ -10,7 +10,7 @@
 //! (`normal`), points eliminated, poses in a folded order (`ordering`) solved within their envelope (`envelope`):
 //! time and memory grow with the length of the drive, not with its cube. One thread, no random numbers.
 //!
-//! The same adjustment serves a window of stereo keyframes and the fruits of a whole session; [`locate`] finds the pose
+//! The same adjustment serves a window of stereo keyframes and the fruits of a whole session; [`locate()`] finds the pose
 //! of a single picture among known points.
 
 mod envelope;
@@ -172,9 +172,8 @@ fn check(problem: &Problem, state: &State) -> Result<()> {
     if problem.fixed.len() != poses {
         return Err(Error::Length { what: "fixed", found: problem.fixed.len(), expected: poses });
     }
-    let row = |name: &'static str, row: usize, below: usize| {
-        let reason = format!("found row {row}, expected one below {below}");
-        if row < below { Ok(()) } else { Err(Error::Setting { name, reason }) }
+    let row = |what: &'static str, found: usize, below: usize| {
+        if found < below { Ok(()) } else { Err(Error::Row { what, found, below }) }
     };
     for seen in &problem.observations {
         row("observations.pose", seen.pose, poses)?;
@@ -195,12 +194,13 @@ fn check_finite(problem: &Problem, state: &State) -> Result<()> {
     let relative =
         |pair: &RelativePose| (pair.information.sum() + pair.first_from_second.to_matrix().sum()).is_finite();
     let wrong = [
-        state.points.iter().position(|point| !point.coords.sum().is_finite()),
-        state.poses.iter().position(|pose| !pose.to_matrix().sum().is_finite()),
-        problem.observations.iter().position(|one| !seen(one)),
-        problem.relative_poses.iter().position(|one| !relative(one)),
+        ("points", state.points.iter().position(|point| !point.coords.sum().is_finite())),
+        ("poses", state.poses.iter().position(|pose| !pose.to_matrix().sum().is_finite())),
+        ("observations", problem.observations.iter().position(|one| !seen(one))),
+        ("relative_poses", problem.relative_poses.iter().position(|one| !relative(one))),
     ];
-    wrong.into_iter().flatten().next().map_or(Ok(()), |row| Err(Error::NotFinite { row }))
+    let found = wrong.into_iter().find_map(|(what, row)| Some(Error::NotFinite { what, row: row? }));
+    found.map_or(Ok(()), Err)
 }
 
 #[cfg(test)]

@@ -215,7 +215,7 @@ fn rows_that_do_not_exist_are_named() {
     let mut problem = pictured_problem(&mut random, &truth, 0.0);
     problem.observations[5].point = 60;
     let error = adjust(&problem, truth.clone(), &Settings::default()).expect_err("row 60 of 60");
-    assert_eq!(error.to_string(), "setting observations.point: found row 60, expected one below 60");
+    assert_eq!(error.to_string(), "observations.point: found row 60, expected one below 60");
     problem.observations[5].point = 0;
     problem.fixed.pop();
     assert!(adjust(&problem, truth, &Settings::default()).is_err());

@@ -1,8 +1,8 @@
 //! The paper's method, whole clouds and frame by frame (the paper, section III-C).
 //!
-//! 1. Constellations of the query find the nearest code of the map ([`codebook`]).
+//! 1. Constellations of the query find the nearest code of the map ([`mod@codebook`]).
 //! 2. Each votes for its fruit pairs ([`voting`]); an assignment makes them one to one ([`crate::assignment`]).
-//! 3. RANSAC and Procrustes find the transform that most pairs agree on ([`ransac`]).
+//! 3. RANSAC and Procrustes find the transform that most pairs agree on ([`mod@ransac`]).
 //! 4. Fruits left over are paired with their nearest neighbour after the alignment ([`completion`]).
 //! 5. A maximum clique keeps the pairs whose distances agree in both clouds ([`clique`]).
 //!
@@ -285,7 +285,7 @@ fn views_of(query: &FruitCloud, fruits: &Ordered, request: &Request) -> Result<V
     }
     let Some(views) = &query.views else {
         let reason = "the query does not know which frame saw which fruit".to_owned();
-        return Err(Error::Setting { name: "per_frame", reason });
+        return Err(Error::Request { name: "per_frame", reason });
     };
     Ok(views.by_frame().iter().map(|(_, rows)| fruits.places(rows)).collect())
 }
@@ -313,15 +313,12 @@ fn median_spacing(tree: &Index<3>) -> f64 {
     nearest.get(nearest.len() / 2).copied().unwrap_or(CLUSTER_SPACING_M)
 }
 
-fn check_size(what: &str, n_fruits: usize, config: &Config) -> Result<()> {
+fn check_size(whose: &'static str, n_fruits: usize, config: &Config) -> Result<()> {
     let (k, n) = (config.constellation.k, config.constellation.n.min(n_fruits.saturating_sub(1)));
     let per_fruit = (0..k - 1).fold(1, |product, i| product * n.saturating_sub(i) / (i + 1));
     let most = n_fruits.saturating_mul(per_fruit);
     if most <= MAX_CONSTELLATIONS {
         return Ok(());
     }
-    let reason = format!(
-        "the {n_fruits} fruits of the {what} give up to {most} constellations, expected at most {MAX_CONSTELLATIONS}"
-    );
-    Err(Error::Setting { name: "constellation.n", reason })
+    Err(Error::TooManyConstellations { whose, fruits: n_fruits, found: most, most: MAX_CONSTELLATIONS })
 }

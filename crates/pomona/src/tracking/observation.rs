@@ -125,7 +125,7 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
         }
     }
     match lifted.rows.iter().find(|&&row| row >= n_boxes) {
-        Some(&row) => Err(Error::Length { what: "lifted.rows", found: row + 1, expected: n_boxes }),
+        Some(&found) => Err(Error::Row { what: "lifted.rows", found, below: n_boxes }),
         None => Ok(()),
     }
 }
