@@ -99,7 +99,7 @@ impl<'a> Proposer<'a> {
     /// Variance of where the pose of the seed puts a fruit, in variances of one pair.
     ///
     /// The pose of four noisy fruits is uncertain: with the inertia J about their centroid, a fruit at r from there has
-    /// 1/4 + tr([r] J^-1 [r]^T) / 3 per axis (cf. 1 + r^2/Q^2 of Lang et al.).
+    /// `1/4 + tr([r] J^-1 [r]^T) / 3` per axis (cf. 1 + r^2/Q^2 of Lang et al.).
     #[inline]
     fn looseness(&self, p: &Vector3<f64>) -> f64 {
         let r = self.to_frame * (p - self.centroid);

@@ -6,7 +6,7 @@
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
 //! 2. The noise and a first share seen again come from distances, nobody said to be who ([`super::scatter`]).
-//! 3. Every pair gets its probability ([`super::association`]); their sum says the share of the next turn.
+//! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn.
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
