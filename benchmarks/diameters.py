@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from benchmarks.recordings import scanned_captures
 from benchmarks.results import FOLDER, markdown, shared_data, write_rows, write_text
 from pomona.cloud import FruitCloud
-from pomona.recording.kinect_apples import NOMINAL
+from pomona.recording.formats.kinect_apples import NOMINAL
 
 COLOURS = ("#2a5d8f", "#c8502d", "#4b9b6e", "#8a6fb0")
 

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 
 from benchmarks.results import markdown, shared_data, write_rows, write_text
-from pomona.depth import lift
 from pomona.recording import Calibration
+from pomona.survey.depth import lift
 
 NOMINAL_PX = 910.0
 """Focal length of such cameras at 1280 x 720, turned upright here."""

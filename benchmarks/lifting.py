@@ -28,8 +28,8 @@ from benchmarks.recordings import (
 )
 from benchmarks.results import markdown, shared_data, write_rows, write_text
 from pomona.cloud import FruitCloud
-from pomona.depth import lift
 from pomona.recording import open_recording
+from pomona.survey.depth import lift
 
 VISIBLE = ((0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.2))
 MIN_VIEWS = (1, 5, 10)

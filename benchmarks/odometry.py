@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from benchmarks.recordings import true_boxes
 from benchmarks.results import FOLDER, markdown, shared_data, write_rows, write_text
 from benchmarks.trajectory_errors import Errors, compare
-from pomona.depth import lift
 from pomona.odometry import OdometryTrajectory, StereoOdometry
 from pomona.recording import Calibration, open_recording
-from pomona.refinement import Motions, Sightings, refine
 from pomona.stereo import StereoDepth
+from pomona.survey.depth import lift
+from pomona.survey.refinement import Motions, SeenFruits, refine
 
 RECORDINGS = ("rendered_row/2024-08-09", "rendered_row/2024-08-28", "kitti_stereo")
 VARIANTS = ("all frames", "every 2nd", "one black")
@@ -143,7 +143,7 @@ def refined(source: Path, trajectory: OdometryTrajectory, every: int) -> Array:
         centres.append(lifted.centres_in_camera)
         covariances.append(lifted.covariances)
     fruits = np.unique(names, return_inverse=True)[1]
-    sightings = Sightings(np.array(frames), fruits, np.concatenate(centres), np.concatenate(covariances))
+    sightings = SeenFruits(np.array(frames), fruits, np.concatenate(centres), np.concatenate(covariances))
     motions = Motions(trajectory.first, trajectory.second, trajectory.first_from_second, trajectory.information)
     return refine(trajectory.session_from_camera, sightings, motions).session_from_camera
 

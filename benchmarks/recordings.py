@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.detect.from_file import FileDetector
 from pomona.recording import Recording, open_recording
-from pomona.recording.kinect_apples import import_captures
+from pomona.recording.formats.kinect_apples import import_captures
 from pomona.survey import Survey, scan
 
 DATES = ("2024-08-09", "2024-08-28")

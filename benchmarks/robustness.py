@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import pomona
 from benchmarks.results import FOLDER, write_rows
-from pomona.synth.row import RowShape, grow_row
+from pomona.synth.planting import RowShape, grow_row
 
 OCCLUSIONS = tuple(step / 100 for step in range(0, 50, 5))
 SIGMAS_M = (0.0, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08)

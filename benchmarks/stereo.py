@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from benchmarks.recordings import DATES, TrueBox, in_camera, rendered_truth, true_boxes
 from benchmarks.results import markdown, shared_data, write_rows, write_text
-from pomona.depth import FruitDepth, lift
 from pomona.recording import Calibration, open_recording
-from pomona.stereo import DenseStereo, StereoDepth
+from pomona.stereo import DenseStereo, FruitDepth, StereoDepth
+from pomona.survey.depth import lift
 
 Stereo = Callable[[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.float64]], FruitDepth]
 

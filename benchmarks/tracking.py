@@ -31,7 +31,7 @@ from benchmarks.tracking_runs import (
 from benchmarks.tracking_scores import Count, Names, Numbers, count, mot_scores, often
 from pomona.detect import Detections
 from pomona.recording import Calibration
-from pomona.tracking import Tracker
+from pomona.survey.tracking import Tracker
 
 
 def main(arguments: list[str]) -> None:

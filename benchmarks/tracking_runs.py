@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.recordings import true_boxes
 from benchmarks.tracking_scores import Names, Numbers
-from pomona.depth import Lifted, lift
 from pomona.detect import Detections
 from pomona.errors import PomonaError
 from pomona.odometry import StereoOdometry
 from pomona.recording import Calibration, Frame, open_recording
 from pomona.stereo import StereoDepth
-from pomona.tracking import Tracker
+from pomona.survey.depth import Lifted, lift
+from pomona.survey.tracking import Tracker
 
 RATE_HZ = 10.0
 

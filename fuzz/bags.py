@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzz.bundle import packed_folder, unpacked
 from pomona.recording import open_recording
-from pomona.recording.check import checked
+from pomona.recording.checks.readable import checked
 
 
 def seeds() -> list[bytes]:

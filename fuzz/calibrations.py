@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from fuzz.bundle import packed, packed_folder, unpacked
-from pomona.recording.rig_files import find_optics
+from pomona.recording.calibration.rig_files import find_optics
 from recording_maker import FIELDS
 
 SIZES = {"zed": (672, 376)}

@@ -18,7 +18,6 @@ from pomona.orchard import (
     add_session,
     load_session,
     problems,
-    read_cloud,
     remove_session,
     write_session,
 )
@@ -73,7 +72,7 @@ def _readers() -> tuple[Callable[[Path], object], ...]:
     def observations(path: Path) -> object:
         return OrchardMap(path).observations()
 
-    return read_cloud, load_session, fruits, visits, observations, problems
+    return FruitCloud.read, load_session, fruits, visits, observations, problems
 
 
 @contextlib.contextmanager

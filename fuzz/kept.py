@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.bundle import packed_folder, unpacked
-from pomona.depth import Lifted
 from pomona.detect import Detections
 from pomona.recording import Frame
+from pomona.survey.depth import Lifted
 from pomona.survey.kept import Kept
 from pomona.survey.seeing import Look
 

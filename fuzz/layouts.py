@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzz.bundle import packed, unpacked
 from pomona.recording import open_recording
-from pomona.recording.check import checked
+from pomona.recording.checks.readable import checked
 
 SIZE = (64, 48)
 OWN = {"width": 64, "height": 48, "fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "baseline_m": 0.12, "rectified": True}

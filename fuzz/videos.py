@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fuzz.bundle import packed_folder, unpacked
 from pomona.recording import open_recording
-from pomona.recording.check import checked
+from pomona.recording.checks.readable import checked
 
 
 def seeds() -> list[bytes]:

@@ -65,7 +65,7 @@ def test_a_knocked_camera_is_corrected(date: Date, tmp_path: Path) -> None:
 
 
 def test_a_far_scene_is_told(date: Date, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pomona.survey.motion.FAR_PX", 60.0)
+    monkeypatch.setattr("pomona.survey.pose_source.FAR_PX", 60.0)
     few = replace(CASE["clean"], frames=lambda frames: frames[:4])
     found = date.scanned(few, 0, tmp_path / "row")
     assert found is not None

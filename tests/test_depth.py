@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from depth_scene import CAMERA, Sphere, box_of, picture
-from pomona.depth import Refusal, lift
 from pomona.errors import PomonaError
+from pomona.survey.depth import Refusal, lift
 
 APPLE = Sphere((0.1, -0.05, 1.3), 0.075)
 

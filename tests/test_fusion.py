@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pomona.fusion import fuse_centres, fuse_diameters
+from pomona.survey.fusion import fuse_centres, fuse_diameters
 
 
 def long_along(direction, along_m, across_m):

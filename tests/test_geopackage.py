@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pomona import geopackage
-from pomona.orchard.failures import told
+from pomona.store.failures import told
 
 
 @pytest.fixture

@@ -27,9 +27,9 @@ from pomona.detect.onnx import OnnxDetector
 from pomona.pairs import read_pairs
 from pomona.recording import Calibration, open_recording
 from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES, UnpackError, unpacked
-from pomona.recording.check import unreadable_frames
+from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.checks.readable import unreadable_frames
 from pomona.recording.picture_size import encoded_size
-from pomona.recording.rig_files import find_optics
 from pomona.settings import Settings
 from recording_maker import FIELDS, make_recording
 
@@ -58,7 +58,7 @@ def in_little_memory(code: str, *arguments: object) -> str:
         import cv2, numpy
         from pomona import PomonaError, PomonaWarning, FruitCloud
         from pomona.recording import open_recording
-        from pomona.recording.check import unreadable_frames
+        from pomona.recording.checks.readable import unreadable_frames
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         most = pages * resource.getpagesize() + {LITTLE_BYTES}
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -410,9 +410,18 @@ def test_calibrations_of_other_programs_are_not_trusted(tmp_path, name, content)
     refused(lambda: find_optics(tmp_path, (672, 376), stereo=False))
 
 
-@pytest.mark.parametrize("junk", [" # #" * 100_000 + '"', "a" + " " * 200_000 + "b", '"' * 100_001])
+@pytest.mark.parametrize(
+    "junk",
+    [
+        " # #" * 100_000 + '"',
+        "a" + " " * 200_000 + "b",
+        '"' * 100_001,
+        *("- " * 100_000, "? " * 100_000, "[" * 100_000, "{a: " * 100_000, "!a" * 100_000, "&a " * 100_000),
+        "\n" + "a: &a [x, x, x, x]\nb: &b [*a, *a, *a, *a]\nc: [*b, *b, *b, *b]\n",
+    ],
+)
 def test_a_line_of_yaml_is_walked_over_once(tmp_path, junk):
-    code = "from pomona.recording.rig_files import find_optics; find_optics(path, (64, 48), stereo=False)"
+    code = "from pomona.recording.calibration.rig_files import find_optics; find_optics(path, (64, 48), stereo=False)"
     (tmp_path / "a.yaml").write_text(f"cam0: {junk}\n")
     assert "refused:" in in_little_memory(code, tmp_path)
 

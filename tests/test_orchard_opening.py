@@ -14,7 +14,7 @@ import pyogrio
 import pytest
 
 from pomona import FruitCloud, PomonaError, atomic
-from pomona.orchard import OrchardMap, add_session, load_session, problems, read_cloud, write_session
+from pomona.orchard import OrchardMap, add_session, load_session, problems, write_session
 from pomona.synth.clouds import scene_pair
 
 POMONA = [sys.executable, "-m", "pomona"]
@@ -69,7 +69,7 @@ def on_a_read_only_disk(folder: Path, command: str) -> subprocess.CompletedProce
 
 
 def test_a_killed_writer_s_map_is_read_where_nothing_may_be_written(orchard: Path) -> None:
-    before = read_cloud(orchard)
+    before = FruitCloud.read(orchard)
     content = orchard.read_bytes()
     kill_a_writer(orchard)
     left = {path: path.read_bytes() for path in orchard.parent.iterdir()}
@@ -117,7 +117,7 @@ def test_what_other_programs_do_after_a_kill(orchard: Path) -> None:
 
 def test_a_reader_sees_no_map_or_all_of_it(tmp_path: Path, visits: tuple[Path, Path]) -> None:
     path = tmp_path / "orchard.gpkg"
-    n = len(read_cloud(visits[0]))
+    n = len(FruitCloud.read(visits[0]))
     seen, done = [], threading.Event()
 
     def look() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from bag_maker import START_NS, STEP_NS, image, info, write_bag
 from pomona.recording import open_recording
-from pomona.recording.check import checked, is_blank
-from pomona.recording.swapped import check_sides
+from pomona.recording.checks.readable import checked, is_blank
+from pomona.recording.checks.swapped import check_sides
 from test_recording_video import write_calibration
 
 SIZE = (320, 240)

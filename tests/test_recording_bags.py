@@ -26,8 +26,8 @@ from bag_maker import (
 from pomona import PomonaError, PomonaWarning
 from pomona.recording import open_recording, selected
 from pomona.recording.bags import mcap_file
-from pomona.recording.bags.pictures import ENCODINGS
-from pomona.recording.check import unreadable_frames
+from pomona.recording.bags.picture_messages import ENCODINGS
+from pomona.recording.checks.readable import unreadable_frames
 
 
 def refused(path, *parts, **options):

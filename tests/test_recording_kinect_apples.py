@@ -5,7 +5,7 @@ import pytest
 from pomona import PomonaError
 from pomona.detect.from_file import FileDetector
 from pomona.recording import open_recording
-from pomona.recording.kinect_apples import import_captures
+from pomona.recording.formats.kinect_apples import import_captures
 
 
 def test_every_capture_becomes_a_recording(shared_data, tmp_path):

@@ -12,7 +12,7 @@ from pomona.cloud import FruitCloud
 from pomona.detect.from_file import FileDetector
 from pomona.orchard import load_session
 from pomona.recording import open_recording
-from pomona.recording.check import unreadable_frames
+from pomona.recording.checks.readable import unreadable_frames
 from pomona.scanning import SUFFIXES
 from pomona.survey import scan
 from recording_maker import FIELDS, FRUITS, make_recording

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from pomona import PomonaError
-from pomona.recording import open_recording, selected, video_file
+from pomona.recording import open_recording, selected
+from pomona.recording.video import video_file
 from recording_maker import make_recording
 from test_recording_video import write_calibration, write_video
 

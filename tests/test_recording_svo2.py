@@ -12,7 +12,7 @@ from mcap.writer import Writer
 
 from pomona import PomonaError, PomonaWarning
 from pomona.recording import open_recording, selected
-from pomona.recording.check import unreadable_frames
+from pomona.recording.checks.readable import unreadable_frames
 
 SIZE = (672, 376)
 SERIAL = 38486288

@@ -14,7 +14,7 @@ import pytest
 
 from pomona import PomonaError, PomonaWarning
 from pomona.recording import open_recording
-from pomona.recording.check import unreadable_frames
+from pomona.recording.checks.readable import unreadable_frames
 from recording_maker import FIELDS
 
 SIZE = (64, 48)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pomona import PomonaError
-from pomona.refinement import Motions, Sightings, refine
+from pomona.survey.refinement import Motions, SeenFruits, refine
 
 SIGMA_M = np.array([0.004, 0.004, 0.02])
 STEP_SIGMA = np.array([0.005, 0.005, 0.005, 0.002, 0.002, 0.002])
@@ -46,7 +46,7 @@ class Row:
         bad = rng.uniform(size=len(frames)) < wrong
         seen[bad] += rng.normal(0.0, 0.3, (int(bad.sum()), 3))
         covariances = np.tile(np.diag(SIGMA_M**2), (len(frames), 1, 1))
-        self.sightings = Sightings(frames, fruits, seen, covariances)
+        self.sightings = SeenFruits(frames, fruits, seen, covariances)
 
     def shift_m(self, poses: NDArray[np.float64]) -> float:
         return float(np.linalg.norm(poses[-1][:3, 3] - self.poses[-1][:3, 3]))
@@ -81,7 +81,7 @@ def test_trusted_poses_stay_and_covariances_are_those_of_the_errors() -> None:
 
 def test_a_session_without_fruits_keeps_its_motions() -> None:
     row = Row()
-    nothing = Sightings(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+    nothing = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
     found = refine(row.drifting, nothing, row.motions)
     np.testing.assert_allclose(found.session_from_camera, row.drifting, atol=1e-9)
     assert found.centres.shape == (0, 3)
@@ -103,7 +103,7 @@ def test_a_long_session_takes_no_longer_than_its_length() -> None:
     relative = np.linalg.inv(poses[:-1]) @ poses[1:]
     information = np.tile(np.diag(STEP_SIGMA**-2), (n - 1, 1, 1))
     motions = Motions(np.arange(n - 1), np.arange(1, n), relative, information)
-    found = refine(poses, Sightings(frames, seen, places, covariances), motions)
+    found = refine(poses, SeenFruits(frames, seen, places, covariances), motions)
     assert np.mean(found.squared_errors) == pytest.approx(2.5, abs=0.6)
 
 
@@ -126,4 +126,4 @@ def test_wrong_sightings_are_refused(change: dict[str, NDArray[np.generic]], mes
         "covariances": np.tile(np.eye(3), (2, 1, 1)),
     }
     with pytest.raises(PomonaError, match=message):
-        refine(row.drifting, Sightings(**(arrays | change)), row.motions)
+        refine(row.drifting, SeenFruits(**(arrays | change)), row.motions)

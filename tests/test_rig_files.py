@@ -9,8 +9,8 @@ import pytest
 
 from pomona import PomonaError
 from pomona.recording import open_recording
-from pomona.recording.rig_files import find_optics
-from pomona.recording.rig_files.yaml_subset import read_documents
+from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.calibration.rig_files.yaml_documents import read_documents
 
 SIZE = (640, 480)
 LEFT = np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]])
@@ -294,8 +294,16 @@ def test_two_different_camera_info_in_one_file(tmp_path):
         ("intrinsics: [500.0", "intrinsics: [.nan", ["intrinsics", "NaN"]),
         ("intrinsics: [500.0,", "intrinsics: [", ["cam0: intrinsics", "expected 4 numbers"]),
         ("intrinsics", "intrinsic", ["calibration: found none"]),
-        ("resolution: [640, 480]\n  rostopic", "resolution: [640, 480\n  rostopic", ["line", "expected ]"]),
+        ("resolution: [640, 480]\n  rostopic", "resolution: [640, 480\n  rostopic", ["camchain.yaml: line 8", "']'"]),
         ("cam0:", "cam0: *anchor", ["line 1"]),
+        ("cam0:", "a: &a [1]\ncam0:", ["line 1", "anchor"]),
+        ("cam0:", "a: !!python/object:os.system {}\ncam0:", ["line 1", "tag", "os.system"]),
+        ("cam0:", "cam1: 1\ncam0:", ["camchain.yaml: line", "'cam1' twice"]),
+        ("cam0:", "? [a, b]\n: 1\ncam0:", ["line 1", "no plain name"]),
+        ("cam0:", "a: 99999999999999999999\ncam0:", ["line 1", "9999", "64 bits"]),
+        ("cam0:", "a: 1e400\ncam0:", ["line 1", "1e400", "64 bits"]),
+        ("cam0:", "a: \b\ncam0:", ["line 1", "not allowed"]),
+        ("cam0:", "- 1\n---\ncam0:", ["line 1", "found [1]", "name: value"]),
     ],
 )
 def test_a_broken_camchain_is_refused(tmp_path, old, new, parts):
@@ -311,13 +319,15 @@ def test_yaml_as_calibration_tools_write_it(tmp_path):
     path.write_text(
         '%YAML:1.0\n---\na: 1e-05 # small\n"b": [1, [2.5, -3], "x # y"]\n'
         "c: !!opencv-matrix\n   data: [ 1.,\n     2. ]\n"
-        "d:\n- 1\n- - 2\n  - 3\ne:\n  - name: q\n    f: ~\ng: true\nh: VI-Sensor cam0 (MT9M034)\n"
+        "i: {width: 640, no: no}\nd:\n- 1\n- - 2\n  - 3\ne:\n  - name: q\n    f: ~\n"
+        "g: true\nh: VI-Sensor cam0 (MT9M034)\n"
     )
     assert read_documents(path) == [
         {
             "a": 1e-05,
             "b": [1, [2.5, -3], "x # y"],
             "c": {"data": [1.0, 2.0]},
+            "i": {"width": 640, "no": "no"},
             "d": [1, [2, 3]],
             "e": [{"name": "q", "f": None}],
             "g": True,

@@ -6,10 +6,10 @@ import pytest
 from benchmarks.recordings import in_camera, rendered_truth, true_boxes
 
 from depth_scene import box_of
-from pomona.depth import Refusal, lift
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
 from pomona.stereo import DenseStereo, StereoDepth
+from pomona.survey.depth import Refusal, lift
 from stereo_scene import PAIR, Leaf, apple, pair, without_baseline
 
 APPLES = [apple(-0.15, -0.1, 1.2), apple(0.1, 0.05, 1.5), apple(0.2, -0.15, 1.0), apple(-0.05, 0.15, 1.35)]

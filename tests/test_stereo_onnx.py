@@ -5,9 +5,9 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper, save
 
 from depth_scene import box_of
-from pomona.depth import lift
 from pomona.errors import PomonaError
 from pomona.stereo import OnnxStereo
+from pomona.survey.depth import lift
 from stereo_scene import PAIR, apple, pair, without_baseline
 
 APPLE = apple(0.0, 0.0, 1.3)

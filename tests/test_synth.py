@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from pomona.cli import main
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.synth.cells import ROWS
 from pomona.synth.clouds import CELLS, ScenePair, scene_pair
-from pomona.synth.row import RowShape, grow_row
+from pomona.synth.named_cells import ROWS
+from pomona.synth.planting import RowShape, grow_row
 
 
 def common(pair: ScenePair) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pomona.refinement import Motions
+from pomona.survey.refinement import Motions
 from pomona.survey.thinning import MAX_COST, between_keys, followed, stride
 
 

@@ -8,11 +8,11 @@ import pytest
 from benchmarks.recordings import true_boxes
 
 from pomona import PomonaError, default_config
-from pomona.depth import Lifted, lift
 from pomona.detect import Detections
 from pomona.recording import open_recording
 from pomona.recording.calibration import Calibration
-from pomona.tracking import Tracker, Tracks
+from pomona.survey.depth import Lifted, lift
+from pomona.survey.tracking import Tracker, Tracks
 
 CALIBRATION = Calibration(width=640, height=360, fx=417.0, fy=417.0, cx=320.0, cy=180.0, baseline_m=0.12)
 

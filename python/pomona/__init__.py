@@ -11,41 +11,68 @@ if TYPE_CHECKING:
     from pomona.matching import Index, Match, Verdict, default_config, match
     from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
     from pomona.plot import draw_match, save_picture
+    from pomona.recording import Calibration, Frame, Recording, open_recording
+    from pomona.recording.selection import selected
     from pomona.scanning import scan
     from pomona.survey import Survey
+    from pomona.survey.depth import Lifted, lift
+    from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
+    from pomona.survey.tracking import Tracker, Tracks
 
 # Loaded at first use, so that `pomona --help` does not wait for numpy.
 _MODULE_OF = {
+    "Calibration": "pomona.recording",
+    "Frame": "pomona.recording",
     "FruitCloud": "pomona.cloud",
     "Index": "pomona.matching",
+    "Lifted": "pomona.survey.depth",
     "Match": "pomona.matching",
+    "Motions": "pomona.survey.refinement",
     "Observations": "pomona.orchard",
     "OrchardMap": "pomona.orchard",
+    "Recording": "pomona.recording",
+    "Refined": "pomona.survey.refinement",
+    "SeenFruits": "pomona.survey.refinement",
     "Session": "pomona.orchard",
     "Survey": "pomona.survey",
+    "Tracker": "pomona.survey.tracking",
+    "Tracks": "pomona.survey.tracking",
     "Verdict": "pomona.matching",
     "Views": "pomona.cloud",
     "Visit": "pomona.orchard",
     "add_session": "pomona.orchard",
     "default_config": "pomona.matching",
     "draw_match": "pomona.plot",
+    "lift": "pomona.survey.depth",
     "load_session": "pomona.orchard",
     "match": "pomona.matching",
+    "open_recording": "pomona.recording",
+    "refine": "pomona.survey.refinement",
     "save_picture": "pomona.plot",
     "scan": "pomona.scanning",
+    "selected": "pomona.recording.selection",
     "write_session": "pomona.orchard",
 }
 
 __all__ = [
+    "Calibration",
+    "Frame",
     "FruitCloud",
     "Index",
+    "Lifted",
     "Match",
+    "Motions",
     "Observations",
     "OrchardMap",
     "PomonaError",
     "PomonaWarning",
+    "Recording",
+    "Refined",
+    "SeenFruits",
     "Session",
     "Survey",
+    "Tracker",
+    "Tracks",
     "Verdict",
     "Views",
     "Visit",
@@ -53,10 +80,14 @@ __all__ = [
     "add_session",
     "default_config",
     "draw_match",
+    "lift",
     "load_session",
     "match",
+    "open_recording",
+    "refine",
     "save_picture",
     "scan",
+    "selected",
     "write_session",
 ]
 

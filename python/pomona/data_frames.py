@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.export import LOCAL_METRES
+from pomona.geopackage import LOCAL_METRES
 
 __all__ = ["to_geopandas", "to_pandas"]
 

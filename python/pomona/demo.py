@@ -11,20 +11,17 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.evaluate import PairScore, score_pairs
-from pomona.likes import PAIRS, PICTURE
+from pomona.likes import DEMO_DATES, DEMO_RECORDING, DEMO_SEED, is_of_demo
 from pomona.orchard import OrchardMap, add_session, load_session, write_session
 from pomona.pairs import write_pairs
 from pomona.plot import draw_match, save_picture
-from pomona.synth.cells import Cell
 from pomona.synth.clouds import scene_pair
+from pomona.synth.named_cells import Cell
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
 
-FIRST_DATE, SECOND_DATE = "2024-08-09", "2024-08-28"
-DEMO_SEED = 1
-RECORDING = f"synthetic, seed {DEMO_SEED}"
 # Three weeks apart: a third hidden on each visit, branches 3 cm lower, fruits 12 mm thicker, nobody knows the poses.
 DEMO_CELL = Cell("demo", hidden=0.30, false_rate=0.05, noise_m=0.02, sag_m=0.03, upright=True, sizes=True)
 
@@ -78,7 +75,8 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
 
     scene = scene_pair(DEMO_CELL, DEMO_SEED)
     tell(f"drew a row of five trees as two visits saw it: {len(scene.map)} fruits, then {len(scene.query)}")
-    sessions = (_write_visit(folder, FIRST_DATE, scene.map), _write_visit(folder, SECOND_DATE, scene.query))
+    first_date, second_date = DEMO_DATES
+    sessions = (_write_visit(folder, first_date, scene.map), _write_visit(folder, second_date, scene.query))
 
     first = add_session(orchard, load_session(sessions[0]))
     known = OrchardMap(orchard).fruits()
@@ -104,30 +102,15 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
     )
 
 
-def is_made_here(folder: Path) -> bool:
-    """Tell a folder in which every file with one of the demo's names is of its kind."""
-    kinds = {"orchard.gpkg": _is_own, "pairs.csv": PAIRS.tells, "match.png": PICTURE.tells}
-    kinds |= {f"{date}.gpkg": _is_own for date in (FIRST_DATE, SECOND_DATE)}
-    return all(is_kind(folder / name) for name, is_kind in kinds.items() if (folder / name).exists())
-
-
-def _is_own(path: Path) -> bool:
-    """Tell a map or a session that holds drawn visits and no others."""
-    try:
-        return all(visit.recording == RECORDING for visit in OrchardMap(path).visits())
-    except PomonaError:
-        return False
-
-
 def _remove_own(orchard: Path) -> None:
-    if orchard.exists() and not _is_own(orchard):
+    if orchard.exists() and not is_of_demo(orchard):
         raise PomonaError(f"{orchard}: is not the map of a demo: take another folder")
     orchard.unlink(missing_ok=True)
 
 
 def _write_visit(folder: Path, date: str, cloud: FruitCloud) -> Path:
     path = folder / f"{date}.gpkg"
-    write_session(path, cloud, name=date, date=date, recording=RECORDING)
+    write_session(path, cloud, name=date, date=date, recording=DEMO_RECORDING)
     return path
 
 

@@ -12,16 +12,14 @@ from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud, csv_file, ply_file
 from pomona.cloud.columns import COVARIANCE, POSITION, typed_columns
 from pomona.errors import PomonaError
+from pomona.geopackage import LOCAL_METRES
 
-__all__ = ["LOCAL_METRES", "SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
+__all__ = ["SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
 
 ExportFormat = Literal["csv", "ply", "geojson"]
 
 SUFFIXES: dict[str, ExportFormat] = {".csv": "csv", ".ply": "ply", ".geojson": "geojson", ".json": "geojson"}
 """What the name of a file says of its format."""
-
-LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
-"""A frame without a place on Earth, as well-known text."""
 
 
 def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "APPLICATION_ID",
+    "LOCAL_METRES",
     "USER_VERSION",
     "add_functions",
     "add_table",
@@ -33,6 +34,10 @@ __all__ = [
 
 APPLICATION_ID = 0x47504B47  # "GPKG"
 USER_VERSION = 10300
+
+LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
+"""A frame without a place on Earth, as well-known text."""
+
 UNDEFINED_CARTESIAN = -1
 
 LITTLE_ENDIAN = 1

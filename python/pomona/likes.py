@@ -12,6 +12,9 @@ from typing import Literal
 
 __all__ = [
     "DEMO",
+    "DEMO_DATES",
+    "DEMO_RECORDING",
+    "DEMO_SEED",
     "EXPORTS",
     "KEPT",
     "PAIRS",
@@ -23,6 +26,7 @@ __all__ = [
     "Like",
     "database_of",
     "is_like",
+    "is_of_demo",
 ]
 
 HEAD_BYTES = 4096
@@ -41,6 +45,11 @@ DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 
 TRUTH_KEYS = {"cell", "seed", "map_from_query"}
 """In the truth of drawn visits."""
+
+DEMO_SEED = 1
+DEMO_DATES = ("2024-08-09", "2024-08-28")
+DEMO_RECORDING = f"synthetic, seed {DEMO_SEED}"
+"""Of the visits of `pomona demo`, and in their tables."""
 
 Database = Literal["session", "map", "other"]
 
@@ -85,7 +94,7 @@ def database_of(path: Path) -> Database | None:
             return "other" if begun else None
     except OSError:
         return None
-    from pomona.orchard.opening import snapshot
+    from pomona.store.opening import snapshot
 
     try:
         with snapshot(path) as (_, kind):
@@ -156,10 +165,25 @@ def _has_drawn_visits(folder: Path) -> bool:
     return all(_is_truth(folder / f"truth{name['seed']}.json") for name in ours)
 
 
-def _is_demo(folder: Path) -> bool:
-    from pomona.demo import is_made_here
+def is_of_demo(path: Path) -> bool:
+    """Tell a map or a session that holds visits drawn by the demo and no others."""
+    from pomona.errors import PomonaError
+    from pomona.store.opening import snapshot
+    from pomona.store.rows import columns_of
 
-    return is_made_here(folder)
+    try:
+        with snapshot(path) as (connection, _):
+            (recordings,) = columns_of(connection, "sessions", ("recording",))
+    except PomonaError:
+        return False
+    return set(recordings) <= {DEMO_RECORDING}
+
+
+def _is_demo(folder: Path) -> bool:
+    """Tell a folder in which every file with one of the demo's names is of its kind."""
+    tells = {"orchard.gpkg": is_of_demo, "pairs.csv": PAIRS.tells, "match.png": PICTURE.tells}
+    tells |= {f"{date}.gpkg": is_of_demo for date in DEMO_DATES}
+    return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
 
 
 def _is_truth(path: Path) -> bool:

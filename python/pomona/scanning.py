@@ -16,7 +16,7 @@ from pomona.likes import SCANNED
 from pomona.orchard.session import GUESSED
 from pomona.outputs import Output, refuse_inputs, require_outputs
 from pomona.recording import Recording, open_recording, selected
-from pomona.recording.swapped import check_sides
+from pomona.recording.checks.swapped import check_sides
 from pomona.streams import is_stream
 from pomona.survey import Kept, Progress, Survey, write_survey
 from pomona.survey import scan as survey_of

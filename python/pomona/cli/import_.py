@@ -27,7 +27,7 @@ def import_kinect_apples(
 
     The intrinsics are nominal: f = 913 px, so diameters carry its error.
     """
-    from pomona.recording.kinect_apples import DATE, import_captures
+    from pomona.recording.formats.kinect_apples import DATE, import_captures
 
     for capture in import_captures(source, output, date or DATE):
         colour = "depth and colour" if capture.has_colour else "depth only, no colour picture in the data set"

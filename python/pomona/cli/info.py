@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pomona.recording import Recording
-    from pomona.recording.check import Checked
+    from pomona.recording.checks.readable import Checked
 
 
 def info(
@@ -61,8 +61,8 @@ def info(
 def _checked(recording: Recording) -> Checked:
     """Decode everything; swapped sides are an error, because then nothing in the recording is right."""
     from pomona.cli.progress import counting
-    from pomona.recording.check import checked
-    from pomona.recording.swapped import check_sides
+    from pomona.recording.checks.readable import checked
+    from pomona.recording.checks.swapped import check_sides
 
     check_sides(recording)
     with counting("reading", len(recording)) as progress:

@@ -141,7 +141,7 @@ def map_check(orchard: Path = orchard_argument, json: bool = typer.Option(False,
 
 def _waiting(orchard: Path) -> Callable[[], None]:
     """Say on the standard error why nothing happens."""
-    from pomona.orchard.opening import TIMEOUT_S
+    from pomona.store.opening import TIMEOUT_S
 
     return lambda: tell(f"pomona: {orchard}: another program is writing to it, waiting up to {TIMEOUT_S:g} s")
 

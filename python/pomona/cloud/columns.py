@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.cloud.typed import as_whole, typed
 from pomona.errors import PomonaError
 from pomona.reading import shown
+
+if TYPE_CHECKING:
+    from pomona.cloud.fruit_cloud import FruitCloud
 
 __all__ = ["BLANKABLE", "MOST_WHOLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split", "typed_columns"]
 
@@ -78,14 +80,14 @@ def number(name: str, cell: str) -> float:
     return value
 
 
-def assemble(columns: Mapping[str, Any]) -> FruitCloud:
+def assemble(columns: Mapping[str, Any], make: type[FruitCloud]) -> FruitCloud:
     """Put columns together as a cloud; numbers as arrays, text as sequences of str."""
     covariances: NDArray[np.float64] | None = None
     if COVARIANCE[0] in columns:
         covariances = np.empty((len(columns["x"]), 3, 3))
         for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
             covariances[:, i, j] = covariances[:, j, i] = columns[name]
-    return FruitCloud(
+    return make(
         positions=np.column_stack([columns[name] for name in POSITION]).astype(np.float64),
         ids=tuple(columns["id"]) if "id" in columns else None,
         diameters_m=columns.get("diameter_m"),

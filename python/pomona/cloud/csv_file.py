@@ -7,23 +7,25 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.cloud.columns import BLANKABLE, MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
-from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.reading import require_file, shown
+
+if TYPE_CHECKING:
+    from pomona.cloud.fruit_cloud import FruitCloud
 
 __all__ = ["read", "write"]
 
 ENCODING = "utf-8-sig"  # spreadsheets put a byte order mark in front
 
 
-def read(path: Path) -> FruitCloud:
+def read(path: Path, make: type[FruitCloud]) -> FruitCloud:
     """Read a cloud; see `FruitCloud.read`.
 
     The whole table goes through numpy's reader; when that stumbles, a reader of cells takes over, which knows the
@@ -37,7 +39,7 @@ def read(path: Path) -> FruitCloud:
         with _opened(path) as file:
             columns = _read_cells(path, file, names, header_lines)
     try:
-        return assemble(columns)
+        return assemble(columns, make)
     except PomonaError as error:
         raise PomonaError(f"{path}: {error}") from None
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import csv_file, ply_file
-from pomona.cloud.fruit_cloud import FruitCloud, Unit
+from pomona.cloud.units import METRES_PER_UNIT, Unit
 from pomona.errors import PomonaError, PomonaWarning
 
-__all__ = ["PLAUSIBLE_DIAMETER_M", "check_spacing", "read_cloud", "write_cloud"]
+if TYPE_CHECKING:
+    from pomona.cloud.fruit_cloud import FruitCloud
 
-METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "free": 1.0}
+__all__ = ["PLAUSIBLE_DIAMETER_M", "check_spacing", "read_cloud", "write_cloud"]
 
 MIN_SPACING_M = 0.005
 """Centres of two fruits cannot be nearer than a fruit is wide, and the smallest berries are 5 mm wide."""
@@ -34,18 +35,18 @@ SPACING_SAMPLE = 1000
 """Fruits asked for their neighbour: the median of 1000 is known to 2 % of rank, whatever the size of the cloud."""
 
 
-def read_cloud(path: Path, unit: Unit) -> FruitCloud:
-    """Read `path` by its suffix; see `FruitCloud.read`."""
+def read_cloud(path: Path, unit: Unit, make: type[FruitCloud]) -> FruitCloud:
+    """Read `path` by its suffix; see `FruitCloud.read`, which says what to make of it."""
     if unit not in get_args(Unit):
         raise PomonaError(f"unit: found {unit!r}, expected one of {', '.join(get_args(Unit))}")
     suffix = path.suffix.lower()
     if suffix == ".gpkg":
-        from pomona.orchard import read_cloud as read_session_cloud
+        from pomona.store.stored_fruits import stored_cloud
 
-        return read_session_cloud(path)
+        return stored_cloud(path, make)
     if suffix not in (".csv", ".ply"):
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv, .ply or .gpkg")
-    cloud = csv_file.read(path) if suffix == ".csv" else ply_file.read(path)
+    cloud = csv_file.read(path, make) if suffix == ".csv" else ply_file.read(path, make)
     cloud = _in_metres(cloud, METRES_PER_UNIT[unit])
     if unit != "free":
         check_spacing(path, cloud.positions)

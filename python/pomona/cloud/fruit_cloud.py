@@ -5,44 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pomona.arrays import checked_array
 from pomona.cards import as_card
 from pomona.cloud.facts import facts
+from pomona.cloud.units import Unit
 from pomona.errors import PomonaError
+from pomona.views import Views
 
-__all__ = ["FruitCloud", "Unit", "Views"]
-
-Unit = Literal["m", "cm", "mm", "free"]
-"""Unit of a file's coordinates; ``free`` keeps the numbers of a reconstruction whose scale nobody knows."""
-
-
-@dataclass(frozen=True, eq=False)
-class Views:
-    """Which frame saw which fruit, as pairs.
-
-    Attributes
-    ----------
-    frames : (V,) int64
-        Frame number of each sighting.
-    fruits : (V,) int64
-        Row of the fruit of each sighting.
-    """
-
-    frames: NDArray[np.int64]
-    fruits: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        frames = _array("views.frames", self.frames, np.int64, (None,))
-        fruits = _array("views.fruits", self.fruits, np.int64, (len(frames),))
-        object.__setattr__(self, "frames", frames)
-        object.__setattr__(self, "fruits", fruits)
-
-    def __len__(self) -> int:
-        return len(self.frames)
+__all__ = ["FruitCloud"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,18 +56,18 @@ class FruitCloud:
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        positions = _array("positions", self.positions, np.float64, (None, 3))
+        positions = checked_array("positions", self.positions, np.float64, (None, 3))
         n = len(positions)
         _require_finite("positions", positions)
         object.__setattr__(self, "positions", positions)
         if self.diameters_m is not None:
             object.__setattr__(self, "diameters_m", _diameters(self.diameters_m, n))
         if self.covariances is not None:
-            covariances = _array("covariances", self.covariances, np.float64, (n, 3, 3))
+            covariances = checked_array("covariances", self.covariances, np.float64, (n, 3, 3))
             _require_covariances(covariances)
             object.__setattr__(self, "covariances", covariances)
         if self.n_views is not None:
-            object.__setattr__(self, "n_views", _array("n_views", self.n_views, np.int64, (n,)))
+            object.__setattr__(self, "n_views", checked_array("n_views", self.n_views, np.int64, (n,)))
         if self.ids is not None:
             object.__setattr__(self, "ids", _column("ids", self.ids, n))
             _require_unique(self.ids)
@@ -128,7 +103,7 @@ class FruitCloud:
         """
         from pomona.cloud.files import read_cloud
 
-        return read_cloud(Path(path), unit)
+        return read_cloud(Path(path), unit, cls)
 
     def write(self, path: str | Path) -> None:
         """Write a .csv or .ply file, in metres; the file appears whole or not at all.
@@ -166,7 +141,7 @@ class FruitCloud:
         map_from_query : (4, 4) array_like
             Rigid or similarity transform, homogeneous, scale folded in. A scale also scales diameters.
         """
-        transform = _array("map_from_query", map_from_query, np.float64, (4, 4))
+        transform = checked_array("map_from_query", map_from_query, np.float64, (4, 4))
         linear, translation_m = transform[:3, :3], transform[:3, 3]
         scale = float(np.cbrt(np.linalg.det(linear)))
         return replace(
@@ -207,22 +182,6 @@ class FruitCloud:
         return str(int(row)) if self.ids is None else self.ids[row]
 
 
-def _array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """Return `values` as a contiguous array of `dtype`; None in `shape` takes any length."""
-    try:
-        array = np.ascontiguousarray(values, dtype=dtype)
-    except (TypeError, ValueError, OverflowError):
-        raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None
-    fits = array.ndim == len(shape) and all(
-        want is None or found == want for found, want in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
-        wanted = ", ".join("N" if want is None else str(want) for want in shape)
-        found = ", ".join(map(str, array.shape))
-        raise PomonaError(f"{name}: found shape ({found}), expected ({wanted})")
-    return array
-
-
 def _require_finite(name: str, array: NDArray[np.float64]) -> None:
     finite = np.isfinite(array)
     if not finite.all():
@@ -244,7 +203,7 @@ def _require_covariances(covariances: NDArray[np.float64]) -> None:
 
 
 def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
-    diameters_m = _array("diameters_m", values, np.float64, (n,))
+    diameters_m = checked_array("diameters_m", values, np.float64, (n,))
     # NaN compares false and so stays allowed: the diameter of that fruit is unknown.
     wrong = (diameters_m <= 0) | np.isinf(diameters_m)
     if wrong.any():

@@ -8,7 +8,8 @@ from typing import TypeAlias
 
 from numpy.typing import ArrayLike
 
-from pomona.cloud.fruit_cloud import FruitCloud, Unit
+from pomona.cloud.fruit_cloud import FruitCloud
+from pomona.cloud.units import Unit
 
 __all__ = ["Cloud", "as_cloud"]
 

@@ -10,18 +10,20 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
-from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.cloud.typed import as_floats, as_whole
 from pomona.errors import PomonaError
 from pomona.likes import PLY_MARK
 from pomona.reading import parsed_json, require_file, shown, whole_number
+
+if TYPE_CHECKING:
+    from pomona.cloud.fruit_cloud import FruitCloud
 
 __all__ = ["read", "write"]
 
@@ -51,7 +53,7 @@ class Header:
     n_lines: int
 
 
-def read(path: Path) -> FruitCloud:
+def read(path: Path, make: type[FruitCloud]) -> FruitCloud:
     """Read a cloud; see `FruitCloud.read`."""
     require_file(path, "a fruit cloud in PLY")
     try:
@@ -66,7 +68,7 @@ def read(path: Path) -> FruitCloud:
         columns[name] = table[name] if name in NUMBERS else [_text(value) for value in table[name].tolist()]
     columns.update((column, _complete(path, column, values, header)) for column, values in header.texts.items())
     try:
-        return assemble(columns)
+        return assemble(columns, make)
     except PomonaError as error:
         raise PomonaError(f"{path}: {error}") from None
 

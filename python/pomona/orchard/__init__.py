@@ -4,11 +4,11 @@ from pomona.orchard.adding import Added, add_session
 from pomona.orchard.integrity import problems
 from pomona.orchard.loading import load_session
 from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
-from pomona.orchard.reading import read_cloud, read_session
 from pomona.orchard.removing import Removed, remove_session
-from pomona.orchard.schema import FORMAT_VERSION
 from pomona.orchard.session import Session
+from pomona.orchard.stored_sessions import read_session
 from pomona.orchard.writing import write_session
+from pomona.store.schema import FORMAT_VERSION
 
 __all__ = [
     "FORMAT_VERSION",
@@ -21,7 +21,6 @@ __all__ = [
     "add_session",
     "load_session",
     "problems",
-    "read_cloud",
     "read_session",
     "remove_session",
     "write_session",

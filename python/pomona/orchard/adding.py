@@ -14,16 +14,16 @@ from pomona import geopackage
 from pomona.atomic import NoLinksError, new_file
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.orchard import schema
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.numbering import last_ids
-from pomona.orchard.opening import TIMEOUT_S, Waiting, blank, writing
-from pomona.orchard.reading import fruits_in_map
 from pomona.orchard.replay import in_view_unseen
-from pomona.orchard.rows import columns_of
 from pomona.orchard.session import Session
 from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
 from pomona.settings import Settings
+from pomona.store import schema
+from pomona.store.failures import WrongContentError
+from pomona.store.numbering import last_ids
+from pomona.store.opening import TIMEOUT_S, Waiting, blank, writing
+from pomona.store.rows import columns_of
+from pomona.store.stored_fruits import fruits_in_map
 
 if TYPE_CHECKING:
     from pomona.matching import Match
@@ -136,7 +136,7 @@ def _add(
         last_ids(connection)
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
-        known = fruits_in_map(connection)
+        known = fruits_in_map(connection, FruitCloud)
         if not len(known):
             raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pomona.orchard.cells import COLUMNS
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.numbering import misnumbered
-from pomona.orchard.opening import snapshot
 from pomona.orchard.replay import replayed, sighted
-from pomona.orchard.rows import columns_of, misfits
+from pomona.store.cells import COLUMNS
+from pomona.store.failures import WrongContentError
+from pomona.store.numbering import misnumbered
+from pomona.store.opening import snapshot
+from pomona.store.rows import columns_of, misfits
 
 __all__ = ["problems"]
 

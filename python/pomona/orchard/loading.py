@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud, Unit
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_spacing
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.orchard.reading import read_session
 from pomona.orchard.session import Session
+from pomona.orchard.stored_sessions import read_session
 
 __all__ = ["load_session"]
 

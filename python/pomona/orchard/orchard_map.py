@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
-from pomona.orchard.cells import finite_json
-from pomona.orchard.opening import snapshot
-from pomona.orchard.reading import fruits_in_map
-from pomona.orchard.rows import columns_of
+from pomona.store.cells import finite_json
+from pomona.store.opening import snapshot
+from pomona.store.rows import columns_of
+from pomona.store.stored_fruits import fruits_in_map
 
 __all__ = ["Observations", "OrchardMap", "Visit"]
 
@@ -157,7 +157,7 @@ class OrchardMap:
     def fruits(self) -> FruitCloud:
         """Return every fruit where it was last seen, with its identity as id."""
         with snapshot(self.path) as (connection, _):
-            return fruits_in_map(connection)
+            return fruits_in_map(connection, FruitCloud)
 
     def visits(self) -> tuple[Visit, ...]:
         """Return the sessions in order of date."""

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.orchard.failures import WrongContentError
-from pomona.orchard.opening import TIMEOUT_S, Waiting, writing
-from pomona.orchard.replay import Fruits, replayed, sighted
-from pomona.orchard.rows import columns_of
+from pomona.orchard.replay import ReplayedFruits, replayed, sighted
 from pomona.orchard.writing import nullable, update_layers
+from pomona.store.failures import WrongContentError
+from pomona.store.opening import TIMEOUT_S, Waiting, writing
+from pomona.store.rows import columns_of
 
 __all__ = ["Removed", "remove_session"]
 
@@ -106,14 +106,14 @@ def _remove(connection: sqlite3.Connection, session_id: int, *, dry: bool) -> Re
     return Removed(len(going.fruit_ids), int((~kept).sum()), int(changed.sum()), len(visits) - 1)
 
 
-def _changed(before: Fruits, after: Fruits, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _changed(before: ReplayedFruits, after: ReplayedFruits, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which of the remaining fruits are elsewhere or no longer missed, (N,)."""
     moved = (before.positions[kept] != after.positions).any(axis=1)
     changed: NDArray[np.bool_] = moved | (before.is_missed[kept] != after.is_missed)
     return changed
 
 
-def _write_fruits(connection: sqlite3.Connection, fruits: Fruits) -> None:
+def _write_fruits(connection: sqlite3.Connection, fruits: ReplayedFruits) -> None:
     connection.executemany(
         """UPDATE fruits SET geom = ?, state = ?, last_seen = ?, last_session_id = ?, n_sessions = ?, n_missed = ?,
         diameter_m = ? WHERE id = ?""",
@@ -131,7 +131,7 @@ def _write_fruits(connection: sqlite3.Connection, fruits: Fruits) -> None:
     )
 
 
-def _forget_matches(connection: sqlite3.Connection, fruits: Fruits) -> None:
+def _forget_matches(connection: sqlite3.Connection, fruits: ReplayedFruits) -> None:
     """Make the sessions that are now the first to have seen a fruit say so: their matches were with what is gone."""
     connection.executemany(
         """UPDATE observations SET match_probability = NULL, match_distance_m = NULL

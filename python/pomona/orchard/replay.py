@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.orchard.rows import columns_of
+from pomona.store.rows import columns_of
 
-__all__ = ["Fruits", "Sighted", "in_view_unseen", "replayed", "sighted"]
+__all__ = ["ReplayedFruits", "Sighted", "in_view_unseen", "replayed", "sighted"]
 
 NEIGHBOURS = 5
 """A fruit was in view when most of its five nearest fruits were seen: as many as make a constellation."""
@@ -41,7 +41,7 @@ class Sighted:
 
 
 @dataclass(eq=False)
-class Fruits:
+class ReplayedFruits:
     """The table of fruits, (N,) rows in order of id; `first_observation_ids` are those that no match led to."""
 
     ids: NDArray[np.int64]
@@ -55,7 +55,7 @@ class Fruits:
     first_observation_ids: NDArray[np.int64]
 
     @classmethod
-    def unseen(cls, ids: NDArray[np.int64]) -> Fruits:
+    def unseen(cls, ids: NDArray[np.int64]) -> ReplayedFruits:
         """Return fruits before the first session."""
         n = len(ids)
         return cls(
@@ -85,9 +85,11 @@ def sighted(connection: sqlite3.Connection) -> list[Sighted]:
     ]
 
 
-def replayed(visits: Sequence[Sighted]) -> Fruits:
+def replayed(visits: Sequence[Sighted]) -> ReplayedFruits:
     """Return the fruits of a map with these sessions, added in this order."""
-    fruits = Fruits.unseen(np.unique(np.concatenate([np.empty(0, np.int64), *(visit.fruit_ids for visit in visits)])))
+    fruits = ReplayedFruits.unseen(
+        np.unique(np.concatenate([np.empty(0, np.int64), *(visit.fruit_ids for visit in visits)]))
+    )
     newest = ""
     for visit in visits:
         _see(fruits, visit, is_newest=visit.date >= newest)
@@ -95,7 +97,7 @@ def replayed(visits: Sequence[Sighted]) -> Fruits:
     return fruits
 
 
-def _see(fruits: Fruits, visit: Sighted, *, is_newest: bool) -> None:
+def _see(fruits: ReplayedFruits, visit: Sighted, *, is_newest: bool) -> None:
     rows = np.searchsorted(fruits.ids, visit.fruit_ids)
     known = np.flatnonzero(fruits.n_sessions)
     missed = known[in_view_unseen(fruits.positions[known], np.isin(known, rows))]

@@ -6,19 +6,16 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
 
 import numpy as np
 
 from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.store.values import FARTHEST_M, iso_date
 from pomona.trajectory import Trajectory
 
-__all__ = ["FARTHEST_M", "GUESSED", "Session", "iso_date"]
-
-FARTHEST_M = 1e12
-"""Nothing that grows is farther from anything than the planets; squares of such numbers can still be added."""
+__all__ = ["GUESSED", "Session"]
 
 GUESSED = "guessed from the age of the files"
 """What `configuration["scan"]["date"]` of a session says when nobody noted the day of the visit."""
@@ -96,20 +93,6 @@ class Session:
     def input_hashes_json(self) -> str:
         """The input hashes as the files hold them."""
         return _json("input_hashes", self.input_hashes)
-
-
-def iso_date(date: str) -> str:
-    """Return a local date, or date and time, as files hold it; refuse anything else with a `PomonaError`."""
-    try:
-        moment = datetime.fromisoformat(date)
-    except ValueError:
-        raise PomonaError(
-            f"session: found the date {date!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
-        ) from None
-    if moment.tzinfo is not None:
-        # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
-        raise PomonaError(f"session: found the date {date!r} with a time zone, expected the orchard's local time")
-    return moment.date().isoformat() if len(date) <= len("2021-09-27") else moment.isoformat()
 
 
 def _require_unicode(texts: Iterable[str]) -> None:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
-from pomona.orchard import schema
-from pomona.orchard.numbering import last_ids
-from pomona.orchard.opening import blank
 from pomona.orchard.session import Session
 from pomona.settings import Settings
+from pomona.store import schema
+from pomona.store.numbering import last_ids
+from pomona.store.opening import blank
 from pomona.trajectory import Trajectory
 
 __all__ = [

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.quiver import Quiver
     from numpy.typing import NDArray
 
-    from pomona.plot.views import View
+    from pomona.plot.projections import View
 
 __all__ = ["Arrows"]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.plot.views import View, view_from_above
+from pomona.plot.projections import View, view_from_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ import numpy as np
 
 from pomona.plot.arrows import Arrows
 from pomona.plot.fates import Fates
+from pomona.plot.projections import View, side_and_plan
 from pomona.plot.sheet import FAINT, INK, Sheet
 from pomona.plot.trees import Trees
-from pomona.plot.views import View, side_and_plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ __all__ = ["draw_row"]
 
 
 @dataclass(frozen=True)
-class Kind:
+class Mark:
     """How fruits of one fate are drawn; colours of Okabe and Ito, and a shape of its own for each."""
 
     name: str
@@ -35,12 +35,12 @@ class Kind:
     filled: bool = True
 
 
-FOUND = Kind("found again", "o", "#0072b2", 1.0)
-NEW = Kind("new", "^", "#e69f00", 1.2)
-MISSED = Kind("missed", "o", "#d55e00", 1.1, filled=False)
-ELSEWHERE = Kind("not in view", ".", FAINT, 0.9)
-MAP = Kind("in the map", "o", "#0072b2", 1.0)
-QUERY = Kind("in the query", "^", "#e69f00", 1.1)
+FOUND = Mark("found again", "o", "#0072b2", 1.0)
+NEW = Mark("new", "^", "#e69f00", 1.2)
+MISSED = Mark("missed", "o", "#d55e00", 1.1, filled=False)
+ELSEWHERE = Mark("not in view", ".", FAINT, 0.9)
+MAP = Mark("in the map", "o", "#0072b2", 1.0)
+QUERY = Mark("in the query", "^", "#e69f00", 1.1)
 
 
 def draw_row(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: ArrayLike | None = None) -> Figure:
@@ -110,7 +110,7 @@ def _draw_fates(sheet: Sheet, views: tuple[View, View], fates: Fates) -> None:
         axes.label_outer()
 
 
-def _scatter(axes: Axes, points: NDArray[np.float64], kind: Kind, zorder: int = 3) -> None:
+def _scatter(axes: Axes, points: NDArray[np.float64], kind: Mark, zorder: int = 3) -> None:
     axes.scatter(
         points[:, 0],
         points[:, 1],

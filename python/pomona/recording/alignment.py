@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaWarning
 from pomona.recording.calibration import Calibration
 from pomona.recording.frame import Frame, Recording
-from pomona.recording.part import PartOfRecording
+from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.trajectory import Trajectory
 

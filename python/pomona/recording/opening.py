@@ -65,7 +65,7 @@ def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> 
     if not place.is_dir():
         require_file(place, ACCEPTED)
     from pomona.recording import bags
-    from pomona.recording.video import VIDEO_SUFFIXES, left_and_right, open_video
+    from pomona.recording.video.stereo_video import VIDEO_SUFFIXES, left_and_right, open_video
 
     if bags.recognises(place):
         return bags.open_bag(place, given, topics)
@@ -73,7 +73,7 @@ def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> 
         raise PomonaError(f"{place}: topics: found no bag, expected one for --topics")
     if not place.is_dir():
         if place.suffix.lower() == ".svo2":
-            from pomona.recording.svo2 import open_svo2
+            from pomona.recording.formats.svo2 import open_svo2
 
             return open_svo2(place, given)
         if place.suffix.lower() == ".svo":
@@ -86,8 +86,8 @@ def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> 
 
 def _open_layout(folder: Path, calibration: Path | None) -> RectifiedRecording | None:
     """Open a folder of pictures, None where it is none."""
-    from pomona.recording import euroc, kitti, tum_rgbd
-    from pomona.recording.folder import FolderRecording
+    from pomona.recording.formats import euroc, kitti, tum_rgbd
+    from pomona.recording.formats.folder import FolderRecording
 
     if euroc.recognises(folder):
         return euroc.open_euroc(folder, calibration)

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.recording.calibration.rectification import Optics
 from pomona.recording.frame import Frame, Recording
-from pomona.recording.part import PartOfRecording
+from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.poses import is_kitti, read_kitti, read_tum
 from pomona.recording.poses_in_time import posed_rows, poses_at
-from pomona.recording.rectification import Optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["PosedRecording", "RectifiedRecording", "with_poses"]

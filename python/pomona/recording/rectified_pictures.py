@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from pomona.errors import PomonaError
+from pomona.recording.calibration.rectification import Optics
 from pomona.recording.pictures import picture_size, read_colour, read_depth
-from pomona.recording.rectification import Optics
 
 __all__ = ["read_rectified", "size_of_first"]
 

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
 from pomona.stereo.exposure import like
+from pomona.stereo.fruit_depth import FruitDepth
 from pomona.stereo.pair import NEAREST_M, Picture, depth_of_disparity, focal_baseline_px_m, in_colour
 
 __all__ = ["DenseStereo"]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import _core
-from pomona.depth import FruitDepth
 from pomona.recording.calibration import Calibration
 from pomona.stereo.exposure import like
+from pomona.stereo.fruit_depth import FruitDepth
 from pomona.stereo.pair import NEAREST_M, Picture, focal_baseline_px_m, in_colour
 
 __all__ = ["StereoDepth"]

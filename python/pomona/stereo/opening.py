@@ -36,6 +36,6 @@ def open_stereo(how: str, calibration: Calibration) -> Stereo:
         return DenseStereo(calibration)
     if Path(how).suffix.lower() != ".onnx":
         raise PomonaError(f"depth: found {how!r}, expected stereo, dense or a stereo network, NAME.onnx")
-    from pomona.stereo.onnx import OnnxStereo
+    from pomona.stereo.onnx_stereo import OnnxStereo
 
     return OnnxStereo.open(how, calibration)

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.depth import FruitDepth
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.stereo.fruit_depth import FruitDepth
 
 __all__ = ["NEAREST_M", "Picture", "Stereo", "depth_of_disparity", "focal_baseline_px_m", "in_colour"]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pomona.recording import Calibration
 from pomona.survey.seeing import Look
-from pomona.tracking import Belief, Tracks, TrackViews, believed
+from pomona.survey.tracking import Belief, Tracks, TrackViews, believed
 
 __all__ = ["Believing"]
 

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from pomona.atomic import whole_file
-from pomona.depth import Lifted, Refusal
 from pomona.detect import Detections
 from pomona.errors import PomonaError
 from pomona.reading import parsed_json, read_text, require_file, shown
 from pomona.recording import Frame
+from pomona.survey.depth import Lifted, Refusal
 from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.survey.believing import Believing
-from pomona.survey.motion import Camera
+from pomona.survey.pose_source import PoseSource
 from pomona.survey.registration import Fruits
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of
-from pomona.tracking import Tracker, Tracks
+from pomona.survey.tracking import Tracker, Tracks
 from pomona.trajectory import Trajectory
 
 __all__ = ["Boxes", "OpenPart", "Part"]
@@ -123,7 +123,7 @@ class OpenPart:
         """Why it began."""
         return self._began
 
-    def refined(self, camera: Camera) -> NDArray[np.float64]:
+    def refined(self, camera: PoseSource) -> NDArray[np.float64]:
         """Give the poses of its frames, (F, 4, 4), by all that is known at the end."""
         sightings = Sightings.of(self._looks)
         frames = [look.frame for look in self._looks]

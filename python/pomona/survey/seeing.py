@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import _core
-from pomona.depth import Lifted, lift
 from pomona.detect import Detections, Detector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Frame, Recording
-from pomona.recording.check import is_blank
+from pomona.recording.checks.readable import is_blank
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.stereo import open_stereo
+from pomona.survey.depth import Lifted, lift
 from pomona.survey.prefetch import Kind
 
 __all__ = ["Look", "Seeing"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud, Views
-from pomona.fusion import fuse_centres, fuse_diameters
+from pomona.survey.fusion import fuse_centres, fuse_diameters
 from pomona.survey.seeing import Look
 
 __all__ = ["Sightings", "fruits_of"]

@@ -15,20 +15,20 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
-from pomona.depth import Refusal
 from pomona.detect import Detector
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
+from pomona.survey.depth import Refusal
 from pomona.survey.kept import Kept
-from pomona.survey.motion import Camera, Place, camera_of
 from pomona.survey.part import OpenPart, Part
+from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing
-from pomona.tracking import Tracker
+from pomona.survey.tracking import Tracker
 from pomona.trajectory import Trajectory
 
 __all__ = ["Progress", "Survey", "scan"]
@@ -126,7 +126,7 @@ def scan(
     if not (depth == "auto" and "depth" in recording.description()["pictures"]):
         recording = straightened(recording)
     seeing = Seeing(recording, detector, depth=depth)
-    camera = camera_of(recording, odometry=odometry)
+    camera = pose_source_of(recording, odometry=odometry)
     named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
     findings = _Findings(partial(_open_part, recording, None if named else config or {}))
     look_at = keep.remembering(seeing) if keep is not None else seeing
@@ -147,7 +147,7 @@ def scan(
     return survey
 
 
-def _placed(camera: Camera, frame: Frame) -> Place:
+def _placed(camera: PoseSource, frame: Frame) -> Place:
     try:
         return camera(frame)
     except UnreadablePictureError as error:
@@ -197,7 +197,7 @@ class _Findings:
         self._detections += len(look.detections)
         self._refused += look.lifted.refused
 
-    def survey(self, camera: Camera) -> Survey:
+    def survey(self, camera: PoseSource) -> Survey:
         if not self._parts:
             raise PomonaError("stopped before a frame could be used")
         placed = [(part, part.refined(camera)) for part in self._parts.values()]

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.refinement import Motions
+from pomona.survey.refinement import Motions
 
 __all__ = ["between_keys", "followed", "stride"]
 

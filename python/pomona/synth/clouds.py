@@ -30,14 +30,14 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.synth.cells import CELLS, Cell
-from pomona.synth.row import Row, unit_vectors
+from pomona.synth.named_cells import CELLS, Cell
+from pomona.synth.planting import Row, unit_vectors
 from pomona.synth.scenes import draw_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["CELLS", "Cell", "ScenePair", "Visit", "scene_pair"]
+__all__ = ["CELLS", "Cell", "ScenePair", "SynthVisit", "scene_pair"]
 
 _TRANSLATION_M = 20.0
 _MEAN_DIAMETER_M, _DIAMETER_SIGMA_M = 0.070, 0.006
@@ -45,7 +45,7 @@ _GROWTH_M, _DIAMETER_NOISE_M = 0.012, 0.002
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class SynthVisit:
     """One visit's cloud and the similarity that took it from the row frame.
 
     Attributes
@@ -146,7 +146,7 @@ def _visit(
     labels: NDArray[np.int64],
     side: Literal["q", "m"],
     units_per_metre: float,
-) -> Visit:
+) -> SynthVisit:
     """See the fruits `in_view`: hide, add, disturb, move, shuffle."""
     seen = np.flatnonzero(in_view & (rng.random(len(positions)) >= cell.hidden))
     n_false = round(cell.false_rate * len(seen))
@@ -159,7 +159,7 @@ def _visit(
         (places @ session_from_row[:3, :3].T + session_from_row[:3, 3])[order],
         ids=tuple(ids[at] for at in order),
     )
-    return Visit(cloud, session_from_row)
+    return SynthVisit(cloud, session_from_row)
 
 
 def _false_points(rng: np.random.Generator, fruits: NDArray[np.float64], count: int) -> NDArray[np.float64]:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.synth.row import Row, grow_row
+from pomona.synth.planting import Row, grow_row
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pomona.synth.cells import Cell
+    from pomona.synth.named_cells import Cell
 
 _GRID_SHAPE = (10, 5, 8)
 _GRID_PITCH_M = 0.25

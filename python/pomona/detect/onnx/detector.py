@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pomona.detect.detections import Detections
 from pomona.detect.onnx.candidates import Selection, suppress
 from pomona.detect.onnx.families import FAMILIES
-from pomona.detect.onnx.masks import tightened
+from pomona.detect.onnx.mask_boxes import tightened
 from pomona.detect.onnx.network import Network
 from pomona.detect.onnx.preparation import prepare
 from pomona.detect.onnx.signature import Signature, identify

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Placement", "Preparation", "prepare"]
+__all__ = ["InputPlacement", "Preparation", "prepare"]
 
 PADDING = 114
 """Grey of the bars: what the YOLO families are trained with."""
@@ -52,7 +52,7 @@ class Preparation:
 
 
 @dataclass(frozen=True)
-class Placement:
+class InputPlacement:
     """Where a picture lies in the input of a network: input = picture * scale + offset_px, for x and y."""
 
     scale: tuple[float, float]
@@ -65,7 +65,7 @@ class Placement:
 
 def prepare(
     picture: NDArray[np.uint8], size_px: tuple[int, int], preparation: Preparation
-) -> tuple[NDArray[np.float32], Placement]:
+) -> tuple[NDArray[np.float32], InputPlacement]:
     """Prepare a picture.
 
     Parameters
@@ -79,7 +79,7 @@ def prepare(
 
     Returns
     -------
-    (3, h, w) float32, Placement
+    (3, h, w) float32, InputPlacement
         The input, and where the picture lies in it.
     """
     old_px = (picture.shape[1], picture.shape[0])
@@ -92,7 +92,7 @@ def prepare(
         # (value / divide_by - mean) / std
         given[plane] *= np.float32(1 / (preparation.divide_by * preparation.std[plane]))
         given[plane] -= np.float32(preparation.mean[plane] / preparation.std[plane])
-    return given, Placement((new_px[0] / old_px[0], new_px[1] / old_px[1]), corner_px)
+    return given, InputPlacement((new_px[0] / old_px[0], new_px[1] / old_px[1]), corner_px)
 
 
 def _fit(old_px: tuple[int, int], size_px: tuple[int, int], fit: str) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.bags.contents import PictureTopic
+from pomona.recording.bags.depth_registration import Registration
 from pomona.recording.bags.message_file import Message, MessageFile, decoded
-from pomona.recording.bags.pictures import colour_of, depth_of
-from pomona.recording.bags.registration import Registration
+from pomona.recording.bags.picture_messages import colour_of, depth_of
 from pomona.recording.bags.topics import Roles
 from pomona.recording.calibration import Calibration
+from pomona.recording.calibration.rectification import Optics
 from pomona.recording.dates import date_in_name, date_of_ns
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.pictures import UnreadablePictureError
-from pomona.recording.rectification import Optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["BagRecording"]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.recording.rig import Camera, Rig
-from pomona.recording.rig_files.fields import distortion_of
+from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.calibration.rig_files.fields import distortion_of
 
 __all__ = ["camera_of", "rig_of", "says_rectified"]
 
@@ -21,7 +21,7 @@ def says_rectified(topic: str) -> bool:
     return "rect" in re.split(r"[/_]", topic.lower())
 
 
-def camera_of(path: Path, topic: str, messages: list[Any], *, is_rectified: bool) -> Camera:
+def camera_of(path: Path, topic: str, messages: list[Any], *, is_rectified: bool) -> RigCamera:
     """Read the camera_info of one topic, decoded; it says the same again and again.
 
     Raises
@@ -42,10 +42,10 @@ def camera_of(path: Path, topic: str, messages: list[Any], *, is_rectified: bool
     projection = info.P if info.P[0, 0] > 0 else None
     rotation = info.R if info.R.any() else np.eye(3)
     if is_rectified and projection is not None:
-        return Camera(projection[:, :3], np.zeros(0), False, info.size_px, np.eye(3), projection)
+        return RigCamera(projection[:, :3], np.zeros(0), False, info.size_px, np.eye(3), projection)
     model = "plumb_bob" if "brown conrady" in info.model.lower() else info.model
     distortion, fisheye = distortion_of(where, model, info.D) if info.D.any() else (np.zeros(0), False)
-    return Camera(info.K, distortion, fisheye, info.size_px, rotation, projection)
+    return RigCamera(info.K, distortion, fisheye, info.size_px, rotation, projection)
 
 
 class _Said:
@@ -71,7 +71,7 @@ class _Said:
 
 
 def rig_of(
-    paths: tuple[Path, ...], left: Camera, right: Camera | None, right_from_left: NDArray[np.float64] | None
+    paths: tuple[Path, ...], left: RigCamera, right: RigCamera | None, right_from_left: NDArray[np.float64] | None
 ) -> Rig:
     """Put two cameras together.
 
@@ -84,5 +84,5 @@ def rig_of(
         shifted = bool(right.projection[0, 3] != left.projection[0, 3])
     if right is None or shifted or right_from_left is None:
         return Rig(paths, left, right)
-    bare = [Camera(camera.matrix, camera.distortion, camera.fisheye, camera.size_px) for camera in (left, right)]
+    bare = [RigCamera(camera.matrix, camera.distortion, camera.fisheye, camera.size_px) for camera in (left, right)]
     return Rig(paths, bare[0], bare[1], right_from_left)

@@ -11,12 +11,12 @@ import numpy as np
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.camera_info import camera_of, rig_of, says_rectified
 from pomona.recording.bags.contents import Contents
+from pomona.recording.bags.depth_registration import Registration, is_aligned
 from pomona.recording.bags.frames_of_reference import bare_name, path_between
-from pomona.recording.bags.registration import Registration, is_aligned
 from pomona.recording.bags.topics import Roles
-from pomona.recording.rectification import Optics, rectified
-from pomona.recording.rig import Camera
-from pomona.recording.rig_files import find_optics
+from pomona.recording.calibration.rectification import Optics, rectified
+from pomona.recording.calibration.rig import RigCamera
+from pomona.recording.calibration.rig_files import find_optics
 
 __all__ = ["optics_of", "registration_of", "without_depth"]
 
@@ -87,7 +87,7 @@ def without_depth(roles: Roles, contents: Contents, reason: PomonaError) -> Role
     return dataclasses.replace(roles, depth=None, depth_info=None)
 
 
-def _camera(path: Path, contents: Contents, picture: str | None, info: str | None) -> Camera:
+def _camera(path: Path, contents: Contents, picture: str | None, info: str | None) -> RigCamera:
     assert picture is not None
     if info is None:
         wanted = f"{picture.rpartition('/')[0]}/camera_info"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.reading import number_in
 from pomona.recording.bags.message_file import Message, MessageFile, Topic, counted, decoded, stamp_ns
-from pomona.recording.bags.pictures import is_depth, size_of
+from pomona.recording.bags.picture_messages import is_depth, size_of
 from pomona.recording.bags.realsense import is_depth_unit, is_extrinsics, static_transform, stream_frame
 from pomona.recording.bags.topics import Roles
 

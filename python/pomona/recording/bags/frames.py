@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.contents import PictureTopic
-from pomona.recording.bags.poses import Known
+from pomona.recording.bags.pose_messages import Known
+from pomona.recording.calibration.rectification import Optics
 from pomona.recording.pairing import half_period, mutually_nearest
 from pomona.recording.poses_in_time import LONGEST_GAP_S, posed_rows, poses_at
-from pomona.recording.rectification import Optics
 from pomona.trajectory import Trajectory
 
 __all__ = ["posed", "simultaneous"]

@@ -9,10 +9,10 @@ from pomona.errors import PomonaError
 from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.cameras import optics_of, registration_of, without_depth
 from pomona.recording.bags.contents import Contents, read_contents
-from pomona.recording.bags.files import open_messages, rest_of
 from pomona.recording.bags.frames import posed, simultaneous
+from pomona.recording.bags.kinds import open_messages, rest_of
 from pomona.recording.bags.message_file import missing_extra
-from pomona.recording.bags.poses import camera_poses
+from pomona.recording.bags.pose_messages import camera_poses
 from pomona.recording.bags.ros_bag import DamagedBagError
 from pomona.recording.bags.topics import chosen_topics
 

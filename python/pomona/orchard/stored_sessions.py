@@ -1,0 +1,65 @@
+"""Sessions out of the tables."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.orchard.session import Session
+from pomona.store.failures import WrongContentError, content
+from pomona.store.opening import snapshot
+from pomona.store.rows import columns_of
+from pomona.store.stored_fruits import OF_SESSION, observed_cloud, only_session
+from pomona.trajectory import Trajectory
+
+__all__ = ["read_session"]
+
+
+def read_session(path: str | Path) -> Session:
+    """Read a session file.
+
+    Raises
+    ------
+    PomonaError
+        When the file is not a session of ours: a map, another GeoPackage, a newer format, or edited to what cannot be.
+    """
+    path = Path(path)
+    with snapshot(path) as (connection, kind):
+        if kind != "session":
+            raise PomonaError(f"{path}: is a map, expected the file of one session")
+        about = only_session(connection)
+        session_id = about.pop("id")
+        cloud, trajectory = observed_cloud(connection, session_id, FruitCloud), _trajectory(connection, session_id)
+        with content("sessions"):
+            return Session(cloud=cloud, trajectory=trajectory, **about)
+
+
+def _trajectory(connection: sqlite3.Connection, session_id: int) -> Trajectory | None:
+    from scipy.spatial.transform import Rotation
+
+    names = ("id", "geom", "frame", "time_s", "qx", "qy", "qz", "qw")
+    ids, geoms, frames, times_s, *cells = columns_of(connection, "poses", names, OF_SESSION.format(session_id))
+    if not ids:
+        return None
+    quaternions = np.array(cells).T
+    _require_units(ids, quaternions)
+    poses = np.tile(np.eye(4), (len(ids), 1, 1))
+    poses[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix()
+    poses[:, :3, 3] = geopackage.points_of(geoms)
+    with content("poses"):
+        return Trajectory(np.array(frames), np.array(times_s), poses)
+
+
+def _require_units(ids: Sequence[int], quaternions: NDArray[np.float64]) -> None:
+    lengths = np.linalg.norm(quaternions, axis=1)
+    wrong = np.abs(lengths - 1) > 1e-6
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise WrongContentError(f"poses {ids[row]}: found a quaternion of length {lengths[row]:.3g}, expected 1")

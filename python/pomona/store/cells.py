@@ -1,0 +1,198 @@
+"""What a cell of each column may hold: the border between a file, which anyone may have edited, and the program."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.errors import PomonaError
+from pomona.store.values import FARTHEST_M, iso_date
+
+__all__ = ["COLUMNS", "CellKind", "finite_json", "similarity"]
+
+RIGID_TOLERANCE = 1e-6
+"""How far the axes of a transform may be from right angles and one length; rounding is at 1e-15."""
+
+
+@dataclass(frozen=True)
+class CellKind:
+    """What a column holds.
+
+    Attributes
+    ----------
+    expected : str
+        In words, for people.
+    type : type
+        As sqlite3 gives it.
+    hold : callable
+        Whether all of these cells, of that type, are right.
+    may_be_null : bool
+        Whether nothing is right too.
+    """
+
+    expected: str
+    type: type
+    hold: Callable[[Sequence[Any]], bool]
+    may_be_null: bool = False
+
+    def are_right(self, cells: Sequence[object]) -> bool:
+        """Tell whether all cells are of this kind."""
+        if self.may_be_null:
+            cells = [cell for cell in cells if cell is not None]
+        return set(map(type, cells)) <= {self.type} and (not cells or self.hold(cells))
+
+    def wrong_rows(self, cells: Sequence[object]) -> list[int]:
+        """Return the rows of the cells that are not of this kind."""
+        if self.are_right(cells):
+            return []
+        return [row for row, cell in enumerate(cells) if not self.are_right((cell,))]
+
+
+def _or_null(kind: CellKind) -> CellKind:
+    return CellKind(f"{kind.expected}, or null", kind.type, kind.hold, may_be_null=True)
+
+
+def _whole(expected: str, least: int) -> CellKind:
+    return CellKind(expected, int, lambda cells: min(cells) >= least)
+
+
+def _number(expected: str, least: float, most: float) -> CellKind:
+    return CellKind(expected, float, lambda cells: bool(least <= min(cells) and max(cells) <= most))
+
+
+def _text(expected: str, is_right: Callable[[str], bool] = bool) -> CellKind:
+    return CellKind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, set(cells))))
+
+
+def _json(expected: str, is_right: Callable[[Any], bool]) -> CellKind:
+    return _text(expected, lambda text: is_right(finite_json(text)))
+
+
+def _are_unicode(texts: Sequence[str]) -> bool:
+    try:
+        "".join(texts).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _is_date(text: str) -> bool:
+    """Tell whether it is a date as `Session` writes it: such dates are in order of time as texts."""
+    try:
+        return iso_date(text) == text
+    except PomonaError:
+        return False
+
+
+def finite_json(text: str) -> Any:
+    """Parse JSON; None where it is none, is nested without end or has numbers that are none."""
+
+    def refuse(name: str) -> None:
+        raise ValueError(name)
+
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except (ValueError, RecursionError):
+        return None
+
+
+def similarity(rows: Any) -> NDArray[np.float64] | None:
+    """Return a (4, 4) transform that turns, moves and scales, and no more; None where it is something else."""
+    is_grid = isinstance(rows, list) and len(rows) == 4 and all(isinstance(row, list) and len(row) == 4 for row in rows)
+    if not is_grid or not all(type(cell) in (int, float) for row in rows for cell in row):
+        return None
+    try:
+        transform = np.array(rows, dtype=np.float64)
+    except OverflowError:
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        axes = transform[:3, :3]
+        scale = np.cbrt(np.linalg.det(axes)) if np.isfinite(transform).all() else np.nan
+        is_similarity = scale > 0 and np.abs(axes @ axes.T / scale**2 - np.eye(3)).max() < RIGID_TOLERANCE
+    is_similarity = bool(is_similarity and np.abs(transform).max() <= FARTHEST_M)
+    return transform if is_similarity and (transform[3] == (0, 0, 0, 1)).all() else None
+
+
+def _are_places(blobs: Sequence[bytes]) -> bool:
+    return geopackage.are_points(blobs) and bool(np.abs(geopackage.points_of(blobs)).max() <= FARTHEST_M)
+
+
+def _texts_by_name(value: object) -> bool:
+    return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
+
+
+ID = _whole("a whole number from 1", 1)
+COUNT = _whole("a whole number from 0", 0)
+WHOLE = _whole("a whole number", -(2**63))
+NAME = _text("a text that is not blank", lambda text: bool(text.strip()))
+TEXT = _text("a text in UTF-8", lambda _: True)
+DATE = _text("ISO 8601 local time as 2021-09-27 or 2021-09-27T11:40:12", _is_date)
+OBJECT = _json("a JSON object", lambda value: isinstance(value, dict))
+HASHES = _json("a JSON object of texts", _texts_by_name)
+TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
+POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
+FINITE = _number("a finite number", -np.finfo(float).max, np.finfo(float).max)
+SQUARE = _number("square metres", -(FARTHEST_M**2), FARTHEST_M**2)
+NUMBER = _number("a number", -np.inf, np.inf)
+LENGTH = _number("metres from 0", 0.0, FARTHEST_M)
+DIAMETER = _number("metres above 0", np.finfo(float).tiny, FARTHEST_M)
+SHARE = _number("a number from 0 to 1", 0.0, 1.0)
+UNIT = _number("a number from -1 to 1", -1.0 - RIGID_TOLERANCE, 1.0 + RIGID_TOLERANCE)
+
+COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
+    "pomona_format": {"id": ID, "format_version": WHOLE, "kind": TEXT, "program_version": TEXT},
+    "sessions": {
+        "id": ID,
+        "name": NAME,
+        "date": DATE,
+        "recording": TEXT,
+        "content_sha256": TEXT,
+        "map_from_session": TRANSFORM,
+        "program_version": TEXT,
+        "configuration": OBJECT,
+        "input_hashes": HASHES,
+        "method": _or_null(TEXT),
+        "settings": _or_null(OBJECT),
+        "log_odds": _or_null(NUMBER),
+        "noise_m": _or_null(LENGTH),
+    },
+    "fruits": {
+        "id": ID,
+        "geom": POINT,
+        "state": _text("'seen' or 'missed'", ("seen", "missed").__contains__),
+        "last_seen": DATE,
+        "last_session_id": ID,
+        "n_sessions": ID,
+        "n_missed": COUNT,
+        "diameter_m": _or_null(DIAMETER),
+    },
+    "observations": {
+        "id": ID,
+        "geom": POINT,
+        "session_id": ID,
+        "fruit_id": ID,
+        "label": _or_null(TEXT),
+        "diameter_m": _or_null(DIAMETER),
+        **dict.fromkeys(("cxx", "cxy", "cxz", "cyy", "cyz", "czz"), _or_null(SQUARE)),
+        "n_views": _or_null(WHOLE),
+        "match_probability": _or_null(SHARE),
+        "match_distance_m": _or_null(LENGTH),
+        "other_columns": _or_null(HASHES),
+    },
+    "sightings": {"id": ID, "observation_id": ID, "frame": WHOLE},
+    "poses": {
+        "id": ID,
+        "geom": POINT,
+        "session_id": ID,
+        "frame": WHOLE,
+        "time_s": FINITE,
+        **dict.fromkeys(("qx", "qy", "qz", "qw"), UNIT),
+    },
+}
+"""The columns that Pomona reads, and what they may hold; the layers `trees` and `rows` are the user's."""

@@ -1,0 +1,191 @@
+"""Files of ours, opened: what is read or written is known to be a map or a session."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pomona import geopackage
+from pomona.errors import PomonaError
+from pomona.store import recovery, shape
+from pomona.store.failures import DAMAGED, WrongContentError, told
+from pomona.store.guard import guard, release, trust
+from pomona.store.rows import columns_of
+from pomona.store.schema import FORMAT_VERSION, Kind
+
+__all__ = ["TIMEOUT_S", "Waiting", "blank", "snapshot", "writing"]
+
+TIMEOUT_S = 60.0
+"""How long to wait for another program that writes: the longest match of a large map, a few times over."""
+
+SHORT_TIMEOUT_S = 0.2
+"""How long a writer waits in silence."""
+
+Waiting = Callable[[], None]
+"""Called once when a writer has to wait."""
+
+
+@contextmanager
+def snapshot(path: Path) -> Iterator[tuple[sqlite3.Connection, Kind]]:
+    """Read a file of ours as it was at one moment, whatever is written meanwhile.
+
+    Raises
+    ------
+    PomonaError
+        When it is not there, not ours, from a newer program or damaged.
+    """
+    _require_there(path)
+    with told(path), _begun(path) as connection:
+        yield connection, _kind_of(connection)
+
+
+@contextmanager
+def writing(
+    path: Path, kind: Kind, *, create: bool = False, timeout_s: float = TIMEOUT_S, waiting: Waiting | None = None
+) -> Iterator[tuple[sqlite3.Connection, bool]]:
+    """Let nobody else write to a file of ours; all of the block is kept, or nothing when it raises.
+
+    Gives the connection, and whether the file is empty and waits for its tables, which only `create` allows.
+    """
+    if not create:
+        _require_there(path)
+    with told(path), _connection(path, create=create, timeout_s=timeout_s) as connection:
+        _begin_to_write(connection, timeout_s, waiting)
+        with _transaction(connection):
+            _load_schema(connection)
+            if create and _is_blank(connection):
+                release(connection)
+                yield connection, True
+            else:
+                _require_kind(_kind_of(connection), kind)
+                trust(connection)
+                yield connection, False
+
+
+@contextmanager
+def blank(partial: Path, shown: Path) -> Iterator[sqlite3.Connection]:
+    """Write a new file whole; nobody else knows it, so no journal is needed to undo what fails."""
+    with told(shown), _connection(partial, create=True, timeout_s=SHORT_TIMEOUT_S) as connection:
+        release(connection)
+        connection.execute("PRAGMA journal_mode = MEMORY")
+        connection.execute("BEGIN IMMEDIATE")
+        with _transaction(connection):
+            yield connection
+
+
+@contextmanager
+def _connection(
+    path: Path, *, create: bool = False, timeout_s: float = SHORT_TIMEOUT_S
+) -> Iterator[sqlite3.Connection]:
+    connection = geopackage.connect(path, create=create, timeout_s=timeout_s)
+    try:
+        guard(connection, path.stat().st_size if path.exists() else 0)
+        yield connection
+    finally:
+        connection.close()
+
+
+@contextmanager
+def _begun(path: Path) -> Iterator[sqlite3.Connection]:
+    """Begin to read; in a copy where a killed writer left the file, and it may not be put in order here."""
+    with _connection(path, timeout_s=TIMEOUT_S) as connection:
+        try:
+            _begin_to_read(connection)
+        except sqlite3.Error as error:
+            if not recovery.is_needed(error):
+                raise
+        else:
+            yield connection
+            return
+    with recovery.copied(path) as copy, _connection(copy) as connection:
+        _begin_to_read(connection)
+        yield connection
+
+
+def _begin_to_read(connection: sqlite3.Connection) -> None:
+    connection.execute("BEGIN")
+    _load_schema(connection)
+
+
+def _load_schema(connection: sqlite3.Connection) -> None:
+    """Read the schema, with which a transaction begins to see the file; what SQLite cannot make of it is damage."""
+    try:
+        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorname == "SQLITE_ERROR":
+            raise WrongContentError(DAMAGED) from None
+        raise
+
+
+def _begin_to_write(connection: sqlite3.Connection, timeout_s: float, waiting: Waiting | None) -> None:
+    """Wait for the other writers. In short steps: SQLite's own waiting cannot be interrupted, nor speak."""
+    end = time.monotonic() + timeout_s
+    connection.execute(f"PRAGMA busy_timeout = {int(1000 * min(timeout_s, SHORT_TIMEOUT_S))}")
+    while True:
+        try:
+            connection.execute("BEGIN IMMEDIATE")
+            break
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorname != "SQLITE_BUSY" or time.monotonic() > end:
+                raise
+        if waiting is not None:
+            waiting()
+            waiting = None
+    connection.execute(f"PRAGMA busy_timeout = {int(1000 * timeout_s)}")
+
+
+@contextmanager
+def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # A full disk may have ended the transaction already.
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise
+
+
+def _require_there(path: Path) -> None:
+    if not path.is_file():
+        raise PomonaError(f"{path}: is not there, expected a session or a map (.gpkg)")
+
+
+def _require_kind(found: Kind, wanted: Kind) -> None:
+    if found != wanted:
+        raise WrongContentError("is the file of one session, expected a map; `map add` makes one from it")
+
+
+def _is_blank(connection: sqlite3.Connection) -> bool:
+    """Tell whether nothing was ever committed to the database."""
+    return connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None
+
+
+def _kind_of(connection: sqlite3.Connection) -> Kind:
+    """Return what the file is; refuse one that is not ours or from a newer program."""
+    (application_id,) = connection.execute("PRAGMA application_id").fetchone()
+    if application_id == 0 and _is_blank(connection):
+        raise WrongContentError("is empty: a map that another program is making just now, or never finished; try again")
+    if application_id != geopackage.APPLICATION_ID:
+        raise WrongContentError(f"is not a GeoPackage: application id {application_id:#x}, expected 'GPKG'")
+    items = shape.items_of(connection)
+    if not any(item.name == "pomona_format" for item in items):
+        raise WrongContentError("is a GeoPackage but not one of pomona: it has no table pomona_format")
+    # The table that tells the version has been the same in every version.
+    shape.require_item(items, shape.expected()["table", "pomona_format"])
+    kind = _kind_of_format(connection)
+    shape.require_ours(items)
+    return kind
+
+
+def _kind_of_format(connection: sqlite3.Connection) -> Kind:
+    versions, kinds = columns_of(connection, "pomona_format", ("format_version", "kind"))
+    version, kind = (versions[0], kinds[0]) if len(versions) == 1 else (None, None)
+    if version is not None and version > FORMAT_VERSION:
+        raise WrongContentError(f"has format {version}, this program reads up to {FORMAT_VERSION}: update pomona")
+    if version != FORMAT_VERSION or kind not in ("session", "map"):
+        raise WrongContentError(f"has format {version} and kind {kind!r}, expected 1 and 'session' or 'map'")
+    return "session" if kind == "session" else "map"

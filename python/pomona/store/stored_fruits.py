@@ -1,0 +1,139 @@
+"""Fruits out of the tables; the caller says what to make of them, so that clouds can be read from here."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.store.cells import finite_json
+from pomona.store.failures import WrongContentError, content
+from pomona.store.opening import snapshot
+from pomona.store.rows import columns_of
+from pomona.views import Views
+
+if TYPE_CHECKING:
+    from pomona.cloud.fruit_cloud import FruitCloud
+
+__all__ = ["OF_SESSION", "fruits_in_map", "observed_cloud", "only_session", "stored_cloud"]
+
+COVARIANCE = ("cxx", "cxy", "cxz", "cxy", "cyy", "cyz", "cxz", "cyz", "czz")
+
+OF_SESSION = "WHERE session_id = {:d} ORDER BY id"
+
+AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id ORDER BY fruit_id"
+"""The observation of each fruit by the session that saw it last."""
+
+
+def stored_cloud(path: Path, make: type[FruitCloud]) -> FruitCloud:
+    """Read a session's fruits with the session's own ids, or a map's with theirs, each where it was last seen."""
+    with snapshot(path) as (connection, kind):
+        if kind == "map":
+            return fruits_in_map(connection, make)
+        return observed_cloud(connection, only_session(connection)["id"], make)
+
+
+def observed_cloud(connection: sqlite3.Connection, session_id: int, make: type[FruitCloud]) -> FruitCloud:
+    """Return what a session saw, in the map's frame, with the session's ids, in the order of the session."""
+    ids, geoms, labels, diameters_m, n_views, others, *cells = columns_of(
+        connection,
+        "observations",
+        ("id", "geom", "label", "diameter_m", "n_views", "other_columns", *COVARIANCE),
+        OF_SESSION.format(session_id),
+    )
+    with content("observations"):
+        return make(
+            positions=geopackage.points_of(geoms),
+            ids=tuple(labels) if labels and None not in labels else None,
+            diameters_m=_numbers(diameters_m),
+            covariances=_covariances(cells),
+            n_views=None if not n_views or None in n_views else np.array(n_views, dtype=np.int64),
+            views=_views(connection, session_id, np.array(ids, dtype=np.int64)),
+            extras=_extras(ids, others),
+        )
+
+
+def fruits_in_map(connection: sqlite3.Connection, make: type[FruitCloud]) -> FruitCloud:
+    """Return every fruit where it was last seen, with the covariance of that sighting."""
+    names = ("id", "geom", "diameter_m", "state", "last_seen", "last_session_id", "n_sessions", "n_missed")
+    ids, geoms, diameters_m, states, last_seen, last_session_ids, n_sessions, n_missed = columns_of(
+        connection, "fruits", names
+    )
+    seen_ids, *cells = columns_of(connection, "observations", ("fruit_id", *COVARIANCE), AT_LAST)
+    _require_seen(ids, last_session_ids, seen_ids)
+    with content("fruits"):
+        return make(
+            positions=geopackage.points_of(geoms),
+            ids=tuple(map(str, ids)),
+            diameters_m=_numbers(diameters_m),
+            covariances=_covariances(cells),
+            extras={
+                "state": tuple(states),
+                "last_seen": tuple(last_seen),
+                "n_sessions": tuple(map(str, n_sessions)),
+                "n_missed": tuple(map(str, n_missed)),
+            },
+        )
+
+
+def only_session(connection: sqlite3.Connection) -> dict[str, Any]:
+    """Return the number of the session, and what `Session` is told besides the cloud and the trajectory."""
+    names = ("id", "name", "date", "recording", "configuration", "input_hashes", "program_version")
+    columns = columns_of(connection, "sessions", names)
+    if len(columns[0]) != 1:
+        raise WrongContentError(f"is a session file with {len(columns[0])} sessions, expected 1")
+    about = {name: cells[0] for name, cells in zip(names, columns, strict=True)}
+    parsed = {name: finite_json(about[name]) for name in ("configuration", "input_hashes")}
+    return {**about, **parsed}
+
+
+def _require_seen(ids: Sequence[int], last_session_ids: Sequence[int], seen_ids: Sequence[int]) -> None:
+    """Refuse fruits that their last session did not see, or saw twice."""
+    if ids == seen_ids:
+        return
+    counts = dict(zip(*np.unique(seen_ids, return_counts=True), strict=True))
+    for fruit_id, session_id in zip(ids, last_session_ids, strict=True):
+        if counts.get(fruit_id) != 1:
+            found = f"{counts.get(fruit_id, 'no')} observations of it by its last session {session_id}"
+            raise WrongContentError(f"fruits {fruit_id}: found {found}, expected one")
+    raise WrongContentError("fruits: an id is there twice, expected each once")
+
+
+def _numbers(column: Sequence[float | None]) -> NDArray[np.float64] | None:
+    """Return numbers with NaN for what is unknown; None when all of it is."""
+    numbers = np.array(column, dtype=np.float64)
+    return None if np.isnan(numbers).all() else numbers
+
+
+def _covariances(cells: Sequence[Sequence[float | None]]) -> NDArray[np.float64] | None:
+    numbers = np.array(cells, dtype=np.float64)
+    return None if np.isnan(numbers).any() or not numbers.size else numbers.T.reshape(-1, 3, 3)
+
+
+def _extras(ids: Sequence[int], others: Sequence[str | None]) -> dict[str, tuple[str, ...]]:
+    rows = [finite_json(other) for other in others if other is not None]
+    if not rows or None in others:
+        return {}
+    for observation_id, row in zip(ids, rows, strict=True):
+        if row.keys() != rows[0].keys():
+            raise WrongContentError(
+                f"observations {observation_id}: other_columns: found {', '.join(row)[:60]!r}, "
+                f"expected {', '.join(rows[0])[:60]!r} as in the session's first"
+            )
+    return {name: tuple(row[name] for row in rows) for name in rows[0]}
+
+
+def _views(connection: sqlite3.Connection, session_id: int, ids: NDArray[np.int64]) -> Views | None:
+    """Return the sightings of observations, numbered by their rows in `ids`, (N,) ascending."""
+    of_session = (
+        f"JOIN observations o ON o.id = observation_id WHERE o.session_id = {session_id:d} ORDER BY sightings.id"
+    )
+    observation_ids, frames = columns_of(connection, "sightings", ("observation_id", "frame"), of_session)
+    if not frames:
+        return None
+    return Views(np.array(frames, dtype=np.int64), np.searchsorted(ids, observation_ids).astype(np.int64))

@@ -1,0 +1,26 @@
+"""What a date and a length may be, in memory as in the files."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pomona.errors import PomonaError
+
+__all__ = ["FARTHEST_M", "iso_date"]
+
+FARTHEST_M = 1e12
+"""Nothing that grows is farther from anything than the planets; squares of such numbers can still be added."""
+
+
+def iso_date(date: str) -> str:
+    """Return a local date, or date and time, as files hold it; refuse anything else with a `PomonaError`."""
+    try:
+        moment = datetime.fromisoformat(date)
+    except ValueError:
+        raise PomonaError(
+            f"session: found the date {date!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
+        ) from None
+    if moment.tzinfo is not None:
+        # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
+        raise PomonaError(f"session: found the date {date!r} with a time zone, expected the orchard's local time")
+    return moment.date().isoformat() if len(date) <= len("2021-09-27") else moment.isoformat()
