@@ -1,7 +1,7 @@
 //! Bundle adjustment and the pose of a picture among known points.
 
 use crate::camera::Calibration;
-use crate::cloud::points;
+use crate::cloud::{points, rows};
 use crate::pose::{pose, pose_array, pose_arrays, poses};
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -184,11 +184,6 @@ pub fn locate<'py>(
         PyArray1::from_slice(py, found.information.as_slice()).reshape([6, 6])?,
         PyArray1::from_vec(py, found.inliers),
     )))
-}
-
-fn rows(name: &str, rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
-    let rows: Result<_, _> = rows.as_array().iter().map(|&row| usize::try_from(row)).collect();
-    rows.map_err(|_| wrong(format!("{name}: a row is negative")))
 }
 
 /// Square blocks of an (N, D, D) array.

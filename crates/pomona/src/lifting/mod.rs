@@ -23,6 +23,7 @@
 //! hidden being the part of it that leaves are expected to hide: such boxes are too small, never too large.
 
 mod edges;
+pub mod fruits;
 pub mod fusion;
 pub mod outline;
 mod shift;
