@@ -4,7 +4,7 @@
 //! Each cell has its own pose ([`super::patches`]). Growth goes from cell to neighbouring cell and stops where the
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
-use super::cells::{Cell, Cut};
+use super::cut::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
 use super::overlap::Landing;

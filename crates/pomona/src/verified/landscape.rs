@@ -1,7 +1,7 @@
 //! One cloud prepared for verification: its grid, its typical spacing, and what chance predicts at each place.
 
-use super::cells::Cut;
 use super::chance::{Companions, crowding, kinship, local_density};
+use super::cut::Cut;
 use super::support::Support;
 use crate::cloud::FruitCloud;
 use crate::neighbours::grid::Grid;

@@ -6,15 +6,15 @@
 //!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`).
-//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`outline`).
+//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
-//!    probabilities (`association`) and patches fitted to them, in turns (`settlement`).
+//!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
-mod cells;
 mod chance;
 mod codes;
 mod conclusion;
+mod cut;
 mod decision;
 mod displacement;
 mod doubts;

@@ -1,6 +1,6 @@
 //! What a growth explains, and how much evidence it has.
 
-use super::cells::{key_of, total};
+use super::cut::{key_of, total};
 use super::growth::{Growth, Partner};
 use super::hypothesis::gaussian;
 use super::placement::Placement;

@@ -4,7 +4,7 @@
 //! few. What the patches leave over is smoothed between neighbouring fruits, in the measure in which neighbours'
 //! residuals agree.
 
-use super::cells::{Cell, surroundings, total};
+use super::cut::{Cell, surroundings, total};
 use super::displacement::{displacement, shared_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::hypothesis::GATE;

@@ -10,7 +10,7 @@
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
-use super::cells::{Cell, surroundings, total};
+use super::cut::{Cell, surroundings, total};
 use super::displacement::{displacement, shared_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::landscape::{Landscape, SHARE_OF_ROWS};
