@@ -4,7 +4,7 @@ Each measurement runs in a process of its own. Time: the fastest of some repetit
 one and two. Two at once: wall time of each of two such processes on one thread, at the same time. Cores share caches
 and clocks, so that even processes that have nothing in common slow each other; twice the wall time on one thread over
 this is what a second thread can bring at best. Memory: growth of the peak resident set over that after `import pomona`
-with the clouds made. Counts per second of the core's stages: crates/pomona/examples/throughput.rs on a base pair.
+with the clouds made. Counts per second of the core's stages: crates/pomona/benches/throughput.rs on a base pair.
 Writes speed.csv, throughput.csv and speed.md.
 """
 
@@ -105,7 +105,7 @@ def throughput() -> dict[str, float]:
         paths = [Path(scratch) / name for name in ("query", "map")]
         for path, cloud in zip(paths, (pair.query, pair.map), strict=True):
             np.savetxt(path, cloud.positions)
-        command = ["cargo", "run", "--quiet", "--release", "--locked", "--package", "pomona", "--example", "throughput"]
+        command = ["cargo", "bench", "--quiet", "--locked", "--package", "pomona", "--bench", "throughput", "--"]
         done = subprocess.run([*command, *paths], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     counts: dict[str, float] = json.loads(done.stdout)
     return counts

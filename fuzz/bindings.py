@@ -87,14 +87,18 @@ def _describe(draw: Drawn) -> None:
     )
 
 
-def _fuse_centres(draw: Drawn) -> None:
-    n = draw.count()
-    _core.fuse_centres(draw.numbers(n, 3), draw.covariances(n), draw.numbers(n, 3))
-
-
-def _fuse_diameters(draw: Drawn) -> None:
-    n = draw.count()
-    _core.fuse_diameters(np.abs(draw.numbers(n)), np.abs(draw.numbers(n)), draw.numbers(n))
+def _fuse_fruits(draw: Drawn) -> None:
+    n, k = draw.count(), draw.count() % 6
+    sightings: Any = {
+        "frames": draw.rows(n, k),
+        "fruits": draw.choice(np.arange(n), draw.rows(n, n)),
+        "centres_in_camera": draw.numbers(n, 3) + np.array([0, 0, 3.0]),
+        "covariances": draw.covariances(n),
+        "diameters_m": np.abs(draw.numbers(n)) * 0.07,
+        "diameter_sigmas_m": np.abs(draw.numbers(n)) * 0.01,
+        "hidden": draw.numbers(n),
+    }
+    _core.fuse_fruits(sightings, draw.poses(k))
 
 
 def _camera(draw: Drawn, width: int, height: int) -> Any:
@@ -131,5 +135,5 @@ def _read_pair(draw: Drawn) -> None:
 
 
 _CALLS: tuple[Callable[[Drawn], None], ...] = (
-    *(_adjust, _locate, _search_rows, _describe, _fuse_centres, _fuse_diameters, _lift, _read_pair, _default_config),
+    *(_adjust, _locate, _search_rows, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
 )

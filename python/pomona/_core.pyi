@@ -13,8 +13,7 @@ __all__ = [
     "believed",
     "default_config",
     "describe",
-    "fuse_centres",
-    "fuse_diameters",
+    "fuse_fruits",
     "lift",
     "locate",
     "look_of",
@@ -214,12 +213,19 @@ def search_rows(
 def default_config() -> str: ...
 def setting_meanings() -> dict[str, str]: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
-def fuse_centres(
-    centres: NDArray[np.float64], covariances: NDArray[np.float64], rays: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def fuse_diameters(
-    diameters_m: NDArray[np.float64], sigmas_m: NDArray[np.float64], hidden: NDArray[np.float64]
-) -> tuple[float, float]: ...
+
+class _Sightings(TypedDict):
+    frames: NDArray[np.int64]
+    fruits: NDArray[np.int64]
+    centres_in_camera: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    diameters_m: NDArray[np.float64]
+    diameter_sigmas_m: NDArray[np.float64]
+    hidden: NDArray[np.float64]
+
+def fuse_fruits(
+    sightings: _Sightings, session_from_camera: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def lift(
     depth_m: NDArray[np.float32],
     boxes_px: NDArray[np.float64],

@@ -2,7 +2,7 @@
 
 use crate::lifting::boxes;
 use numpy::{PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use pomona::appearance::appearance;
+use pomona::look;
 use pomona::stereo::Picture;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,7 +25,7 @@ pub fn look_of<'py>(
         return Err(PyValueError::new_err(format!("picture: found {channels} channels, expected 3")));
     }
     let values = picture.as_slice()?;
-    let found = py.detach(|| appearance(Picture::new(values, width), &boxes));
+    let found = py.detach(|| look::look_of(Picture::new(values, width), &boxes));
     let given = |values| PyArray1::from_vec(py, values);
     Ok((given(found.fruitness), given(found.fruit_px), given(found.elsewhere)))
 }

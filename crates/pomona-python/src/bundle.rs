@@ -1,14 +1,14 @@
 //! Bundle adjustment and the pose of a picture among known points.
 
 use crate::camera::Calibration;
-use crate::cloud::points;
+use crate::cloud::{points, rows};
 use crate::pose::{pose, pose_array, pose_arrays, poses};
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
 use pomona::bundle::{
-    Adjustment, KnownPoints, LocateSettings, Measured, Observation, Problem, RelativePose, Settings, State,
+    Adjustment, KnownPoints, LocateSettings, Measured, PointView, Problem, RelativePose, Settings, State,
     adjust as adjust_bundle, locate as locate_picture,
 };
 use pomona::nalgebra::{Matrix3, Matrix6, Vector2, Vector3};
@@ -34,7 +34,7 @@ pub struct Seen<'py> {
 }
 
 impl Seen<'_> {
-    fn append(&self, measured: fn(Vector3<f64>) -> Measured, all: &mut Vec<Observation>) -> PyResult<()> {
+    fn append(&self, measured: fn(Vector3<f64>) -> Measured, all: &mut Vec<PointView>) -> PyResult<()> {
         let (poses, seen) = (rows("poses", &self.poses)?, rows("points", &self.points)?);
         let values = points(&self.values)?;
         let whitenings = matrices(&self.whitenings)?;
@@ -42,7 +42,7 @@ impl Seen<'_> {
             return Err(wrong("observations: found arrays of different lengths"));
         }
         for (((pose, point), value), whitening) in poses.into_iter().zip(seen).zip(values).zip(whitenings) {
-            all.push(Observation { pose, point, measured: measured(value.coords), whitening });
+            all.push(PointView { pose, point, measured: measured(value.coords), whitening });
         }
         Ok(())
     }
@@ -184,11 +184,6 @@ pub fn locate<'py>(
         PyArray1::from_slice(py, found.information.as_slice()).reshape([6, 6])?,
         PyArray1::from_vec(py, found.inliers),
     )))
-}
-
-fn rows(name: &str, rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
-    let rows: Result<_, _> = rows.as_array().iter().map(|&row| usize::try_from(row)).collect();
-    rows.map_err(|_| wrong(format!("{name}: a row is negative")))
 }
 
 /// Square blocks of an (N, D, D) array.

@@ -64,3 +64,9 @@ pub fn matrices(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> 
     }
     Ok(all.as_array().outer_iter().map(|one| Matrix3::from_fn(|row, column| one[[row, column]])).collect())
 }
+
+/// Rows that an (N,) array names.
+pub fn rows(name: &str, rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
+    let rows: Result<_, _> = rows.as_array().iter().map(|&row| usize::try_from(row)).collect();
+    rows.map_err(|_| PyValueError::new_err(format!("{name}: a row is negative")))
+}

@@ -2,9 +2,9 @@
 
 use crate::cloud::points;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pomona::constellation::constellations;
-use pomona::descriptor::{Described, describe_all};
 use pomona::nalgebra::Point3;
+use pomona::paper::constellation::constellations;
+use pomona::paper::descriptor::{Described, describe_all};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

@@ -25,8 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(tracking::believed, module)?)?;
     module.add_function(wrap_pyfunction!(appearance::look_of, module)?)?;
     module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
-    module.add_function(wrap_pyfunction!(lifting::fuse_centres, module)?)?;
-    module.add_function(wrap_pyfunction!(lifting::fuse_diameters, module)?)?;
+    module.add_function(wrap_pyfunction!(lifting::fuse_fruits, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::locate, module)?)?;

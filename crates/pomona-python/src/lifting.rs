@@ -1,15 +1,16 @@
 //! Boxes and depth to fruits; many sightings to one.
 
 use crate::camera::Calibration;
-use crate::cloud::{matrices, points};
+use crate::cloud::{matrices, points, rows};
+use crate::pose::poses;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
+use pomona::Pose;
 use pomona::camera::DepthPicture;
-use pomona::lifting::fusion::{self, MeasuredCentre, MeasuredDiameter};
-use pomona::lifting::{self, Refusal, Sighting, Source};
-use pomona::nalgebra::Matrix3;
+use pomona::lifting::fruits::FruitSightings;
+use pomona::lifting::{self, LiftedFruit, Refusal, Source};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -43,7 +44,7 @@ pub fn lift<'py>(
     let depth = depth_m.as_slice()?;
     let lifted = py.detach(|| lifting::lift(DepthPicture::new(depth, camera.width), &boxes, &sources, &camera));
     let outcomes = PyArray1::from_iter(py, lifted.iter().map(outcome));
-    let found: Vec<&Sighting> = lifted.iter().flatten().collect();
+    let found: Vec<&LiftedFruit> = lifted.iter().flatten().collect();
     let centres = PyArray1::from_iter(py, found.iter().flat_map(|one| one.centre.coords.iter().copied()));
     let covariances = PyArray1::from_iter(py, found.iter().flat_map(|one| one.covariance.iter().copied()));
     let numbers = PyArray1::from_iter(
@@ -54,7 +55,7 @@ pub fn lift<'py>(
     Ok((outcomes, centres.reshape([count, 3])?, covariances.reshape([count, 3, 3])?, numbers.reshape([count, 4])?))
 }
 
-fn outcome(lifted: &Result<Sighting, Refusal>) -> u8 {
+fn outcome(lifted: &Result<LiftedFruit, Refusal>) -> u8 {
     match lifted {
         Ok(_) => 0,
         Err(Refusal::Cut) => 1,
@@ -83,46 +84,62 @@ pub fn boxes(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 4]>> {
     Ok(rows.outer_iter().map(|one| [one[0], one[1], one[2], one[3]]).collect())
 }
 
-type Centre<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
-
-/// One centre (3,) and covariance (3, 3) out of many, each with the ray along which it was seen.
-#[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
-pub fn fuse_centres<'py>(
-    py: Python<'py>,
-    centres: PyReadonlyArray2<'py, f64>,
+/// Sightings of fruits, as Python passes them.
+#[derive(FromPyObject)]
+pub struct SightingArrays<'py> {
+    #[pyo3(item)]
+    frames: PyReadonlyArray1<'py, i64>,
+    #[pyo3(item)]
+    fruits: PyReadonlyArray1<'py, i64>,
+    #[pyo3(item)]
+    centres_in_camera: PyReadonlyArray2<'py, f64>,
+    #[pyo3(item)]
     covariances: PyReadonlyArray3<'py, f64>,
-    rays: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Centre<'py>> {
-    let (centres, covariances, rays) = (points(&centres)?, matrices(&covariances)?, points(&rays)?);
-    if centres.len() != covariances.len() || centres.len() != rays.len() {
-        return Err(PyValueError::new_err("centres, covariances, rays: expected the same length"));
-    }
-    let measured: Vec<MeasuredCentre> = (centres.into_iter().zip(covariances).zip(rays))
-        .map(|((centre, covariance), ray)| MeasuredCentre { centre, covariance, ray: ray.coords })
-        .collect();
-    let (centre, covariance) = fusion::fuse_centres(&measured).ok_or_else(|| {
-        PyValueError::new_err("expected at least one sighting, each with a positive definite covariance")
-    })?;
-    let rows: Matrix3<f64> = covariance.transpose();
-    let covariance = PyArray1::from_iter(py, rows.iter().copied()).reshape([3, 3])?;
-    Ok((PyArray1::from_iter(py, centre.coords.iter().copied()), covariance))
+    #[pyo3(item)]
+    diameters_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    diameter_sigmas_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    hidden: PyReadonlyArray1<'py, f64>,
 }
 
-/// One diameter and its sigma out of many.
+/// Centres (N, 3), covariances (N, 3, 3), diameters and their sigmas (N,) of fruits.
+type Fused<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Every fruit out of its sightings; `session_from_camera` (F, 4, 4) are the poses of the frames.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
-pub fn fuse_diameters(
-    diameters_m: PyReadonlyArray1<'_, f64>,
-    sigmas_m: PyReadonlyArray1<'_, f64>,
-    hidden: PyReadonlyArray1<'_, f64>,
-) -> PyResult<(f64, f64)> {
-    let (diameters_m, sigmas_m, hidden) = (diameters_m.as_array(), sigmas_m.as_array(), hidden.as_array());
-    if diameters_m.len() != sigmas_m.len() || diameters_m.len() != hidden.len() {
-        return Err(PyValueError::new_err("diameters_m, sigmas_m, hidden: expected the same length"));
-    }
-    let measured: Vec<MeasuredDiameter> = (diameters_m.iter().zip(sigmas_m).zip(hidden))
-        .map(|((&diameter_m, &sigma_m), &hidden)| MeasuredDiameter { diameter_m, sigma_m, hidden })
-        .collect();
-    fusion::fuse_diameters(&measured).ok_or_else(|| PyValueError::new_err("diameters_m: expected at least one"))
+pub fn fuse_fruits<'py>(
+    py: Python<'py>,
+    sightings: SightingArrays<'py>,
+    session_from_camera: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Fused<'py>> {
+    let poses = poses("session_from_camera", &session_from_camera, Pose::from_exact_matrix)?;
+    let numbers = |values: &PyReadonlyArray1<'py, f64>| values.as_array().to_vec();
+    let (frames, fruits) = (rows("frames", &sightings.frames)?, rows("fruits", &sightings.fruits)?);
+    let (centres, covariances) = (points(&sightings.centres_in_camera)?, matrices(&sightings.covariances)?);
+    let (diameters_m, hidden) = (numbers(&sightings.diameters_m), numbers(&sightings.hidden));
+    let diameter_sigmas_m = numbers(&sightings.diameter_sigmas_m);
+    let sightings = FruitSightings {
+        frames: &frames,
+        fruits: &fruits,
+        centres_in_camera: &centres,
+        covariances: &covariances,
+        diameters_m: &diameters_m,
+        diameter_sigmas_m: &diameter_sigmas_m,
+        hidden: &hidden,
+    };
+    let found = py.detach(|| lifting::fruits::fuse_fruits(&sightings, &poses));
+    let found = found.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let n = found.centres.len();
+    let centres = PyArray1::from_iter(py, found.centres.iter().flat_map(|one| one.coords.iter().copied()));
+    // Row by row.
+    let covariances = found.covariances.iter().flat_map(|one| one.transpose().iter().copied().collect::<Vec<_>>());
+    Ok((
+        centres.reshape([n, 3])?,
+        PyArray1::from_iter(py, covariances).reshape([n, 3, 3])?,
+        PyArray1::from_vec(py, found.diameters_m),
+        PyArray1::from_vec(py, found.diameter_sigmas_m),
+    ))
 }

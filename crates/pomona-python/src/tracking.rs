@@ -1,13 +1,13 @@
 //! Fruits followed through the frames of one visit.
 
 use crate::camera::Calibration;
-use crate::cloud::points;
+use crate::cloud::{matrices, points, rows};
+use crate::lifting::boxes;
 use crate::pose::{pose, poses};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
-use pomona::nalgebra::Matrix3;
 use pomona::stereo::Picture;
 use pomona::tracking::{Body, Boxes, Colours, LiftedBoxes, TrackViews, Tracker, Tracks, belief, merge_duplicates};
 use pomona::{Config, Pose};
@@ -71,7 +71,7 @@ impl PyTracker {
         let pose = pose("session_from_camera", &session_from_camera, Pose::from_matrix)?;
         let edges_px = boxes(&boxes_px)?;
         let scores = scores.as_array().to_vec();
-        let rows = rows(&lifted.rows)?;
+        let rows = rows("rows", &lifted.rows)?;
         let centres: Vec<_> = points(&lifted.centres_in_camera)?.iter().map(|point| point.coords).collect();
         let covariances = matrices(&lifted.covariances)?;
         let diameters_m = lifted.diameters_m.as_array().to_vec();
@@ -224,7 +224,7 @@ pub fn believed<'py>(
     let numbers = |values: &PyReadonlyArray1<'py, f64>| values.as_array().to_vec();
     let (depths_m, shown_m2) = (numbers(&tracks.depths_m), numbers(&tracks.shown_m2));
     let fruitness = numbers(&tracks.fruitness);
-    let (views, glimpses) = (rows(&tracks.views)?, rows(&tracks.glimpses)?);
+    let (views, glimpses) = (rows("views", &tracks.views)?, rows("glimpses", &tracks.glimpses)?);
     if [depths_m.len(), shown_m2.len(), fruitness.len(), views.len(), glimpses.len()] != [n; 5] {
         return Err(wrong("tracks: expected one row for each track in every array"));
     }
@@ -275,7 +275,7 @@ pub fn one_fruit_each<'py>(
         .map(|((centre, covariance), radius_m)| Body { centre: centre.coords, covariance, radius_m })
         .collect();
     let mut frames_of: Vec<Vec<i64>> = vec![Vec::new(); bodies.len()];
-    for (&frame, fruit) in frames.as_array().iter().zip(rows(&fruits)?) {
+    for (&frame, fruit) in frames.as_array().iter().zip(rows("fruits", &fruits)?) {
         frames_of.get_mut(fruit).ok_or_else(|| wrong("fruits: a sighting names a row beyond the last"))?.push(frame);
     }
     for frames in &mut frames_of {
@@ -283,24 +283,4 @@ pub fn one_fruit_each<'py>(
     }
     let labels = py.detach(|| merge_duplicates(&bodies, &frames_of, place_sigma_m, &config));
     Ok(PyArray1::from_iter(py, labels.into_iter().map(|label| label as i64)))
-}
-
-fn boxes(rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 4]>> {
-    let rows = rows.as_array();
-    if rows.ncols() != 4 {
-        return Err(wrong(format!("boxes_px: found {} columns, expected 4 (xmin, ymin, xmax, ymax)", rows.ncols())));
-    }
-    Ok(rows.outer_iter().map(|edges| [edges[0], edges[1], edges[2], edges[3]]).collect())
-}
-
-fn matrices(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
-    let all = all.as_array();
-    if all.shape()[1..] != [3, 3] {
-        return Err(wrong("covariances: expected an array of shape (N, 3, 3)"));
-    }
-    Ok(all.outer_iter().map(|one| Matrix3::from_fn(|row, column| one[[row, column]])).collect())
-}
-
-fn rows(rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
-    rows.as_array().iter().map(|&row| usize::try_from(row).map_err(|_| wrong("a row is negative"))).collect()
 }

@@ -7,9 +7,9 @@ mod support;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use pomona::constellation::constellations;
-use pomona::descriptor::{Described, describe, describe_all};
-use pomona::index::Index;
+use pomona::neighbours::index::Index;
+use pomona::paper::constellation::constellations;
+use pomona::paper::descriptor::{Described, describe, describe_all};
 use pomona::{Config, FruitCloud, MapIndex, Method, Request, Scale, match_clouds};
 use support::{Random, Scene, row, scene};
 

@@ -72,7 +72,7 @@ impl FruitCloud {
     pub fn validate(&self) -> Result<()> {
         let expected = self.len();
         if let Some(row) = self.positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
-            return Err(Error::NotFinite { row });
+            return Err(Error::NotFinite { what: "positions", row });
         }
         let check = |what, found: Option<usize>| match found {
             Some(found) if found != expected => Err(Error::Length { what, found, expected }),
@@ -88,11 +88,11 @@ impl FruitCloud {
             Some(views) if views.frames.len() != views.fruits.len() => {
                 Err(Error::Length { what: "views", found: views.frames.len(), expected: views.fruits.len() })
             }
-            Some(views) if views.fruits.iter().any(|&fruit| fruit >= expected) => Err(Error::Setting {
-                name: "views",
-                reason: format!("a sighting names a fruit beyond the last row, {expected} rows"),
-            }),
-            _ => Ok(()),
+            Some(views) => match views.fruits.iter().find(|&&fruit| fruit >= expected) {
+                Some(&found) => Err(Error::Row { what: "views.fruits", found, below: expected }),
+                None => Ok(()),
+            },
+            None => Ok(()),
         }
     }
 }
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn validate_names_the_row() {
         let cloud = FruitCloud::from_positions(vec![Point3::origin(), Point3::new(0.0, f64::NAN, 0.0)]);
-        assert_eq!(cloud.validate(), Err(Error::NotFinite { row: 1 }));
+        assert_eq!(cloud.validate(), Err(Error::NotFinite { what: "positions", row: 1 }));
     }
 
     #[test]
@@ -126,5 +126,12 @@ mod tests {
         let mut cloud = FruitCloud::from_positions(vec![Point3::origin()]);
         cloud.covariances = Some(vec![Matrix3::identity() * -1.0]);
         assert_eq!(cloud.validate(), Err(Error::Covariance { row: 0 }));
+    }
+
+    #[test]
+    fn validate_names_the_fruit_that_a_view_knows_and_the_cloud_does_not() {
+        let mut cloud = FruitCloud::from_positions(vec![Point3::origin(); 3]);
+        cloud.views = Some(Views { frames: vec![0, 0], fruits: vec![2, 7] });
+        assert_eq!(cloud.validate(), Err(Error::Row { what: "views.fruits", found: 7, below: 3 }));
     }
 }

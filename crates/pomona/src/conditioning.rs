@@ -12,14 +12,12 @@
 //!    other is compared with each other, and a heap of thousands would take hours.
 //! 5. What is left is moved to its mean; where the scale is free it is also scaled to one spacing.
 
+use crate::answer::{Match, Pair, Registration};
 use crate::cloud::{FruitCloud, Views};
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
-use crate::matching::{Match, Pair, Registration};
-use crate::verified::CellHasher;
+use crate::neighbours::cells::{CellKey, CellMap};
 use nalgebra::{Point3, Vector3};
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
 
 /// Fruits whose spacing is measured: enough for a median that up to fifteen strays among them do not touch.
 const SAMPLE: usize = 32;
@@ -110,7 +108,7 @@ impl Conditioned {
             Some(found) if !self.rows.is_empty() && found > most_m => {
                 let reason =
                     format!("found {found} m, expected at most {most_m:.3} m, the spacing of the map's fruits");
-                Err(Error::Setting { name: "noise_m", reason })
+                Err(Error::Request { name: "noise_m", reason })
             }
             _ => Ok(noise_m.map(|noise_m| noise_m / self.unit)),
         }
@@ -237,12 +235,12 @@ struct Cells<'a> {
     positions: &'a [Point3<f64>],
     origin: &'a Point3<f64>,
     edge: f64,
-    rows: HashMap<[i64; 3], Vec<usize>, BuildHasherDefault<CellHasher>>,
+    rows: CellMap<Vec<usize>>,
 }
 
 impl<'a> Cells<'a> {
     fn new(positions: &'a [Point3<f64>], rows: &[usize], origin: &'a Point3<f64>, edge: f64) -> Self {
-        let mut cells = Self { positions, origin, edge, rows: HashMap::default() };
+        let mut cells = Self { positions, origin, edge, rows: CellMap::default() };
         for &row in rows {
             let cell = cells.of(row);
             cells.rows.entry(cell).or_default().push(row);
@@ -250,13 +248,13 @@ impl<'a> Cells<'a> {
         cells
     }
 
-    fn of(&self, row: usize) -> [i64; 3] {
+    fn of(&self, row: usize) -> CellKey {
         let p = (self.positions[row] - self.origin) / self.edge;
         [p.x, p.y, p.z].map(|x| x.floor() as i64)
     }
 
     /// Fruits up to two cells away.
-    fn around(&self, [x, y, z]: [i64; 3]) -> impl Iterator<Item = &usize> {
+    fn around(&self, [x, y, z]: CellKey) -> impl Iterator<Item = &usize> {
         let steps = || -2..=2i64;
         let cells =
             steps().flat_map(move |dx| steps().flat_map(move |dy| steps().map(move |dz| [x + dx, y + dy, z + dz])));

@@ -3,10 +3,10 @@
 //! Lengths are metres. Where the scale is free and the clouds have no metre, lengths are stretched by the map's median
 //! distance between nearest fruits over [`CLUSTER_SPACING_M`].
 
-use crate::constellation::MAX_NEIGHBOURS;
 use crate::error::{Error, Result};
 use crate::meanings::settings;
-use crate::ransac::RansacConfig;
+use crate::paper::constellation::MAX_NEIGHBOURS;
+use crate::paper::ransac::RansacConfig;
 use crate::tracking::TrackingConfig;
 use crate::verified::VerifiedConfig;
 use serde::{Deserialize, Serialize};

@@ -60,7 +60,7 @@ impl Similarity {
     /// # Errors
     /// The matrix is not finite, mirrors, shears or has another last row than 0, 0, 0, 1 (to 1e-6).
     pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self> {
-        let wrong = |reason: &str| Err(Error::Setting { name: "map_from_query", reason: reason.to_owned() });
+        let wrong = |reason| Err(Error::Similarity { reason });
         let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
         let scale = linear.determinant().cbrt();
         if !(scale.is_finite() && scale > 0.0) {

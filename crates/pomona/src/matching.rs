@@ -1,5 +1,6 @@
 //! The facade: which fruit of the query is which fruit of the map.
 
+use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
 use crate::config::Config;
@@ -7,19 +8,6 @@ use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-/// What a match says. All four are results, none is an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// One registration stands out and its pairs are reported.
-    Found,
-    /// Fewer fruits than a constellation needs.
-    TooFew,
-    /// Several different registrations explain the clouds equally well; they are reported as alternatives.
-    Ambiguous,
-    /// No registration explains the clouds better than chance.
-    NoMatch,
-}
 
 /// Which method decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -48,55 +36,6 @@ pub struct Request {
     pub per_frame: bool,
 }
 
-/// One fruit found again.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
-    /// Row in the query.
-    pub query: usize,
-    /// Row in the map.
-    pub map: usize,
-    /// Probability that the two are one fruit. Paper: of the residual under the noise, against a stranger at the density of
-    /// fruits about it.
-    pub probability: f64,
-    /// Distance after the registration that the pair belongs to, metres of the map.
-    pub distance_m: f64,
-    /// What speaks for the pair: votes of constellations (paper) or log-odds in nats (verified).
-    pub support: f64,
-}
-
-/// A registration with its evidence.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Registration {
-    /// Takes points of the query into the map.
-    pub map_from_query: Similarity,
-    /// Evidence against chance, nats. Paper: log-odds of the pairs' residuals, summed over pairs.
-    pub log_odds: f64,
-}
-
-/// The answer to one query.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Match {
-    /// What the match says.
-    pub verdict: Verdict,
-    /// The registration; `None` for `TooFew` and `NoMatch`.
-    pub registration: Option<Registration>,
-    /// Other registrations as good as the first; empty unless `Ambiguous`.
-    pub alternatives: Vec<Registration>,
-    /// Fruits found again, sorted by query row; one to one.
-    pub pairs: Vec<Pair>,
-    /// Relative noise per axis in metres, as given or as estimated; NaN where nothing was found.
-    pub noise_m: f64,
-    /// What happened, stage by stage: name and count, for `--explain`.
-    pub stages: Vec<(&'static str, f64)>,
-}
-
-impl Match {
-    /// A result without a registration.
-    pub(crate) fn without_answer(verdict: Verdict, stages: Vec<(&'static str, f64)>) -> Self {
-        Self { verdict, registration: None, alternatives: Vec::new(), pairs: Vec::new(), noise_m: f64::NAN, stages }
-    }
-}
-
 /// A map made ready for many queries.
 #[derive(Debug)]
 pub struct MapIndex {
@@ -104,15 +43,15 @@ pub struct MapIndex {
     config: Config,
     method: Method,
     scale: Scale,
-    prepared: Prepared,
+    prepared: PreparedMap,
 }
 
 #[derive(Debug)]
-enum Prepared {
+enum PreparedMap {
     /// Fewer fruits than a constellation of the paper.
     TooFew,
-    Paper(Box<crate::paper::Prepared>),
-    Verified(Box<crate::verified::Prepared>),
+    Paper(Box<crate::paper::PaperMap>),
+    Verified(Box<crate::verified::VerifiedMap>),
 }
 
 impl MapIndex {
@@ -127,9 +66,9 @@ impl MapIndex {
         let fruits = &map.cloud;
         let prepared = match method {
             Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => return Err(too_many(fruits.len())),
-            Method::Verified => Prepared::Verified(Box::new(crate::verified::Prepared::new(fruits, scale))),
-            Method::Paper if fruits.len() < config.constellation.k => Prepared::TooFew,
-            Method::Paper => Prepared::Paper(Box::new(crate::paper::Prepared::new(&fruits.positions, &config)?)),
+            Method::Verified => PreparedMap::Verified(Box::new(crate::verified::VerifiedMap::new(fruits, scale))),
+            Method::Paper if fruits.len() < config.constellation.k => PreparedMap::TooFew,
+            Method::Paper => PreparedMap::Paper(Box::new(crate::paper::PaperMap::new(&fruits.positions, &config)?)),
         };
         Ok(Self { map, config, method, scale, prepared })
     }
@@ -165,16 +104,16 @@ impl MapIndex {
     fn found(&self, query: &Conditioned, request: &Request) -> Result<Match> {
         let fruits = &query.cloud;
         match &self.prepared {
-            Prepared::Verified(_) if fruits.len() > crate::verified::MAX_FRUITS => Err(too_many(fruits.len())),
+            PreparedMap::Verified(_) if fruits.len() > crate::verified::MAX_FRUITS => Err(too_many(fruits.len())),
             _ if !self.map.is_comparable(query) => Ok(Match::without_answer(Verdict::NoMatch, Vec::new())),
-            Prepared::Paper(map) if fruits.len() >= self.config.constellation.k => {
+            PreparedMap::Paper(map) if fruits.len() >= self.config.constellation.k => {
                 map.search(fruits, request, &self.config)
             }
-            Prepared::Paper(_) | Prepared::TooFew => {
+            PreparedMap::Paper(_) | PreparedMap::TooFew => {
                 let stages = vec![("query fruits", fruits.len() as f64), ("map fruits", self.map.cloud.len() as f64)];
                 Ok(Match::without_answer(Verdict::TooFew, stages))
             }
-            Prepared::Verified(prepared) => {
+            PreparedMap::Verified(prepared) => {
                 Ok(crate::verified::search(prepared, &self.map.cloud, fruits, request, &self.config.verified))
             }
         }
@@ -201,9 +140,9 @@ impl MapIndex {
         query.validate()?;
         let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: false };
         request.validate()?;
-        let Prepared::Verified(prepared) = &self.prepared else {
+        let PreparedMap::Verified(prepared) = &self.prepared else {
             let reason = "pairs under a known pose need an index of the verified method".to_owned();
-            return Err(Error::Setting { name: "method", reason });
+            return Err(Error::Request { name: "method", reason });
         };
         let query = Conditioned::new(query, self.scale);
         let pose = self.map.conditioned_pose(&query, pose);
@@ -215,25 +154,23 @@ impl MapIndex {
 }
 
 fn too_many(found: usize) -> Error {
-    let expected = crate::verified::MAX_FRUITS;
-    let reason = format!("found {found} fruits in one cloud, the verified method expects at most {expected}");
-    Error::Setting { name: "method", reason }
+    Error::TooManyFruits { found, most: crate::verified::MAX_FRUITS }
 }
 
 impl Request {
     fn validate(&self) -> Result<()> {
         if let Some(noise) = self.noise_m.filter(|noise| !(noise.is_finite() && *noise > 0.0)) {
             let reason = format!("found {noise}, expected a length above 0 m");
-            return Err(Error::Setting { name: "noise_m", reason });
+            return Err(Error::Request { name: "noise_m", reason });
         }
         if self.up.iter().flatten().any(|up| !(up.norm().is_finite() && up.norm() > 0.0)) {
             let reason = "expected a finite vector that is not zero".to_owned();
-            return Err(Error::Setting { name: "up", reason });
+            return Err(Error::Request { name: "up", reason });
         }
         if self.per_frame && self.method != Method::Paper {
             // The verified method bends with the row by itself.
             let reason = "expected the paper's method".to_owned();
-            return Err(Error::Setting { name: "per_frame", reason });
+            return Err(Error::Request { name: "per_frame", reason });
         }
         Ok(())
     }
@@ -245,4 +182,29 @@ impl Request {
 /// A cloud or a setting that is wrong. That there is no match is no error.
 pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, config: &Config) -> Result<Match> {
     MapIndex::new(map, request.method, request.scale, *config)?.answer(query, request)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::MAX_FRUITS;
+    use nalgebra::Point3;
+
+    #[test]
+    fn more_fruits_than_the_verified_method_holds_are_no_wrong_setting() {
+        let place = |row: usize| Point3::new((row % 1000) as f64, (row / 1000) as f64, 0.0);
+        let many = FruitCloud::from_positions((0..=MAX_FRUITS).map(place).collect());
+        let refused = MapIndex::new(&many, Method::Verified, Scale::Metric, Config::default());
+        assert_eq!(refused.err(), Some(Error::TooManyFruits { found: MAX_FRUITS + 1, most: MAX_FRUITS }));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_request_is_said_of_the_request() {
+        let cloud = FruitCloud::from_positions(vec![Point3::origin(); 3]);
+        let ask = |request: &Request| match_clouds(&cloud, &cloud, request, &Config::default()).map(|_| ());
+        let named = |answer| matches!(answer, Err(Error::Request { name, .. }) if name == "noise_m");
+        assert!(named(ask(&Request { noise_m: Some(-1.0), ..Request::default() })));
+        let up = Request { up: Some([Vector3::zeros(); 2]), ..Request::default() };
+        assert_eq!(ask(&up).unwrap_err().to_string(), "up: expected a finite vector that is not zero");
+    }
 }

@@ -102,7 +102,7 @@ fn similarities(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ransac::SplitMix;
+    use crate::random::SplitMix;
 
     const WIDTH: usize = 160;
 

@@ -1,7 +1,7 @@
 //! Golden codes of `testdata/star_i.json`, worked out by another way in `testdata/star_i_reference.py`.
 
 use nalgebra::Point3;
-use pomona::descriptor::{Degenerate, code_in_paper_frame, describe, is_canonical};
+use pomona::paper::descriptor::{Degenerate, code_in_paper_frame, describe, is_canonical};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -1,6 +1,6 @@
 //! The index against looking at every point.
 
-use pomona::index::{Index, Neighbour};
+use pomona::neighbours::index::{Index, Neighbour};
 use proptest::prelude::*;
 
 fn distance_squared<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {

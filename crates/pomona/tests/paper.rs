@@ -165,7 +165,7 @@ fn frames_must_be_known() {
     let scene = visits(9, 0.0, 0.0);
     let request = Request { per_frame: true, ..paper(Scale::Metric) };
     let error = match_clouds(&scene.query, &scene.map, &request, &Config::default()).unwrap_err();
-    assert_eq!(error.to_string(), "setting per_frame: the query does not know which frame saw which fruit");
+    assert_eq!(error.to_string(), "per_frame: the query does not know which frame saw which fruit");
 }
 
 #[test]

@@ -150,6 +150,59 @@ fn pair_of_fruits(change: impl Fn(&mut Seen)) -> (Tracks, Vec<Option<usize>>) {
     (tracker.finish(1), answer)
 }
 
+/// Evidence of one fruit that a camera drives past, with a box in some of the frames.
+fn evidence_of(shown: &[bool], score: f64) -> f64 {
+    let (fruit, mut tracker) = (Vector3::new(0.3, 0.1, 1.4), tracker());
+    for (frame, &is_shown) in shown.iter().enumerate() {
+        let place = frame as f64 / 2.0;
+        let in_camera = fruit - pose(place).translation;
+        let mut seen = Seen::default();
+        if is_shown {
+            seen.lifted_box(outline(&in_camera).expect("in view"), in_camera, 0.02, RADIUS_M);
+        }
+        seen.take_scored(&mut tracker, frame as i64, &pose(place), score);
+    }
+    let tracks = tracker.finish(1);
+    assert_eq!(tracks.evidence.len(), 1, "one fruit");
+    tracks.evidence[0]
+}
+
+#[test]
+fn evidence_begins_with_the_box_falls_with_every_miss_and_rises_with_every_hit() {
+    let config = TrackingConfig::default();
+    let born = |score: f64| (config.new_per_frame / config.false_per_frame).ln() + (score / (1.0 - score)).ln();
+    for score in [0.3, 0.8] {
+        assert!((evidence_of(&[true], score) - born(score)).abs() < 1e-9);
+    }
+    // No score is trusted beyond nine in ten.
+    assert!((evidence_of(&[true], 1.0) - born(0.9)).abs() < 1e-9);
+    let missed = evidence_of(&[true, false, false, false], 0.8);
+    assert!((missed - born(0.8) - 3.0 * (1.0 - config.detection_probability).ln()).abs() < 1e-9, "{missed}");
+    let mut last = born(0.8);
+    for n in 2..8 {
+        let evidence = evidence_of(&vec![true; n], 0.8);
+        // Boxes of one fruit err alike: none of them says more than e^3 to 1.
+        assert!(evidence > last + 1.0 && evidence < last + 3.0 + 1e-9, "{n} boxes: {evidence} after {last}");
+        last = evidence;
+    }
+}
+
+#[test]
+fn a_box_around_two_fruits_is_no_evidence_of_either_and_no_miss() {
+    let with_sixth = |edit: fn(&mut Seen)| pair_of_fruits(edit).0.evidence;
+    let plain = with_sixth(|_| {});
+    let shared = with_sixth(|seen| {
+        let [top, bottom] = [seen.edges_px[0], seen.edges_px[1]];
+        *seen = Seen { edges_px: vec![[top[0], top[1], top[2], bottom[3]]], ..Seen::default() };
+    });
+    let missed = with_sixth(|seen| *seen = Seen::default());
+    let miss = (1.0 - TrackingConfig::default().detection_probability).ln();
+    for fruit in 0..2 {
+        assert!(plain[fruit] > shared[fruit] + 1.0, "{plain:?}, {shared:?}");
+        assert!((missed[fruit] - shared[fruit] - miss).abs() < 0.2, "{missed:?}, {shared:?}");
+    }
+}
+
 #[test]
 fn one_box_around_two_fruits_moves_neither() {
     let (plain, _) = pair_of_fruits(|_| {});

@@ -153,7 +153,7 @@ impl Factor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ransac::SplitMix;
+    use crate::random::SplitMix;
     use nalgebra::{DMatrix, DVector};
 
     /// A positive definite matrix with rows of many lengths, and the same dense.

@@ -4,13 +4,13 @@
 //! `StereoScan`, 2011: no quartic, no four solutions, and the expected pose is always near). The pose on which most
 //! matches agree wins; its matches then fix it with the points' own uncertainty in the adjustment.
 
-use super::problem::{Measured, Observation, Problem, State};
+use super::problem::{Measured, PointView, Problem, State};
 use super::steps::{moved, skew};
 use super::{Settings, adjust};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::pose::Pose;
-use crate::ransac::SplitMix;
+use crate::random::SplitMix;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Point3, Vector2, Vector3, Vector6};
 
 /// Points whose places are known, and where a picture shows them.
@@ -208,10 +208,10 @@ fn refined(
     for (point, &i) in rows.iter().enumerate() {
         let Some(whitening) = whitening(&known.covariances[i]) else { continue };
         let place = Measured::Place(known.points[i].coords);
-        observations.push(Observation { pose: 0, point, measured: place, whitening });
+        observations.push(PointView { pose: 0, point, measured: place, whitening });
         let seen = Measured::Picture(Vector3::new(known.pixels[i].x, known.pixels[i].y, 0.0));
         let whitening = Matrix3::from_diagonal(&Vector3::new(sharpness, sharpness, 0.0));
-        observations.push(Observation { pose: 1, point, measured: seen, whitening });
+        observations.push(PointView { pose: 1, point, measured: seen, whitening });
     }
     let problem = Problem { camera: *camera, fixed: vec![true, false], observations, relative_poses: Vec::new() };
     let points = rows.iter().map(|&i| known.points[i]).collect();

@@ -10,7 +10,7 @@
 //! (`normal`), points eliminated, poses in a folded order (`ordering`) solved within their envelope (`envelope`):
 //! time and memory grow with the length of the drive, not with its cube. One thread, no random numbers.
 //!
-//! The same adjustment serves a window of stereo keyframes and the fruits of a whole session; [`locate`] finds the pose
+//! The same adjustment serves a window of stereo keyframes and the fruits of a whole session; [`locate()`] finds the pose
 //! of a single picture among known points.
 
 mod envelope;
@@ -26,7 +26,7 @@ use nalgebra::{Matrix3, Matrix6};
 use normal::Plan;
 
 pub use locate::{KnownPoints, LocateSettings, Located, locate};
-pub use problem::{Measured, Observation, Problem, RelativePose, State};
+pub use problem::{Measured, PointView, Problem, RelativePose, State};
 
 /// When an adjustment ends and how it weighs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +93,7 @@ pub fn adjust(problem: &Problem, initial: State, settings: &Settings) -> Result<
     }
     let cost = plan.cost(&state);
     let last = plan.normal(&state, 0.0);
-    let distance = |seen: &Observation| seen.squared_error(&problem.camera, &state).unwrap_or(f64::INFINITY);
+    let distance = |seen: &PointView| seen.squared_error(&problem.camera, &state).unwrap_or(f64::INFINITY);
     Ok(Adjustment {
         point_covariances: last.point_covariances(),
         squared_errors: problem.observations.iter().map(distance).collect(),
@@ -172,9 +172,8 @@ fn check(problem: &Problem, state: &State) -> Result<()> {
     if problem.fixed.len() != poses {
         return Err(Error::Length { what: "fixed", found: problem.fixed.len(), expected: poses });
     }
-    let row = |name: &'static str, row: usize, below: usize| {
-        let reason = format!("found row {row}, expected one below {below}");
-        if row < below { Ok(()) } else { Err(Error::Setting { name, reason }) }
+    let row = |what: &'static str, found: usize, below: usize| {
+        if found < below { Ok(()) } else { Err(Error::Row { what, found, below }) }
     };
     for seen in &problem.observations {
         row("observations.pose", seen.pose, poses)?;
@@ -188,19 +187,20 @@ fn check(problem: &Problem, state: &State) -> Result<()> {
 }
 
 fn check_finite(problem: &Problem, state: &State) -> Result<()> {
-    let seen = |seen: &Observation| {
+    let seen = |seen: &PointView| {
         let (Measured::Picture(value) | Measured::Place(value)) = seen.measured;
         (seen.whitening.sum() + value.sum()).is_finite()
     };
     let relative =
         |pair: &RelativePose| (pair.information.sum() + pair.first_from_second.to_matrix().sum()).is_finite();
     let wrong = [
-        state.points.iter().position(|point| !point.coords.sum().is_finite()),
-        state.poses.iter().position(|pose| !pose.to_matrix().sum().is_finite()),
-        problem.observations.iter().position(|one| !seen(one)),
-        problem.relative_poses.iter().position(|one| !relative(one)),
+        ("points", state.points.iter().position(|point| !point.coords.sum().is_finite())),
+        ("poses", state.poses.iter().position(|pose| !pose.to_matrix().sum().is_finite())),
+        ("observations", problem.observations.iter().position(|one| !seen(one))),
+        ("relative_poses", problem.relative_poses.iter().position(|one| !relative(one))),
     ];
-    wrong.into_iter().flatten().next().map_or(Ok(()), |row| Err(Error::NotFinite { row }))
+    let found = wrong.into_iter().find_map(|(what, row)| Some(Error::NotFinite { what, row: row? }));
+    found.map_or(Ok(()), Err)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use super::Settings;
 use super::envelope::Envelope;
 use super::ordering::Order;
-use super::problem::{Measured, Observation, Problem, State};
+use super::problem::{Measured, PointView, Problem, State};
 use super::steps::moved;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
@@ -18,12 +18,12 @@ pub(super) struct Plan<'a> {
     pub order: Order,
     /// How many times as large Cauchy's c^2 is for now.
     pub scale: f64,
-    by_point: Vec<Observation>,
+    by_point: Vec<PointView>,
     start: Vec<usize>,
 }
 
 /// The equations of one step.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     pub reduced: Envelope,
     pub right: Vec<Vector6<f64>>,
     points: Vec<EliminatedPoint>,
@@ -58,7 +58,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Cauchy's loss c^2 ln(1 + m^2 / c^2) and its slope by m^2, the weight of the observation.
-    pub(super) fn loss(&self, seen: &Observation, state: &State) -> (f64, f64) {
+    pub(super) fn loss(&self, seen: &PointView, state: &State) -> (f64, f64) {
         let scale2 = match seen.measured {
             Measured::Picture(_) => self.settings.picture_scale2,
             Measured::Place(_) => self.settings.place_scale2,
@@ -68,9 +68,9 @@ impl<'a> Plan<'a> {
     }
 
     /// The equations at a state; `damping` is added to the diagonal in proportion to it (Marquardt, 1963).
-    pub(super) fn normal(&self, state: &State, damping: f64) -> Normal {
+    pub(super) fn normal(&self, state: &State, damping: f64) -> NormalEquations {
         let n = self.order.first.len();
-        let mut normal = Normal {
+        let mut normal = NormalEquations {
             reduced: Envelope::zeros(self.order.first.clone()),
             right: vec![Vector6::zeros(); n],
             points: Vec::with_capacity(state.points.len()),
@@ -90,7 +90,7 @@ impl<'a> Plan<'a> {
         normal
     }
 
-    fn add_relative_poses(&self, state: &State, normal: &mut Normal, diagonal: &mut [Matrix6<f64>]) {
+    fn add_relative_poses(&self, state: &State, normal: &mut NormalEquations, diagonal: &mut [Matrix6<f64>]) {
         for pair in &self.problem.relative_poses {
             let (error, by_first, by_second) = pair.linear(state);
             let places = [self.order.place[pair.first], self.order.place[pair.second]];
@@ -109,7 +109,14 @@ impl<'a> Plan<'a> {
         }
     }
 
-    fn eliminate(&self, point: usize, state: &State, damping: f64, normal: &mut Normal, diagonal: &mut [Matrix6<f64>]) {
+    fn eliminate(
+        &self,
+        point: usize,
+        state: &State,
+        damping: f64,
+        normal: &mut NormalEquations,
+        diagonal: &mut [Matrix6<f64>],
+    ) {
         let (mut block, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let couplings_start = normal.couplings.len();
         for seen in &self.by_point[self.start[point]..self.start[point + 1]] {
@@ -141,7 +148,7 @@ impl<'a> Plan<'a> {
     }
 
     /// The state after the step of the poses `step`, points following.
-    pub(super) fn stepped(&self, state: &State, normal: &Normal, step: &[Vector6<f64>]) -> State {
+    pub(super) fn stepped(&self, state: &State, normal: &NormalEquations, step: &[Vector6<f64>]) -> State {
         let mut next = state.clone();
         for (pose, place) in next.poses.iter_mut().zip(&self.order.place) {
             if let Some(place) = *place {
@@ -161,7 +168,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-impl Normal {
+impl NormalEquations {
     /// Covariances of the points while the poses stay.
     pub(super) fn point_covariances(&self) -> Vec<Matrix3<f64>> {
         self.points.iter().map(|point| point.inverse).collect()

@@ -127,7 +127,7 @@ fn cuthill_mckee(graph: &Graph, free: &[usize]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::{Measured, Observation};
+    use super::super::problem::{Measured, PointView};
     use super::*;
     use crate::camera::Camera;
     use nalgebra::{Matrix3, Vector3};
@@ -137,7 +137,7 @@ mod tests {
         let observations = (0..2 * n)
             .flat_map(|pose| {
                 let place = if pose < n { pose } else { 2 * n - 1 - pose };
-                (place..place + 3).map(move |point| Observation {
+                (place..place + 3).map(move |point| PointView {
                     pose,
                     point,
                     measured: Measured::Place(Vector3::zeros()),

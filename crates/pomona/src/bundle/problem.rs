@@ -16,7 +16,7 @@ pub enum Measured {
 
 /// One camera sees one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observation {
+pub struct PointView {
     /// Row of the pose.
     pub pose: usize,
     /// Row of the point.
@@ -48,7 +48,7 @@ pub struct Problem {
     /// Which poses stay as they are. Without relative poses or places to hold the frame, at least one has to.
     pub fixed: Vec<bool>,
     /// What was seen.
-    pub observations: Vec<Observation>,
+    pub observations: Vec<PointView>,
     /// What was measured between poses.
     pub relative_poses: Vec<RelativePose>,
 }
@@ -69,7 +69,7 @@ pub(super) struct Linear {
     pub by_point: Matrix3<f64>,
 }
 
-impl Observation {
+impl PointView {
     fn place_in_camera(&self, state: &State) -> (Vector3<f64>, Matrix3<f64>) {
         let pose = &state.poses[self.pose];
         let camera_from_session = pose.rotation.matrix().transpose();
@@ -175,7 +175,7 @@ mod tests {
         for measured in
             [Measured::Picture(Vector3::new(330.0, 100.0, 24.0)), Measured::Place(Vector3::new(0.1, 0.2, 1.9))]
         {
-            let seen = Observation { pose: 0, point: 0, measured, whitening };
+            let seen = PointView { pose: 0, point: 0, measured, whitening };
             let residual = |state: &State| seen.linear(&camera, state).expect("in front").residual;
             let linear = seen.linear(&camera, &state).expect("in front");
             let numeric = by_pose(&state, 0, residual);

@@ -3,7 +3,7 @@
 use super::*;
 use crate::camera::Camera;
 use crate::pose::Pose;
-use crate::ransac::SplitMix;
+use crate::random::SplitMix;
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 struct Random(SplitMix);
@@ -47,7 +47,7 @@ fn drive(random: &mut Random, n_poses: usize) -> State {
 }
 
 /// Noisy pictures of all points in view; a share of them wrong.
-fn pictures(random: &mut Random, truth: &State, wrong: f64) -> Vec<Observation> {
+fn pictures(random: &mut Random, truth: &State, wrong: f64) -> Vec<PointView> {
     let camera = camera();
     let mut all = Vec::new();
     for (pose, session_from_camera) in truth.poses.iter().enumerate() {
@@ -60,7 +60,7 @@ fn pictures(random: &mut Random, truth: &State, wrong: f64) -> Vec<Observation> 
             }
             let spread = if random.uniform() < wrong { 30.0 } else { SIGMA_PX };
             let measured = Measured::Picture(seen + Vector3::from_fn(|_, _| spread * random.normal()));
-            all.push(Observation { pose, point, measured, whitening: Matrix3::identity() / SIGMA_PX });
+            all.push(PointView { pose, point, measured, whitening: Matrix3::identity() / SIGMA_PX });
         }
     }
     all
@@ -152,7 +152,7 @@ fn sightings_of_the_same_fruit_close_a_loop() {
             let place = session_from_camera.to_camera(&fruit.coords);
             if place.x.abs() < 0.7 {
                 let seen = place + spread * Vector3::from_fn(|_, _| random.normal());
-                observations.push(Observation { pose, point, measured: Measured::Place(seen), whitening });
+                observations.push(PointView { pose, point, measured: Measured::Place(seen), whitening });
             }
         }
     }
@@ -215,7 +215,7 @@ fn rows_that_do_not_exist_are_named() {
     let mut problem = pictured_problem(&mut random, &truth, 0.0);
     problem.observations[5].point = 60;
     let error = adjust(&problem, truth.clone(), &Settings::default()).expect_err("row 60 of 60");
-    assert_eq!(error.to_string(), "setting observations.point: found row 60, expected one below 60");
+    assert_eq!(error.to_string(), "observations.point: found row 60, expected one below 60");
     problem.observations[5].point = 0;
     problem.fixed.pop();
     assert!(adjust(&problem, truth, &Settings::default()).is_err());

@@ -209,3 +209,6 @@ impl Term {
         log_normal_cdf(short / self.sigma - ratio) - short / self.scale + ratio * ratio / 2.0
     }
 }
+
+#[cfg(test)]
+mod tests;

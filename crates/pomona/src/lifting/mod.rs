@@ -23,6 +23,7 @@
 //! hidden being the part of it that leaves are expected to hide: such boxes are too small, never too large.
 
 mod edges;
+pub mod fruits;
 pub mod fusion;
 pub mod outline;
 mod shift;
@@ -34,7 +35,7 @@ use edges::covered_edges;
 use nalgebra::{Matrix3, Point3, Vector3};
 use outline::Outline;
 use shift::shifted;
-use surface::{Pixel, Vote, vote_for_depth};
+use surface::{DepthVote, Pixel, vote_for_depth};
 
 /// How far fruits are from a sphere, over the radius (or diameter): calipers on two diameters of an apple differ by
 /// 2-5 %.
@@ -91,7 +92,7 @@ pub enum Source {
 
 /// A fruit seen in one picture, in the frame of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sighting {
+pub struct LiftedFruit {
     /// Metres.
     pub centre: Point3<f64>,
     /// Square metres.
@@ -115,7 +116,7 @@ pub fn lift(
     boxes_px: &[[f64; 4]],
     sources: &[Source],
     camera: &Camera,
-) -> Vec<Result<Sighting, Refusal>> {
+) -> Vec<Result<LiftedFruit, Refusal>> {
     assert_eq!(boxes_px.len(), sources.len(), "one source per box");
     assert_eq!((depth.width(), depth.height()), (camera.width, camera.height), "the camera of the depth picture");
     let lift = |(&box_px, &source)| lift_box(depth, clipped(box_px, camera), source, camera);
@@ -128,13 +129,13 @@ fn clipped(box_px: [f64; 4], camera: &Camera) -> [f64; 4] {
     [xmin.clamp(0.0, width), ymin.clamp(0.0, height), xmax.clamp(0.0, width), ymax.clamp(0.0, height)]
 }
 
-fn lift_box(depth: DepthPicture, box_px: [f64; 4], source: Source, camera: &Camera) -> Result<Sighting, Refusal> {
+fn lift_box(depth: DepthPicture, box_px: [f64; 4], source: Source, camera: &Camera) -> Result<LiftedFruit, Refusal> {
     let mut outline = Outline::of_box(box_px, camera, [false; 4]).ok_or(Refusal::Cut)?;
     let (sigma_per_m2, matched) = match source {
         Source::Votes { sigma_per_m2 } => (sigma_per_m2, None),
         // The pixels of a match err together: nothing of its scatter averages out.
         Source::Match { depth_m, sigma_per_m2, support } => {
-            (sigma_per_m2, Some(Vote { depth_m, sigma_m: 0.0, support }))
+            (sigma_per_m2, Some(DepthVote { depth_m, sigma_m: 0.0, support }))
         }
         Source::Unmatched => return Err(Refusal::Unmatched),
     };
@@ -164,7 +165,7 @@ fn pixels(depth: DepthPicture, box_px: [f64; 4], camera: &Camera) -> Vec<Pixel> 
 }
 
 /// Puts a fruit together with its covariance, equations (4) and (5).
-fn sighting(outline: &Outline, vote: &Vote, depth_sigma_per_m2: f64) -> Sighting {
+fn sighting(outline: &Outline, vote: &DepthVote, depth_sigma_per_m2: f64) -> LiftedFruit {
     let (z, s) = (vote.depth_m, outline.radius);
     let diameter_m = 2.0 * s * z;
     let patches = (SURFACE_PATCHES * vote.support).max(1.0);
@@ -184,7 +185,7 @@ fn sighting(outline: &Outline, vote: &Vote, depth_sigma_per_m2: f64) -> Sighting
     let diameter_variance = (2.0 * z * outline.radius_sigma).powi(2)
         + 4.0 * s * s * along2
         + (ROUNDNESS_SIGMA.powi(2) + hidden * hidden) * diameter_m * diameter_m;
-    Sighting {
+    LiftedFruit {
         centre: Point3::from(ray * z),
         covariance: ray * ray.transpose() * along2 + across,
         diameter_m,

@@ -62,14 +62,14 @@ pub struct Outline {
 
 /// One axis of a box: angles of its edges, which the picture cuts, which are the fruit's own; a sigma.
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct AngularSide {
     angles: [f64; 2],
     cut: [bool; 2],
     own: [bool; 2],
     edge_sigma: f64,
 }
 
-impl Side {
+impl AngularSide {
     fn new(edges_px: [f64; 2], covered: [bool; 2], size_px: f64, focal_px: f64, centre_px: f64) -> Self {
         let cut = [edges_px[0] <= PICTURE_EDGE_PX, edges_px[1] >= size_px - PICTURE_EDGE_PX];
         Self {
@@ -108,12 +108,12 @@ impl Outline {
     pub fn of_box(box_px: [f64; 4], camera: &Camera, covered: Covered) -> Option<Self> {
         let [xmin, ymin, xmax, ymax] = box_px;
         let sides = [
-            Side::new([xmin, xmax], [covered[0], covered[2]], camera.width as f64, camera.fx, camera.cx),
-            Side::new([ymin, ymax], [covered[1], covered[3]], camera.height as f64, camera.fy, camera.cy),
+            AngularSide::new([xmin, xmax], [covered[0], covered[2]], camera.width as f64, camera.fx, camera.cx),
+            AngularSide::new([ymin, ymax], [covered[1], covered[3]], camera.height as f64, camera.fy, camera.cy),
         ];
         if !decided(&sides) {
             None
-        } else if sides.iter().all(Side::whole) {
+        } else if sides.iter().all(AngularSide::whole) {
             Some(whole(&sides))
         } else {
             Some(bounded(&sides))
@@ -122,7 +122,7 @@ impl Outline {
 }
 
 /// Whether the picture leaves enough of the fruit: at most one edge cut, and over half of that side there.
-fn decided(sides: &[Side; 2]) -> bool {
+fn decided(sides: &[AngularSide; 2]) -> bool {
     let cuts = sides.map(|side| side.cuts());
     match cuts {
         [0, 0] => true,
@@ -133,7 +133,7 @@ fn decided(sides: &[Side; 2]) -> bool {
 }
 
 /// All four edges are the fruit's own.
-fn whole(sides: &[Side; 2]) -> Outline {
+fn whole(sides: &[AngularSide; 2]) -> Outline {
     let radii = sides.map(|side| side.radius());
     let long = usize::from(radii[1] > radii[0]);
     let centre_sigma = sides.map(|side| side.half_sigma());
@@ -153,7 +153,7 @@ fn whole(sides: &[Side; 2]) -> Outline {
 /// Takes size from the longer side and place from edges of the fruit's own, where others are only bounds.
 ///
 /// A box as round as fruits are was drawn around the whole fruit, leaf or not: it counts as it is.
-fn bounded(sides: &[Side; 2]) -> Outline {
+fn bounded(sides: &[AngularSide; 2]) -> Outline {
     let radii = sides.map(|side| side.radius());
     let (short, long) = (radii[0].min(radii[1]), radii[0].max(radii[1]));
     let is_cut = sides.iter().any(|side| side.cuts() > 0);

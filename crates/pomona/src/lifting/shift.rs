@@ -3,7 +3,7 @@
 use super::SURFACE_PATCHES;
 use super::outline::Outline;
 use super::statistics::median;
-use super::surface::{MIN_PIXELS, MIN_SURFACE_SIGMA_M, P_GAP, Pixel, RIM, UnitSphere, Vote};
+use super::surface::{DepthVote, MIN_PIXELS, MIN_SURFACE_SIGMA_M, P_GAP, Pixel, RIM, UnitSphere};
 
 /// Places tried along the hidden side of a box; the farthest two leave the fruit flush with one edge.
 const SHIFTS: usize = 17;
@@ -17,7 +17,7 @@ pub(crate) fn shifted(
     pixels: &[Pixel],
     outline: &Outline,
     axis: usize,
-    vote: &Vote,
+    vote: &DepthVote,
     noise_m: f64,
 ) -> ([f64; 2], [f64; 2]) {
     let near: Vec<Pixel> = pixels

@@ -65,7 +65,7 @@ pub(crate) struct Pixel {
 
 /// Depth of the centre, the spread of the votes that agree, their share of the outline's pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vote {
+pub struct DepthVote {
     /// Depth of the centre.
     pub depth_m: f64,
     /// Spread of the votes that agree.
@@ -103,7 +103,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Finds the depth of the centre that the pixels agree on; none where fewer than `MIN_PIXELS` have a depth.
-pub(crate) fn vote_for_depth(pixels: &[Pixel], centre: [f64; 2], radius: f64) -> Option<Vote> {
+pub(crate) fn vote_for_depth(pixels: &[Pixel], centre: [f64; 2], radius: f64) -> Option<DepthVote> {
     for part in [FACE, RIM] {
         let sphere = UnitSphere::new(centre, radius, part);
         let mut inside = 0;
@@ -120,7 +120,7 @@ pub(crate) fn vote_for_depth(pixels: &[Pixel], centre: [f64; 2], radius: f64) ->
             let votes: Vec<f64> = measured.iter().map(|(d, t)| d / t).collect();
             let start_m = best_supported(&measured, &votes, radius);
             let (depth_m, sigma_m, agree) = biweight(&votes, start_m, SURFACE_SIGMA * radius * start_m);
-            return Some(Vote { depth_m, sigma_m, support: agree as f64 / f64::from(inside) });
+            return Some(DepthVote { depth_m, sigma_m, support: agree as f64 / f64::from(inside) });
         }
     }
     None

@@ -11,10 +11,10 @@
 //! with the roundness of the fruit in it: near its rim t is 1, in its middle 1 - R/Z, which is most of a pixel.
 
 use super::picture::{Bounds, CHANNELS, Picture, TRUNCATION};
-use crate::appearance::FruitColour;
 use crate::camera::{Camera, PixelBox};
 use crate::lifting::outline::Outline;
 use crate::lifting::surface::UnitSphere;
+use crate::look::FruitColour;
 
 /// Part of the radius that is matched: up to the rim, where the edge of the fruit says most.
 const PART: f64 = 0.97;

@@ -1,7 +1,7 @@
 //! The disparity of fruits in a rectified pair, and the depth around them.
 //!
 //! Each fruit is matched as one disc (`disc`): the outline of its box leaves only the disparity open. Colours that the
-//! boxes share weigh the pixels (`appearance`), so that a leaf in the box says little; sizes of surely matched fruits help the
+//! boxes share weigh the pixels (`look`), so that a leaf in the box says little; sizes of surely matched fruits help the
 //! unsure (`sizes`). The best disparity is then fixed to a part of a pixel, and kept where the way back from the right
 //! picture agrees and no other disparity is nearly as good. How nearly, the margin, is also what says how sure it is. Of a
 //! fruit that does not match, hidden from the right camera or from both, the size still says roughly how far it is.
@@ -13,9 +13,9 @@ mod surroundings;
 
 pub use picture::Picture;
 
-use crate::appearance::FruitColour;
 use crate::camera::{Camera, PixelBox};
 use crate::lifting::outline::Outline;
+use crate::look::FruitColour;
 
 use disc::Disc;
 use picture::{Bounds, Side};

@@ -103,7 +103,7 @@ impl Pull {
     }
 }
 
-/// Derivative of what is seen by (a, w): J [I, -[p]x].
+/// Derivative of what is seen by (a, w): `J [I, -[p]x]`.
 fn by_motion<const D: usize>(projection: &SMatrix<f64, D, 3>, p: &Vector3<f64>) -> SMatrix<f64, D, 6> {
     let mut jacobian = SMatrix::<f64, D, 6>::zeros();
     jacobian.fixed_view_mut::<D, 3>(0, 0).copy_from(projection);

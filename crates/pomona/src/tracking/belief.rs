@@ -14,7 +14,7 @@
 //! detector missed, as pictures of fruits without a box tell. k boxes, g frames that show it without a box ([`super::glimpse`]), and v in [0, 1) the rank of the area that it shows:
 //! a track of k boxes stands for a stretch of k to k + 1 frames, and the clearer it shows, the longer.
 //!
-//! **Does it look like a fruit?** With x the mean fruitness of its boxes ([`crate::appearance`]),
+//! **Does it look like a fruit?** With x the mean fruitness of its boxes ([`crate::look`]),
 //!
 //! ```text
 //! p = w N(x; fruits) / (w N(x; fruits) + (1 - w) N(x; places without a box)),

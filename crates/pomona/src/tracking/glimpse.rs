@@ -8,8 +8,8 @@
 use super::observation::Observation;
 use super::prediction::Appearance;
 use super::sphere::Interval;
-use crate::appearance::{FRUIT, FruitColour};
 use crate::camera::PixelBox;
+use crate::look::{FRUIT, FruitColour};
 use crate::stereo::Picture;
 
 /// Steps of the share of an outline: 5 % each, less than a pixel's width of an edge.

@@ -5,8 +5,8 @@ use super::config::TrackingConfig;
 use super::landmark::Landmark;
 use super::likelihood::{Residual, Weighed};
 use super::merging::{Body, one_fruit_log_odds};
+use super::near_view::NearView;
 use super::prediction::{Prediction, predict};
-use super::space::Space;
 use crate::camera::Camera;
 use crate::pose::Pose;
 
@@ -24,13 +24,13 @@ pub(crate) struct Instant {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Known {
     pub landmarks: Vec<Landmark>,
-    space: Space,
+    near_view: NearView,
 }
 
 impl Known {
     /// How the fruits near the view should look.
     pub fn predictions(&self, camera: &Camera, pose: &Pose, way_m: f64, config: &TrackingConfig) -> Vec<Prediction> {
-        let near = self.space.near_view(camera, pose);
+        let near = self.near_view.of(camera, pose);
         near.into_iter()
             .filter_map(|index| predict(index, &self.landmarks[index], camera, pose, way_m, config))
             .collect()
@@ -39,8 +39,8 @@ impl Known {
     /// The number of a new fruit.
     pub fn add(&mut self, born: Birth, pose: &Pose, now: Instant) -> usize {
         let index = self.landmarks.len();
-        self.space.insert(index, &born.estimate.centre);
-        self.space.reach(pose.to_camera(&born.estimate.centre).z);
+        self.near_view.fruits.insert(index, &born.estimate.centre);
+        self.near_view.reach(pose.to_camera(&born.estimate.centre).z);
         self.landmarks.push(Landmark::born(born, now));
         index
     }
@@ -57,7 +57,7 @@ impl Known {
         let index = prediction.landmark;
         let before = self.landmarks[index].estimate.centre;
         let likely = take_up(&mut self.landmarks[index], prediction, weighed, camera, pose);
-        self.space.moved(index, &before, &self.landmarks[index].estimate.centre);
+        self.near_view.fruits.moved(index, &before, &self.landmarks[index].estimate.centre);
         likely
     }
 
@@ -78,7 +78,7 @@ impl Known {
                     let other = self.landmarks[b].clone();
                     let before = self.landmarks[a].estimate.centre;
                     self.landmarks[a].absorb(&other);
-                    self.space.moved(a, &before, &self.landmarks[a].estimate.centre);
+                    self.near_view.fruits.moved(a, &before, &self.landmarks[a].estimate.centre);
                     self.forget(b, a);
                 }
             }
@@ -88,7 +88,7 @@ impl Known {
     /// Leaves a record to another one that is the same fruit.
     pub fn forget(&mut self, index: usize, instead: usize) {
         let centre = self.landmarks[index].estimate.centre;
-        self.space.remove(index, &centre);
+        self.near_view.fruits.remove(index, &centre);
         self.landmarks[index].merged_into = Some(instead);
     }
 

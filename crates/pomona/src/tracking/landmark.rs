@@ -183,3 +183,22 @@ impl Estimate {
         Some((gain * value, self.covariance - gain * jacobian * self.covariance))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_that_turns_out_to_be_the_same_fruit_brings_its_evidence() {
+        let born = |evidence: f64| {
+            let estimate = Estimate { centre: Vector3::zeros(), covariance: Matrix3::identity() };
+            let size = Size { ln_radius: -3.0, variance: 0.1 };
+            Landmark::born(Birth { estimate, doubt: None, size, evidence }, Instant::default())
+        };
+        let (mut one, mut other) = (born(2.5), born(-1.0));
+        other.hit(Instant::default(), 0.25);
+        one.absorb(&other);
+        assert!((one.evidence - 1.75).abs() < 1e-12);
+        assert_eq!(one.views, 3);
+    }
+}

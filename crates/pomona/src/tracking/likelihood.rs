@@ -13,7 +13,7 @@
 //! then the other edge places the fruit.
 
 use super::config::TrackingConfig;
-use super::observation::{Observation, Side};
+use super::observation::{Observation, PixelSide};
 use super::prediction::{Appearance, Prediction};
 use super::unknown::{Conditions, NEW_LN_SIZES, Unknown};
 use crate::camera::Camera;
@@ -129,7 +129,13 @@ struct Along {
     lack2: f64,
 }
 
-fn along_axis(axis: usize, appearance: &Appearance, side: &Side, camera: &Camera, config: &TrackingConfig) -> Along {
+fn along_axis(
+    axis: usize,
+    appearance: &Appearance,
+    side: &PixelSide,
+    camera: &Camera,
+    config: &TrackingConfig,
+) -> Along {
     let predicted = appearance.outline[axis];
     let edge2 = config.edge_sigma_px.powi(2);
     match side.cut {

@@ -5,7 +5,7 @@
 //! gates, costs and duplicates follow from covariances instead of counts of points. One frame goes as follows
 //! ([`Tracker::update`]):
 //!
-//! 1. Fruits near the view are looked up by place (`space`), whenever they were last seen.
+//! 1. Fruits near the view are looked up by place (`near_view`), whenever they were last seen.
 //! 2. Each is projected: the outline of its sphere, the covariance of its middle and depth (`prediction`).
 //! 3. Each box is weighed against each such fruit by the log-odds against a box of something new (`likelihood`).
 //! 4. The assignment with the largest sum of log-odds is taken ([`crate::assignment`]), once to see where the fruits say that
@@ -30,12 +30,12 @@ mod known;
 mod landmark;
 mod likelihood;
 mod merging;
+mod near_view;
 mod observation;
 mod population;
 mod prediction;
 mod settling;
 mod sharing;
-mod space;
 mod sphere;
 mod tracker;
 mod tracks;

@@ -49,7 +49,7 @@ impl LiftedBoxes<'_> {
 /// One box as the tracker sees it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observation {
-    pub sides: [Side; 2],
+    pub sides: [PixelSide; 2],
     pub score: f64,
     pub lift: Option<Lift>,
 }
@@ -64,7 +64,7 @@ impl Observation {
 
 /// One axis of a box: its edges, and which of them the picture cuts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Side {
+pub(crate) struct PixelSide {
     pub edges: Interval,
     /// Where the centre of a sphere with these edges projects to, and its R / Z.
     pub middle: f64,
@@ -72,7 +72,7 @@ pub(crate) struct Side {
     pub cut: [bool; 2],
 }
 
-impl Side {
+impl PixelSide {
     pub fn whole(self) -> bool {
         !self.cut[0] && !self.cut[1]
     }
@@ -125,17 +125,17 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
         }
     }
     match lifted.rows.iter().find(|&&row| row >= n_boxes) {
-        Some(&row) => Err(Error::Length { what: "lifted.rows", found: row + 1, expected: n_boxes }),
+        Some(&found) => Err(Error::Row { what: "lifted.rows", found, below: n_boxes }),
         None => Ok(()),
     }
 }
 
-fn sides(camera: &Camera, [xmin, ymin, xmax, ymax]: [f64; 4]) -> [Side; 2] {
+fn sides(camera: &Camera, [xmin, ymin, xmax, ymax]: [f64; 4]) -> [PixelSide; 2] {
     let side = |axis: usize, low: f64, high: f64| {
         let size = camera.size_px()[axis];
         let edges = Interval { low: low.max(0.0), high: high.min(size) };
         let (middle, ratio) = camera.middle_and_ratio(axis, edges);
-        Side { edges, middle, ratio, cut: [low <= PICTURE_EDGE_PX, high >= size - PICTURE_EDGE_PX] }
+        PixelSide { edges, middle, ratio, cut: [low <= PICTURE_EDGE_PX, high >= size - PICTURE_EDGE_PX] }
     };
     [side(0, xmin, xmax), side(1, ymin, ymax)]
 }

@@ -2,18 +2,19 @@
 
 use super::acceptance::{VerifiedConfig, poses};
 use super::doubts::RIVAL_CANDIDATES;
+use super::extent;
 use super::growth::{Growth, grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
-use super::outline;
 use super::overlap::Overlap;
-use super::pose::Pose;
-use super::search::{Candidate, Effort, Starts, of_some_fruits, round};
+use super::placement::Placement;
+use super::search::{Contender, Effort, Starts, of_some_fruits, round};
 use super::seeds::{self, Seed, SeedIndex};
 use super::vertical::Vertical;
+use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
-use crate::matching::{Match, Request, Verdict};
+use crate::matching::Request;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 const MIN_FRUITS: usize = 5;
@@ -58,13 +59,13 @@ const UPRIGHT_SEEDS: u64 = 2;
 
 /// A map made ready for many queries.
 #[derive(Debug, Clone)]
-pub(crate) struct Prepared {
+pub(crate) struct VerifiedMap {
     landscape: Landscape,
     seeds: SeedIndex,
     scale: Scale,
 }
 
-impl Prepared {
+impl VerifiedMap {
     pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
         let landscape = Landscape::new(map);
         let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
@@ -89,7 +90,7 @@ impl<'a> Finding<'a> {
 
 /// Finds the query in the map.
 pub(crate) fn search(
-    prepared: &Prepared,
+    prepared: &VerifiedMap,
     map: &FruitCloud,
     query: &FruitCloud,
     request: &Request,
@@ -125,7 +126,7 @@ pub(crate) fn search(
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
 pub(crate) fn pairs_under(
-    prepared: &Prepared,
+    prepared: &VerifiedMap,
     map: &FruitCloud,
     query: &FruitCloud,
     map_from_query: &Similarity,
@@ -137,7 +138,7 @@ pub(crate) fn pairs_under(
     }
     let landscape = Landscape::new(query);
     let search = Search::new(prepared, &landscape, request, config);
-    let pose = Pose::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
+    let pose = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let place = search.query.points.first().copied().unwrap_or_default();
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
@@ -174,7 +175,7 @@ impl Default for Log {
 }
 
 impl<'a> Search<'a> {
-    fn new(prepared: &'a Prepared, query: &'a Landscape, request: &Request, config: &VerifiedConfig) -> Self {
+    fn new(prepared: &'a VerifiedMap, query: &'a Landscape, request: &Request, config: &VerifiedConfig) -> Self {
         let map = &prepared.landscape;
         // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
         let common = SEED_SIGMA * map.spacing;
@@ -211,7 +212,7 @@ impl<'a> Search<'a> {
         self.config.least_told(poses, share)
     }
 
-    pub(super) fn admits(&self, pose: &Pose) -> bool {
+    pub(super) fn admits(&self, pose: &Placement) -> bool {
         self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
@@ -259,7 +260,7 @@ impl<'a> Search<'a> {
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
-    fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Candidate], log: &mut Log) {
+    fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Contender], log: &mut Log) {
         log.grown += self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
         if log.seeds < FIRST_FRUITS {
@@ -275,7 +276,7 @@ impl<'a> Search<'a> {
     }
 
     /// Hypotheses of one round, and the candidates that were not refined.
-    fn round(&self, seeds: &[Seed], plan: (usize, Starts), log: &mut Log) -> (Vec<Hypothesis>, Vec<Candidate>) {
+    fn round(&self, seeds: &[Seed], plan: (usize, Starts), log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
         let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, seeds, plan);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
@@ -325,7 +326,7 @@ impl<'a> Search<'a> {
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = outline::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
+        let seed = extent::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
         let model = Model { sigma: seed.sigma, ..self.model };
         let growth = if seed.sigma < SHARP * self.map.spacing {
             grow(self.query, self.map, &seed, &model)

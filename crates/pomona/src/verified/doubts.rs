@@ -5,8 +5,8 @@ use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::single;
 use super::overlap::Overlap;
-use super::pose::{Moments, Pose};
-use super::search::{Candidate, Starts, refined};
+use super::placement::{Moments, Placement};
+use super::search::{Contender, Starts, refined};
 use nalgebra::{Matrix3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
@@ -39,8 +39,8 @@ const POLISH_TURNS: [f64; 4] = [-0.175, -0.087, 0.087, 0.175];
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
     /// the true one may have more of the best.
-    pub(super) fn look_for_rivals(&self, rest: &[Candidate], findings: &mut Vec<Finding<'a>>) -> u32 {
-        let others: Vec<Candidate> = rest
+    pub(super) fn look_for_rivals(&self, rest: &[Contender], findings: &mut Vec<Finding<'a>>) -> u32 {
+        let others: Vec<Contender> = rest
             .iter()
             .filter(|candidate| {
                 !findings.iter().any(|finding| self.explains(finding, &candidate.place, &candidate.pose))
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
-    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Pose) -> bool {
+    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Placement) -> bool {
         let reach = SAME * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
@@ -108,7 +108,7 @@ impl<'a> Search<'a> {
         let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
         let translation = pose.apply(&middle) - rotation * middle * pose.scale;
         let seed =
-            Hypothesis { pose: Pose { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
+            Hypothesis { pose: Placement { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
         let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
         self.polish(&mut mirrored);
         mirrored.overlap.log_odds > MIRRORED * log_odds

@@ -4,11 +4,11 @@
 //! Each cell has its own pose ([`super::patches`]). Growth goes from cell to neighbouring cell and stops where the
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
-use super::cells::{Cell, Cut};
+use super::cut::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
-use super::overlap::Prediction;
-use super::pose::{Moments, Pose};
+use super::overlap::Landing;
+use super::placement::{Moments, Placement};
 use nalgebra::Vector3;
 
 /// Edge of a cell in spacings of the query: some ten fruits.
@@ -54,11 +54,11 @@ pub(crate) struct Growth<'a> {
     /// Sums around every cell that was reached when pairs were made last.
     pub(super) wide: Vec<Option<Moments>>,
     pub(super) edge: f64,
-    pub(super) pose: Pose,
+    pub(super) pose: Placement,
     pub(super) sigma: f64,
     /// Variance of the displacement that neighbours share, square metres.
     pub(super) shared: f64,
-    pub(super) predictions: Vec<Option<Prediction>>,
+    pub(super) predictions: Vec<Option<Landing>>,
     pub(super) partners: Vec<Option<Partner>>,
     pub(super) owner: Vec<Option<u32>>,
     pub(super) patch_places: Vec<Vector3<f64>>,

@@ -1,7 +1,7 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
 use super::landscape::Landscape;
-use super::pose::{Moments, Pose};
+use super::placement::{Moments, Placement};
 use super::vertical::Vertical;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
@@ -77,7 +77,7 @@ pub(crate) const GATE: f64 = 3.0;
 /// A pose with the evidence around one place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hypothesis {
-    pub(crate) pose: Pose,
+    pub(crate) pose: Placement,
     /// Evidence against chance within the place's reach, nats.
     pub(crate) log_odds: f64,
     /// Where the evidence lies, in the centred query.
@@ -99,7 +99,7 @@ pub(crate) struct Scratch {
 pub(crate) fn refine(
     query: &Landscape,
     map: &Landscape,
-    start: &Pose,
+    start: &Placement,
     place: &Vector3<f64>,
     reach: f64,
     model: &Model,
@@ -165,7 +165,7 @@ pub(crate) fn refine(
 fn other_side(
     query: &Landscape,
     map: &Landscape,
-    pose: &Pose,
+    pose: &Placement,
     place: &Vector3<f64>,
     reach: f64,
     model: &Model,
@@ -186,7 +186,7 @@ fn other_side(
 fn pair_up(
     query: &Landscape,
     map: &Landscape,
-    pose: &Pose,
+    pose: &Placement,
     variance_at: impl Fn(&Vector3<f64>) -> f64,
     scratch: &mut Scratch,
 ) {

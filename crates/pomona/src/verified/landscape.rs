@@ -1,11 +1,12 @@
 //! One cloud prepared for verification: its grid, its typical spacing, and what chance predicts at each place.
 
-use super::cells::Cut;
 use super::chance::{Companions, crowding, kinship, local_density};
-use super::grid::{Grid, Support};
-use super::space::Tree;
-use super::vicinity::Vicinity;
+use super::cut::Cut;
+use super::support::Support;
 use crate::cloud::FruitCloud;
+use crate::neighbours::grid::Grid;
+use crate::neighbours::tree::Tree;
+use crate::neighbours::vicinity::Vicinity;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::sync::OnceLock;

@@ -6,40 +6,37 @@
 //!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`).
-//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`outline`).
+//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
-//!    probabilities (`association`) and patches fitted to them, in turns (`settlement`).
+//!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
-mod answer;
-mod association;
-mod cells;
 mod chance;
 mod codes;
+mod conclusion;
+mod cut;
 mod decision;
+mod displacement;
 mod doubts;
+mod extent;
 #[cfg(test)]
 mod fixture;
-mod grid;
 mod growth;
 mod hypothesis;
 mod landscape;
-mod outline;
 mod overlap;
+mod pairing;
 mod patches;
-mod pose;
+mod placement;
 mod proposal;
 mod scatter;
 mod search;
 mod seeds;
 mod settlement;
-mod sharing;
 mod size;
-mod space;
+mod support;
 mod vertical;
-mod vicinity;
 
 pub use acceptance::VerifiedConfig;
-pub(crate) use decision::{MAX_FRUITS, Prepared, pairs_under, search};
-pub(crate) use grid::CellHasher;
+pub(crate) use decision::{MAX_FRUITS, VerifiedMap, pairs_under, search};
 pub(crate) use landscape::median;

@@ -1,9 +1,9 @@
 //! What a growth explains, and how much evidence it has.
 
-use super::cells::{key_of, total};
+use super::cut::{key_of, total};
 use super::growth::{Growth, Partner};
 use super::hypothesis::gaussian;
-use super::pose::Pose;
+use super::placement::Placement;
 use nalgebra::Vector3;
 
 /// Shares of fruits seen again that are tried: heavy occlusion to a bare tree.
@@ -11,7 +11,7 @@ const SHARES_SEEN_AGAIN: [f64; 4] = [0.35, 0.55, 0.75, 0.9];
 
 /// A fruit of the query where the grown pose puts it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Prediction {
+pub(crate) struct Landing {
     pub(crate) place: Vector3<f64>,
     /// Variance per axis of the distance to the partner, square metres of the map.
     pub(crate) variance: f64,
@@ -21,7 +21,7 @@ pub(crate) struct Prediction {
 #[derive(Debug, Clone)]
 pub(crate) struct Overlap {
     /// Least-squares pose over all pairs.
-    pub(crate) pose: Pose,
+    pub(crate) pose: Placement,
     /// Evidence summed over all cells that growth reached, nats.
     pub(crate) log_odds: f64,
     /// Relative noise per axis, metres of the map.
@@ -29,7 +29,7 @@ pub(crate) struct Overlap {
     /// Centroid of the matched fruits, in the centred query.
     pub(crate) middle: Vector3<f64>,
     /// Where each fruit of the query is expected; `None` outside the overlap.
-    pub(crate) predictions: Vec<Option<Prediction>>,
+    pub(crate) predictions: Vec<Option<Landing>>,
 }
 
 impl Growth<'_> {

@@ -4,13 +4,13 @@
 //! few. What the patches leave over is smoothed between neighbouring fruits, in the measure in which neighbours'
 //! residuals agree.
 
-use super::cells::{Cell, surroundings, total};
+use super::cut::{Cell, surroundings, total};
+use super::displacement::{displacement, shared_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::hypothesis::GATE;
 use super::landscape::SHARE_OF_ROWS;
-use super::overlap::Prediction;
-use super::pose::{Moments, Pose};
-use super::sharing::{displacement, shared_by_neighbours};
+use super::overlap::Landing;
+use super::placement::{Moments, Placement};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -98,7 +98,7 @@ impl Growth<'_> {
             let place = self.cells[cell].pose.apply(&p);
             let (shift, unexplained) = displacement(self.query, row, (self.shared, self.sigma * self.sigma), residual);
             let variance = sigma2 * (1.0 + footing.looseness(&p)) + bent + unexplained;
-            Some((place, Prediction { place: place + shift, variance }))
+            Some((place, Landing { place: place + shift, variance }))
         };
         let (mut predictions, mut places) = (take(&mut self.predictions), take(&mut self.patch_places));
         let both = predictions.par_iter_mut().zip(&mut places).enumerate().with_min_len(SHARE_OF_ROWS);
@@ -141,7 +141,7 @@ impl Growth<'_> {
     }
 
     /// What a prediction meets in the map.
-    fn meet(&self, Prediction { place, variance }: &Prediction) -> Met {
+    fn meet(&self, Landing { place, variance }: &Landing) -> Met {
         let Some((row, d2)) = self.map.nearest(place, GATE * variance.sqrt()) else {
             return Met { partner: None, gain: self.model.missed(self.map.support(place)).ln() };
         };
@@ -187,7 +187,7 @@ impl Growth<'_> {
             None => cell.pose,
         };
         let both = self.cells.par_iter().zip(&self.wide).with_min_len(SHARE_OF_CELLS);
-        let poses: Vec<Pose> = both.map(refitted).collect();
+        let poses: Vec<Placement> = both.map(refitted).collect();
         self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
         if !self.whole {
             self.estimate_noise();
@@ -195,7 +195,7 @@ impl Growth<'_> {
     }
 
     /// The pose of one patch from the pairs next to it, held by that of its surroundings.
-    fn patch(&self, cell: &Cell, wide: &Moments) -> Pose {
+    fn patch(&self, cell: &Cell, wide: &Moments) -> Placement {
         let prior = HOLD * self.edge * self.edge;
         let mut parent = cell.pose;
         if wide.weight > 6.0 {

@@ -2,7 +2,7 @@
 
 use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
-use super::pose::Pose;
+use super::placement::Placement;
 use super::seeds::{Quad, STARS, frame};
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -49,9 +49,9 @@ impl<'a> Proposer<'a> {
     /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
     ///
     /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does
-    /// the rest (see [`Pose`]'s step): the inertia is the same for all candidates.
+    /// the rest (see [`Placement`]'s step): the inertia is the same for all candidates.
     #[inline]
-    pub(crate) fn fit(&self, target: &Quad) -> Option<(Pose, f64)> {
+    pub(crate) fn fit(&self, target: &Quad) -> Option<(Placement, f64)> {
         let axes = Matrix3::from_columns(&frame(&self.map.points, target)?);
         let (centroid, fruits) = in_frame(&self.map.points, target, &axes.transpose());
         let both = || self.fruits.iter().zip(&fruits);
@@ -68,12 +68,12 @@ impl<'a> Proposer<'a> {
         let residual = turned.iter().zip(&fruits).map(|(here, there)| (there - here * scale).norm_squared()).sum();
         let rotation = axes * turn * self.to_frame;
         let translation = centroid - rotation * self.centroid * scale;
-        Some((Pose { rotation, translation, scale }, residual))
+        Some((Placement { rotation, translation, scale }, residual))
     }
 
     /// The pose as a known vertical corrects it; `None` where the two contradict each other.
     #[inline]
-    pub(crate) fn upright(&self, pose: Pose) -> Option<Pose> {
+    pub(crate) fn upright(&self, pose: Placement) -> Option<Placement> {
         let Some(vertical) = self.model.vertical else { return Some(pose) };
         // The noise is in metres of the map, the inertia in those of the query.
         let sigma = self.model.sigma / pose.scale;
@@ -83,7 +83,7 @@ impl<'a> Proposer<'a> {
 
     /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
     #[inline]
-    pub(crate) fn first_look(&self, pose: &Pose) -> f64 {
+    pub(crate) fn first_look(&self, pose: &Placement) -> f64 {
         // Likelihood ratios are multiplied: one logarithm in the end costs less than one a fruit.
         let mut around = 1.0;
         for &row in self.query.neighbours(self.middle as usize).iter().filter(|&row| !self.quad.contains(row)) {
@@ -99,7 +99,7 @@ impl<'a> Proposer<'a> {
     /// Variance of where the pose of the seed puts a fruit, in variances of one pair.
     ///
     /// The pose of four noisy fruits is uncertain: with the inertia J about their centroid, a fruit at r from there has
-    /// 1/4 + tr([r] J^-1 [r]^T) / 3 per axis (cf. 1 + r^2/Q^2 of Lang et al.).
+    /// `1/4 + tr([r] J^-1 [r]^T) / 3` per axis (cf. 1 + r^2/Q^2 of Lang et al.).
     #[inline]
     fn looseness(&self, p: &Vector3<f64>) -> f64 {
         let r = self.to_frame * (p - self.centroid);
@@ -109,7 +109,7 @@ impl<'a> Proposer<'a> {
 
     /// What a fruit says for the pose, as a likelihood ratio.
     #[inline]
-    fn ratio(&self, row: u32, pose: &Pose) -> f64 {
+    fn ratio(&self, row: u32, pose: &Placement) -> f64 {
         let p = self.query.points[row as usize];
         let variance = self.model.sigma * self.model.sigma * (1.0 + self.looseness(&p));
         let place = pose.apply(&p);
@@ -167,7 +167,7 @@ mod tests {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
         let model = model(Scale::Metric);
-        let truth = Pose { translation: query.centre - map.centre, ..Pose::identity() };
+        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
         let mut looks = Vec::new();
         for (quad, _) in longest(&query, 200) {
             let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");

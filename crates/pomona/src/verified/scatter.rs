@@ -9,13 +9,13 @@
 //! true one where fruits crowd, so that the noise comes out small and the share large.
 
 use super::landscape::{Landscape, SHARE_OF_ROWS, single};
-use super::overlap::Prediction;
+use super::overlap::Landing;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is known of the noise beforehand, metres of the map.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Expected {
+pub(crate) enum KnownNoise {
     /// By the spacing, within a factor of two.
     Guess(f64),
     /// By the outline, within a third.
@@ -66,15 +66,15 @@ const ROUNDS: usize = 20;
 pub(crate) fn scatter(
     query: &Landscape,
     map: &Landscape,
-    predictions: &[Option<Prediction>],
+    predictions: &[Option<Landing>],
     scale: f64,
-    expected: Expected,
+    expected: KnownNoise,
 ) -> Scatter {
     let counts = Counts::new(query, map, predictions, scale);
     let (expected, width) = match expected {
-        Expected::Guess(sigma) => (sigma, GUESSED),
-        Expected::Outlined(sigma) => (sigma, OUTLINED),
-        Expected::Given(sigma) => (sigma, GIVEN),
+        KnownNoise::Guess(sigma) => (sigma, GUESSED),
+        KnownNoise::Outlined(sigma) => (sigma, OUTLINED),
+        KnownNoise::Given(sigma) => (sigma, GIVEN),
     };
     let finest = FINEST * map.spacing;
     let tried: Vec<(f64, f64, f64)> = (0..STEPS)
@@ -122,11 +122,11 @@ impl Part {
 }
 
 impl Counts {
-    fn new(query: &Landscape, map: &Landscape, predictions: &[Option<Prediction>], scale: f64) -> Self {
+    fn new(query: &Landscape, map: &Landscape, predictions: &[Option<Landing>], scale: f64) -> Self {
         let bin = BIN * map.spacing;
         let met: Vec<AtomicBool> = (0..map.len()).map(|_| AtomicBool::new(false)).collect();
         let here = in_parts(query.len(), |row, part| {
-            let Some(Prediction { place, .. }) = &predictions[row] else { return };
+            let Some(Landing { place, .. }) = &predictions[row] else { return };
             part.fruits += 1.0;
             part.due += map.support(place);
             map.tree.within(&single(place), (BINS as f64 * bin) as f32, |partner, d2| {
@@ -230,9 +230,9 @@ mod tests {
         for sigma in [0.01, 0.02, 0.04] {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-            let place = |p: &Vector3<f64>| Some(Prediction { place: p + query.centre - map.centre, variance: 1.0 });
+            let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
             let predictions: Vec<_> = query.points.iter().map(place).collect();
-            let found = scatter(&query, &map, &predictions, 1.0, Expected::Guess(0.02));
+            let found = scatter(&query, &map, &predictions, 1.0, KnownNoise::Guess(0.02));
             assert!((found.sigma / sigma - 1.0).abs() < 0.12, "{} for {sigma}", found.sigma);
             assert!((found.share - 0.6).abs() < 0.08, "{} at {sigma}", found.share);
         }

@@ -2,7 +2,7 @@
 
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
-use super::pose::Pose;
+use super::placement::Placement;
 use super::proposal::Proposer;
 use super::seeds::{Quad, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
 use crate::geometry::Scale;
@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 /// A seed of the query laid on a seed of the map.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
-    pub(crate) pose: Pose,
+pub(crate) struct Contender {
+    pub(crate) pose: Placement,
     pub(crate) log_odds: f64,
     pub(crate) place: Vector3<f64>,
     /// Rows of both seeds: an order for equal evidence.
@@ -75,7 +75,7 @@ fn candidates_of(
     index: &SeedIndex,
     model: &Model,
     seed: Seed,
-    found: &mut Vec<Candidate>,
+    found: &mut Vec<Contender>,
 ) -> Effort {
     let mut effort = Effort::default();
     let length = f64::from(seed.1[0]);
@@ -116,7 +116,7 @@ fn candidates_of(
             effort.fitted += 1;
             let log_odds = proposer.first_look(&pose);
             if log_odds > 0.0 {
-                found.push(Candidate { pose, log_odds, place: proposer.centroid, key: (quad, *target) });
+                found.push(Contender { pose, log_odds, place: proposer.centroid, key: (quad, *target) });
             }
         }
     });
@@ -155,8 +155,8 @@ pub(crate) fn round(
     model: &Model,
     seeds: &[Seed],
     (keep, starts): (usize, Starts),
-) -> (Vec<Hypothesis>, Vec<Candidate>, Effort) {
-    let parts: Vec<(Vec<Candidate>, Effort)> = seeds
+) -> (Vec<Hypothesis>, Vec<Contender>, Effort) {
+    let parts: Vec<(Vec<Contender>, Effort)> = seeds
         .par_chunks(SHARE_OF_SEEDS)
         .map(|seeds| {
             let mut found = Vec::new();
@@ -168,7 +168,7 @@ pub(crate) fn round(
         })
         .collect();
     let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
-    let mut candidates: Vec<Candidate> = parts.into_iter().flat_map(|part| part.0).collect();
+    let mut candidates: Vec<Contender> = parts.into_iter().flat_map(|part| part.0).collect();
     candidates.sort_unstable_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key)));
     let best = distinct(query, map, &mut candidates, keep);
     (refined(query, map, &best, model, starts), candidates, effort)
@@ -178,12 +178,12 @@ pub(crate) fn round(
 const SHARE_OF_SEEDS: usize = 32;
 
 /// Takes the best `keep` candidates out of those given best first, one of each pose.
-fn distinct(query: &Landscape, map: &Landscape, candidates: &mut Vec<Candidate>, keep: usize) -> Vec<Candidate> {
+fn distinct(query: &Landscape, map: &Landscape, candidates: &mut Vec<Contender>, keep: usize) -> Vec<Contender> {
     let (near, same) = (query.spacing, SAME_PLACE * map.spacing);
-    let mut kept: Vec<Candidate> = Vec::new();
+    let mut kept: Vec<Contender> = Vec::new();
     candidates.retain(|candidate| {
         let place = candidate.place;
-        let proposed = |other: &Candidate| {
+        let proposed = |other: &Contender| {
             (place - other.place).norm() < near
                 && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
                 && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
@@ -224,7 +224,7 @@ const NEAR: f64 = 0.75;
 pub(crate) fn refined(
     query: &Landscape,
     map: &Landscape,
-    candidates: &[Candidate],
+    candidates: &[Contender],
     model: &Model,
     starts: Starts,
 ) -> Vec<Hypothesis> {
@@ -243,13 +243,13 @@ fn refine_from(
     starts: Starts,
     query: &Landscape,
     map: &Landscape,
-    Candidate { pose, place, .. }: &Candidate,
+    Contender { pose, place, .. }: &Contender,
     model: &Model,
     scratch: &mut Scratch,
 ) -> Option<Hypothesis> {
     let more = |a: &Hypothesis, b: &Hypothesis| a.log_odds.total_cmp(&b.log_odds);
     let reach = REACH * query.spacing;
-    let mut from = |start: &Pose, reach: f64| refine(query, map, start, place, reach, model, scratch);
+    let mut from = |start: &Placement, reach: f64| refine(query, map, start, place, reach, model, scratch);
     let straight = from(pose, reach);
     if starts == Starts::Straight {
         return straight;
@@ -283,13 +283,13 @@ mod tests {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
         let model = Model { sigma: 0.02, detection: 0.6, scale: Scale::Metric, vertical: None };
-        let truth = Pose { translation: query.centre - map.centre, ..Pose::identity() };
+        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
         let mut dice = Dice(11);
         let (mut straight_reached, mut turned_reached) = (0, 0);
         for i in 0..20 {
             let place = query.points[i * query.len() / 20];
             let pose = truth.turned(&place, &Rotation3::new(dice.normal().normalize() * 0.26));
-            let candidate = Candidate { pose, log_odds: 0.0, place, key: ([0; 4], [0; 4]) };
+            let candidate = Contender { pose, log_odds: 0.0, place, key: ([0; 4], [0; 4]) };
             let [straight, turned] = [Starts::Straight, Starts::Turned]
                 .map(|starts| refined(&query, &map, &[candidate], &model, starts).pop());
             let reached =

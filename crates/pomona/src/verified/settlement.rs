@@ -6,20 +6,20 @@
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
 //! 2. The noise and a first share seen again come from distances, nobody said to be who ([`super::scatter`]).
-//! 3. Every pair gets its probability ([`super::association`]); their sum says the share of the next turn.
+//! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn.
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
-use super::association::Marginals;
-use super::cells::{Cell, surroundings, total};
+use super::cut::{Cell, surroundings, total};
+use super::displacement::{displacement, shared_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::landscape::{Landscape, SHARE_OF_ROWS};
-use super::overlap::{Overlap, Prediction};
+use super::overlap::{Landing, Overlap};
+use super::pairing::Marginals;
 use super::patches::{DRIFT, Footing, HOLD, SHARE_OF_CELLS, next_to};
-use super::pose::{Moments, Pose};
-use super::scatter::{Expected, scatter};
-use super::sharing::{displacement, shared_by_neighbours};
-use super::size::{Cue, Sizes};
+use super::placement::{Moments, Placement};
+use super::scatter::{KnownNoise, scatter};
+use super::size::{Cue, Diameters};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -56,11 +56,11 @@ struct Settlement<'a> {
     query: &'a Landscape,
     map: &'a Landscape,
     scale: Scale,
-    expected: Expected,
+    expected: KnownNoise,
     cells: Vec<Cell>,
     cell_of: &'a [u32],
     edge: f64,
-    pose: Pose,
+    pose: Placement,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     sigma: f64,
     /// Probability that a fruit which the map could have shown is there: by the distances, then by the pairs.
@@ -71,11 +71,11 @@ struct Settlement<'a> {
     /// Variance that neighbours' residuals about the patches share, square metres.
     shared: f64,
     targets: Vec<Target>,
-    predictions: Vec<Option<Prediction>>,
+    predictions: Vec<Option<Landing>>,
 }
 
 /// Settles what `growth` found; `noise_m` is the relative noise where it is known.
-pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Sizes>) -> Settled {
+pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diameters>) -> Settled {
     let mut settlement = Settlement::new(growth, noise_m);
     let mut cue = None;
     for _ in 0..TURNS {
@@ -113,9 +113,9 @@ impl<'a> Settlement<'a> {
             map: growth.map,
             scale: growth.model.scale,
             expected: match noise_m {
-                Some(noise_m) => Expected::Given(noise_m),
-                None if growth.whole => Expected::Outlined(growth.sigma),
-                None => Expected::Guess(growth.model.sigma),
+                Some(noise_m) => KnownNoise::Given(noise_m),
+                None if growth.whole => KnownNoise::Outlined(growth.sigma),
+                None => KnownNoise::Guess(growth.model.sigma),
             },
             cells,
             cell_of: &growth.cut.cell_of,
@@ -156,7 +156,7 @@ impl<'a> Settlement<'a> {
         self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
     }
 
-    fn prediction(&self, row: usize, [near, wide]: &[Footing; 2]) -> Prediction {
+    fn prediction(&self, row: usize, [near, wide]: &[Footing; 2]) -> Landing {
         let p = self.query.points[row];
         let away2 = wide.away2(&p);
         let bent = if away2 > self.edge * self.edge { DRIFT * DRIFT * away2 } else { 0.0 };
@@ -170,7 +170,7 @@ impl<'a> Settlement<'a> {
             let leverage = (weight * looseness).min(MAX_LEVERAGE);
             place -= residual * (leverage / (1.0 - leverage));
         }
-        Prediction { place, variance: noise * (1.0 + looseness) + bent + unexplained }
+        Landing { place, variance: noise * (1.0 + looseness) + bent + unexplained }
     }
 
     /// Noise and share from the distances; the predictions' variances follow.
@@ -256,7 +256,7 @@ impl<'a> Settlement<'a> {
             moments.add(&cell.centre, &cell.pose.apply(&cell.centre), hold);
             moments.step(&cell.pose, Scale::Metric, prior).unwrap_or(cell.pose)
         };
-        let poses: Vec<Pose> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
+        let poses: Vec<Placement> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
         self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
     }
 }

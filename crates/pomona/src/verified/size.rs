@@ -1,7 +1,7 @@
 //! Diameters as a soft cue, once the growth that all fruits share is removed.
 
-use super::association::Link;
 use super::landscape::{Landscape, median};
+use super::pairing::Link;
 use crate::cloud::FruitCloud;
 
 /// Pairs needed before diameters are believed: growth and its spread are two numbers.
@@ -11,21 +11,21 @@ const MIN_PAIRS: usize = 6;
 const LEAST_SPREAD: f64 = 0.015;
 
 /// Logarithms of the diameters in the order of the landscapes; NaN where unknown.
-pub(crate) struct Sizes {
+pub(crate) struct Diameters {
     query: Vec<f64>,
     map: Vec<f64>,
 }
 
 /// The cue fitted to a first set of pairs.
 pub(crate) struct Cue<'a> {
-    sizes: &'a Sizes,
+    sizes: &'a Diameters,
     /// Median and spread of ln(map / query) over fruits that are the same.
     same: (f64, f64),
     /// The same over fruits that are not.
     other: (f64, f64),
 }
 
-impl Sizes {
+impl Diameters {
     /// `None` unless both clouds have diameters.
     pub(crate) fn new(query: &FruitCloud, map: &FruitCloud, q: &Landscape, m: &Landscape) -> Option<Self> {
         let logarithms = |cloud: &FruitCloud, landscape: &Landscape| {

@@ -54,7 +54,11 @@ impl Seen {
     }
 
     pub fn take(&self, tracker: &mut Tracker, frame: i64, pose: &Pose) -> Vec<Option<usize>> {
-        let scores = vec![1.0; self.edges_px.len()];
+        self.take_scored(tracker, frame, pose, 1.0)
+    }
+
+    pub fn take_scored(&self, tracker: &mut Tracker, frame: i64, pose: &Pose, score: f64) -> Vec<Option<usize>> {
+        let scores = vec![score; self.edges_px.len()];
         let lifted = LiftedBoxes {
             rows: &self.rows,
             centres_in_camera: &self.centres,

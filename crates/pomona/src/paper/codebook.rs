@@ -1,9 +1,9 @@
 //! The map as codes: which constellation of the map looks most like one of the query, and what it votes for.
 
-use crate::constellation::constellations;
-use crate::descriptor::{Described, describe_all};
-use crate::index::Index;
-use crate::voting::Votes;
+use crate::neighbours::index::Index;
+use crate::paper::constellation::constellations;
+use crate::paper::descriptor::{Described, describe_all};
+use crate::paper::voting::Votes;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::HashSet;

@@ -57,7 +57,7 @@ fn maximum_clique(rows: &[Bits], max_work: u64) -> Clique {
             clique.members.push(alone);
             continue;
         }
-        let mut search = Search::new(rows, &group, max_work.saturating_sub(clique.work));
+        let mut search = CliqueSearch::new(rows, &group, max_work.saturating_sub(clique.work));
         search.run();
         clique.is_maximum &= search.work <= search.max_work;
         clique.work += search.work;
@@ -91,7 +91,7 @@ fn disagreeing_groups(rows: &[Bits]) -> Vec<Vec<usize>> {
 }
 
 /// Branch and bound in one group; vertices are numbered by falling degree.
-struct Search {
+struct CliqueSearch {
     /// Vertex of the whole graph of each number.
     vertices: Vec<usize>,
     rows: Vec<Bits>,
@@ -101,7 +101,7 @@ struct Search {
     max_work: u64,
 }
 
-impl Search {
+impl CliqueSearch {
     fn new(all: &[Bits], group: &[usize], max_work: u64) -> Self {
         let mut vertices = group.to_vec();
         let members = Bits::of(all.len(), group.iter().copied());

@@ -1,8 +1,8 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
 use super::landscape::{Landscape, SHARE_OF_ROWS};
-use super::overlap::Prediction;
-use super::pose::Pose;
+use super::overlap::Landing;
+use super::placement::Placement;
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ const LEAST_RATIO: f64 = 1e-3;
 
 /// One fruit of the query found again, rows of the centred clouds.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Association {
+pub(crate) struct Pairing {
     pub(crate) query: u32,
     pub(crate) map: u32,
     pub(crate) probability: f64,
@@ -67,8 +67,8 @@ impl Marginals {
     pub(crate) fn new(
         query: &Landscape,
         map: &Landscape,
-        predictions: &[Option<Prediction>],
-        pose: &Pose,
+        predictions: &[Option<Landing>],
+        pose: &Placement,
         share: f64,
         size: &(impl Fn(u32, u32) -> f64 + Sync),
     ) -> Self {
@@ -92,14 +92,14 @@ impl Marginals {
     }
 
     /// The one-to-one pairs that gain most expected right answers.
-    pub(crate) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Association> {
+    pub(crate) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Pairing> {
         let both = || self.edges.iter().zip(&self.probabilities);
         let gains: Vec<(usize, usize, f64)> =
             both().map(|(edge, &p)| (edge.query as usize, edge.map as usize, p - min_probability)).collect();
         let partners = assign(n_query, n_map, &gains);
-        let mut pairs: Vec<Association> = both()
+        let mut pairs: Vec<Pairing> = both()
             .filter(|(edge, _)| partners[edge.query as usize] == Some(edge.map as usize))
-            .map(|(edge, &probability)| Association {
+            .map(|(edge, &probability)| Pairing {
                 query: edge.query,
                 map: edge.map,
                 probability,
@@ -116,15 +116,15 @@ impl Marginals {
 fn edges_of(
     query: &Landscape,
     map: &Landscape,
-    predictions: &[Option<Prediction>],
-    pose: &Pose,
+    predictions: &[Option<Landing>],
+    pose: &Placement,
     share: f64,
     size: &(impl Fn(u32, u32) -> f64 + Sync),
 ) -> Vec<Edge> {
     let scale = pose.scale;
     let volume_scale = scale.powi(3);
     let of = |row: usize, edges: &mut Vec<Edge>| {
-        let Some(Prediction { place, variance }) = predictions[row] else { return };
+        let Some(Landing { place, variance }) = predictions[row] else { return };
         let seen = (share * map.support(&place)).max(LEAST_SEEN);
         let first = edges.len();
         let own = query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));

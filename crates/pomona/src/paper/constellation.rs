@@ -1,6 +1,6 @@
 //! Constellations: each fruit with `K - 1` of its `n` nearest neighbours (the paper, section III-C).
 
-use crate::index::Index;
+use crate::neighbours::index::Index;
 use nalgebra::Point3;
 use rayon::prelude::*;
 

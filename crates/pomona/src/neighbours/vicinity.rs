@@ -3,16 +3,16 @@
 //! Poses are weighed by asking, again and again, which fruit of the map is nearest to a place. A place's cell has a
 //! list of all fruits that can be within reach of any place in it, so that no neighbouring cell is asked.
 
-use super::grid::{cell_of, hash};
+use super::cells::{cell_of, hash};
 use nalgebra::Vector3;
 
 /// Lists of the fruits within `reach` of every cell; cells that share a bucket share a list.
 #[derive(Debug, Clone)]
-pub(super) struct Vicinity {
+pub(crate) struct Vicinity {
     inverse_cell: f64,
     mask: u64,
     /// Distance that the lists answer for, metres.
-    pub(super) reach: f64,
+    pub(crate) reach: f64,
     /// Start of each bucket's list in `rows`, one more than there are buckets.
     starts: Vec<u32>,
     rows: Vec<u32>,
@@ -23,7 +23,7 @@ const BUCKETS: usize = 8;
 
 impl Vicinity {
     /// Cells are as large as the reach: smaller ones would have shorter lists, but more of them than a cache holds.
-    pub(super) fn new(points: &[Vector3<f64>], reach: f64) -> Self {
+    pub(crate) fn new(points: &[Vector3<f64>], reach: f64) -> Self {
         let buckets = (BUCKETS * points.len().max(1)).next_power_of_two();
         let (mask, inverse_cell) = (buckets as u64 - 1, 1.0 / reach);
         let mut starts = vec![0u32; buckets + 1];
@@ -48,7 +48,7 @@ impl Vicinity {
 
     /// Rows among which are all fruits within the reach of `place`.
     #[inline]
-    pub(super) fn of(&self, place: &Vector3<f64>) -> &[u32] {
+    pub(crate) fn of(&self, place: &Vector3<f64>) -> &[u32] {
         let bucket = hash(cell_of(place, self.inverse_cell), self.mask);
         &self.rows[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
     }

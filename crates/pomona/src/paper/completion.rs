@@ -1,7 +1,7 @@
 //! Fruits left over find their partner by nearest neighbour after the alignment (the paper, section III-C).
 
 use crate::geometry::Similarity;
-use crate::index::Index;
+use crate::neighbours::index::Index;
 use nalgebra::Point3;
 
 /// Pairs of left-over fruits that are each other's nearest within `reach_m`, by query row.

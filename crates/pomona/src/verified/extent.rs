@@ -7,7 +7,7 @@
 use super::decision::DETECTION;
 use super::hypothesis::{Hypothesis, gaussian};
 use super::landscape::Landscape;
-use super::pose::{Moments, Pose};
+use super::placement::{Moments, Placement};
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -19,7 +19,7 @@ pub(crate) fn hypothesis(
     query: &Landscape,
     map: &Landscape,
     scale: Scale,
-    admits: &impl Fn(&Pose) -> bool,
+    admits: &impl Fn(&Placement) -> bool,
 ) -> Option<Hypothesis> {
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
@@ -34,7 +34,7 @@ pub(crate) fn hypothesis(
         .map(|signs| {
             let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
             let rotation = turned * axes_query.transpose();
-            anneal(query, map, Pose { rotation, translation: Vector3::zeros(), scale: ratio }, scale)
+            anneal(query, map, Placement { rotation, translation: Vector3::zeros(), scale: ratio }, scale)
         })
         .filter(|pose| admits(pose))
         .map(|pose| (pose, fine_structure(query, map, &pose, SCREENING * map.spacing)))
@@ -57,14 +57,14 @@ pub(crate) fn hypothesis(
 ///
 /// In a hedge, a pergola or the skin of a round crown fruits hang denser than the width of a branch tells, and layer
 /// laid on layer gains anywhere. But it gains nearly as much a little aside, along the layer; fruits on fruits do not.
-fn beside(query: &Landscape, pose: &Pose, axes: &Matrix3<f64>, distance: f64) -> impl Iterator<Item = Pose> {
+fn beside(query: &Landscape, pose: &Placement, axes: &Matrix3<f64>, distance: f64) -> impl Iterator<Item = Placement> {
     let directed = (0..3).flat_map(|i| [1.0, -1.0].map(|sign| axes.column(i) * sign));
     directed.flat_map(move |axis| {
         let arm2: f64 = query.points.iter().map(|p| (pose.rotation * p).cross(&axis).norm_squared()).sum();
         let arm = pose.scale * (arm2 / query.len() as f64).sqrt();
         let turn = Rotation3::new(axis * (distance / arm)).into_inner();
-        let shifted = Pose { translation: pose.translation + axis * distance, ..*pose };
-        [shifted, Pose { rotation: turn * pose.rotation, ..*pose }]
+        let shifted = Placement { translation: pose.translation + axis * distance, ..*pose };
+        [shifted, Placement { rotation: turn * pose.rotation, ..*pose }]
     })
 }
 
@@ -101,7 +101,7 @@ fn middle(cloud: &Landscape) -> Vector3<f64> {
     cloud.points.iter().copied().min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared())).unwrap_or_default()
 }
 
-fn anneal(query: &Landscape, map: &Landscape, start: Pose, scale: Scale) -> Pose {
+fn anneal(query: &Landscape, map: &Landscape, start: Placement, scale: Scale) -> Placement {
     let mut pose = start;
     for width in ANNEALING {
         let sigma = width * map.spacing;
@@ -127,7 +127,7 @@ fn anneal(query: &Landscape, map: &Landscape, start: Pose, scale: Scale) -> Pose
 }
 
 /// The noise under which the fine structure speaks most for the pose, and what it says, nats.
-fn sharpest(query: &Landscape, map: &Landscape, pose: &Pose) -> (f64, f64) {
+fn sharpest(query: &Landscape, map: &Landscape, pose: &Placement) -> (f64, f64) {
     SIGMAS
         .iter()
         .map(|&share| (share * map.spacing, fine_structure(query, map, pose, share * map.spacing)))
@@ -137,7 +137,7 @@ fn sharpest(query: &Landscape, map: &Landscape, pose: &Pose) -> (f64, f64) {
 
 /// Whether fruits line up, given that crowns do: the density of the map's fruits at the width of the noise against
 /// that at the width of a branch. Under a pose that lays crown on crown by chance the expectation is below zero.
-fn fine_structure(query: &Landscape, map: &Landscape, pose: &Pose, sigma: f64) -> f64 {
+fn fine_structure(query: &Landscape, map: &Landscape, pose: &Placement, sigma: f64) -> f64 {
     let variance = sigma * sigma;
     let wide = WIDE * map.spacing * WIDE * map.spacing + variance;
     query

@@ -1,26 +1,36 @@
 //! The paper's method, whole clouds and frame by frame (the paper, section III-C).
 //!
-//! 1. Constellations of the query find the nearest code of the map ([`crate::codebook`]).
-//! 2. Each votes for its fruit pairs ([`crate::voting`]); an assignment makes them one to one ([`crate::assignment`]).
-//! 3. RANSAC and Procrustes find the transform that most pairs agree on ([`crate::ransac`]).
-//! 4. Fruits left over are paired with their nearest neighbour after the alignment ([`crate::completion`]).
-//! 5. A maximum clique keeps the pairs whose distances agree in both clouds ([`crate::clique`]).
+//! 1. Constellations of the query find the nearest code of the map ([`mod@codebook`]).
+//! 2. Each votes for its fruit pairs ([`voting`]); an assignment makes them one to one ([`crate::assignment`]).
+//! 3. RANSAC and Procrustes find the transform that most pairs agree on ([`mod@ransac`]).
+//! 4. Fruits left over are paired with their nearest neighbour after the alignment ([`completion`]).
+//! 5. A maximum clique keeps the pairs whose distances agree in both clouds ([`clique`]).
 //!
 //! Frame by frame, each frame's fruits go through these steps alone and get a transform of their own, because no single
 //! rigid transform fits a long row; an assignment by the number of frames that saw a pair merges them.
 
+pub mod clique;
+pub mod codebook;
+pub mod completion;
+pub mod constellation;
+pub mod descriptor;
+mod pair_odds;
+pub mod ransac;
+pub mod voting;
+
+use self::clique::{Tolerance, largest_consistent};
+use self::codebook::{Ballot, Codebook, codebook};
+use self::completion::complete;
+use self::pair_odds::PairOdds;
+use self::ransac::ransac;
+use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::assignment::assign;
-use crate::clique::{Tolerance, largest_consistent};
 use crate::cloud::FruitCloud;
-use crate::codebook::{Ballot, Codebook, codebook};
-use crate::completion::complete;
 use crate::config::{CLUSTER_SPACING_M, Config, PaperConfig};
 use crate::error::{Error, Result};
-use crate::evidence::Evidence;
 use crate::geometry::{Scale, Similarity};
-use crate::index::Index;
-use crate::matching::{Match, Pair, Registration, Request, Verdict};
-use crate::ransac::ransac;
+use crate::matching::Request;
+use crate::neighbours::index::Index;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -30,12 +40,12 @@ const MAX_CONSTELLATIONS: usize = 100_000_000;
 
 /// A map prepared for many queries.
 #[derive(Debug)]
-pub(crate) struct Prepared {
+pub(crate) struct PaperMap {
     fruits: Ordered,
     codes: Box<dyn Codebook>,
     /// Median distance of a fruit from its nearest neighbour, metres.
     spacing_m: f64,
-    evidence: Evidence,
+    evidence: PairOdds,
 }
 
 /// Fruits ordered by place, so that the order of the input rows cannot touch the answer.
@@ -75,12 +85,12 @@ struct Local {
     map_from_query: Option<Similarity>,
     /// Pairs kept by the clique, with their distance after the alignment.
     pairs: Vec<(usize, usize, f64)>,
-    counts: Counts,
+    counts: StageCounts,
 }
 
 /// Counts of the stages, summed over views.
 #[derive(Debug, Clone, Copy, Default)]
-struct Counts {
+struct StageCounts {
     constellations: usize,
     assigned: usize,
     samples: usize,
@@ -91,7 +101,7 @@ struct Counts {
     cut_short: usize,
 }
 
-impl std::ops::Add for Counts {
+impl std::ops::Add for StageCounts {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self {
@@ -106,7 +116,7 @@ impl std::ops::Add for Counts {
     }
 }
 
-impl Prepared {
+impl PaperMap {
     /// # Errors
     /// Where the map gives more constellations than memory should hold.
     pub(crate) fn new(map: &[Point3<f64>], config: &Config) -> Result<Self> {
@@ -115,7 +125,7 @@ impl Prepared {
         let codes = codebook(&fruits.positions, config.constellation.k, config.constellation.n);
         let tree = Index::new(fruits.positions.iter().map(|p| [p.x, p.y, p.z]).collect());
         let spacing_m = median_spacing(&tree);
-        Ok(Self { codes, spacing_m, evidence: Evidence::new(tree), fruits })
+        Ok(Self { codes, spacing_m, evidence: PairOdds::new(tree), fruits })
     }
 
     /// Matches a query cloud; `request.up` is not used by this method.
@@ -133,7 +143,7 @@ impl Prepared {
             .zip(&ballots)
             .map(|(view, ballot)| self.solve(&fruits, view, ballot, request.scale, &lengths))
             .collect();
-        let counts = locals.iter().fold(Counts::default(), |sum, local| sum + local.counts);
+        let counts = locals.iter().fold(StageCounts::default(), |sum, local| sum + local.counts);
         let mut stages = vec![
             ("views", views.len() as f64),
             ("map constellations", self.codes.len() as f64),
@@ -182,7 +192,7 @@ impl Prepared {
         let mut partners = assign(query.positions.len(), map.len(), &gains);
         let assigned: Vec<_> = partners.iter().enumerate().filter_map(|(q, m)| Some((q, (*m)?))).collect();
         let mut counts =
-            Counts { constellations: ballot.constellations, assigned: assigned.len(), ..Counts::default() };
+            StageCounts { constellations: ballot.constellations, assigned: assigned.len(), ..StageCounts::default() };
         let ends = |pairs: &[(usize, usize)]| -> (Vec<_>, Vec<_>) {
             pairs.iter().map(|&(q, m)| (query.positions[q], map[m])).unzip()
         };
@@ -245,7 +255,7 @@ impl Prepared {
         stages: Vec<(&'static str, f64)>,
     ) -> Match {
         let distances: Vec<_> = merged.iter().map(|pair| pair.2).collect();
-        let noise_m = request.noise_m.unwrap_or_else(|| Evidence::noise_per_axis(&distances));
+        let noise_m = request.noise_m.unwrap_or_else(|| PairOdds::noise_per_axis(&distances));
         let mut log_odds = 0.0;
         let mut pairs: Vec<_> = merged
             .iter()
@@ -275,7 +285,7 @@ fn views_of(query: &FruitCloud, fruits: &Ordered, request: &Request) -> Result<V
     }
     let Some(views) = &query.views else {
         let reason = "the query does not know which frame saw which fruit".to_owned();
-        return Err(Error::Setting { name: "per_frame", reason });
+        return Err(Error::Request { name: "per_frame", reason });
     };
     Ok(views.by_frame().iter().map(|(_, rows)| fruits.places(rows)).collect())
 }
@@ -303,15 +313,12 @@ fn median_spacing(tree: &Index<3>) -> f64 {
     nearest.get(nearest.len() / 2).copied().unwrap_or(CLUSTER_SPACING_M)
 }
 
-fn check_size(what: &str, n_fruits: usize, config: &Config) -> Result<()> {
+fn check_size(whose: &'static str, n_fruits: usize, config: &Config) -> Result<()> {
     let (k, n) = (config.constellation.k, config.constellation.n.min(n_fruits.saturating_sub(1)));
     let per_fruit = (0..k - 1).fold(1, |product, i| product * n.saturating_sub(i) / (i + 1));
     let most = n_fruits.saturating_mul(per_fruit);
     if most <= MAX_CONSTELLATIONS {
         return Ok(());
     }
-    let reason = format!(
-        "the {n_fruits} fruits of the {what} give up to {most} constellations, expected at most {MAX_CONSTELLATIONS}"
-    );
-    Err(Error::Setting { name: "constellation.n", reason })
+    Err(Error::TooManyConstellations { whose, fruits: n_fruits, found: most, most: MAX_CONSTELLATIONS })
 }

@@ -1,4 +1,4 @@
-//! Exact neighbour search among points in space: a balanced k-d tree with bucket leaves.
+//! Search among fruits in single precision: a balanced k-d tree with bucket leaves, visited in an order that is its own.
 
 /// A k-d tree over points in single precision.
 ///

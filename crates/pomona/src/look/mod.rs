@@ -16,7 +16,7 @@ const PLACES: [usize; 2] = [12, 8];
 
 /// What the boxes of one picture look like.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Appearance {
+pub struct Look {
     /// Per box: mean probability that the colour of a pixel in its ellipse is fruit. 0 of a box without a pixel.
     pub fruitness: Vec<f64>,
     /// Per box: pixels whose colour is rather fruit.
@@ -26,17 +26,17 @@ pub struct Appearance {
 }
 
 /// Looks at the boxes (xmin, ymin, xmax, ymax) of a picture.
-pub fn appearance(picture: Picture, boxes_px: &[[f64; 4]]) -> Appearance {
+pub fn look_of(picture: Picture, boxes_px: &[[f64; 4]]) -> Look {
     let (width, height) = (picture.width(), picture.height());
     let boxes: Vec<_> = boxes_px.iter().map(|&one| PixelBox::new(one, 0, width, height)).collect();
     if boxes.is_empty() {
-        return Appearance::default();
+        return Look::default();
     }
     let colours = FruitColour::new(picture, &boxes);
     let seen = |one: &PixelBox| fruitness(picture, one, &colours);
     let (means, pixels) = boxes.iter().map(seen).unzip();
     let elsewhere = places_without(&boxes, width, height).iter().map(|one| seen(one).0).collect();
-    Appearance { fruitness: means, fruit_px: pixels, elsewhere }
+    Look { fruitness: means, fruit_px: pixels, elsewhere }
 }
 
 /// Mean probability of being fruit in the ellipse of a box, and the pixels that rather are.
@@ -101,7 +101,7 @@ mod tests {
         let values = scene(&fruits);
         let mut boxes: Vec<_> = fruits.iter().map(|one| one.map(|edge| edge as f64)).collect();
         boxes.push([100.0, 120.0, 120.0, 140.0]);
-        let found = appearance(Picture::new(&values, 320), &boxes);
+        let found = look_of(Picture::new(&values, 320), &boxes);
         let leaves = found.elsewhere.iter().copied().fold(0.0, f64::max);
         assert!(found.fruitness[..8].iter().all(|&one| one > 0.9), "{:?}", found.fruitness);
         assert!(found.fruitness[8] < leaves + 0.15 && leaves < 0.4, "{:?} {leaves}", found.fruitness[8]);
@@ -110,6 +110,6 @@ mod tests {
 
     #[test]
     fn a_picture_without_boxes_says_nothing() {
-        assert_eq!(appearance(Picture::new(&scene(&[]), 320), &[]), Appearance::default());
+        assert_eq!(look_of(Picture::new(&scene(&[]), 320), &[]), Look::default());
     }
 }

@@ -1,12 +1,13 @@
-//! Counts per second of the stages that run most: `throughput QUERY MAP`, two files of `x y z` lines in metres.
+//! Counts per second of the stages that run most: `cargo bench -p pomona --bench throughput -- QUERY MAP`, two files of
+//! `x y z` lines in metres.
 //!
 //! Prints JSON: constellations of the map formed and described per second, nearest codes of the query found in the
 //! map's index per second. One thread, the fastest of some repetitions.
 
 use nalgebra::Point3;
-use pomona::constellation::constellations;
-use pomona::descriptor::{Described, describe_all};
-use pomona::index::Index;
+use pomona::neighbours::index::Index;
+use pomona::paper::constellation::constellations;
+use pomona::paper::descriptor::{Described, describe_all};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -14,7 +15,8 @@ const REPETITIONS: usize = 7;
 const NEIGHBOURS: usize = 10;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let paths: Vec<String> = std::env::args().skip(1).collect();
+    // Cargo adds `--bench`.
+    let paths: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let [query, map] = &paths[..] else { return Err("expected two files of x y z lines".into()) };
     let (query, map) = (read(query)?, read(map)?);
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;

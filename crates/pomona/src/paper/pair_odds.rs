@@ -1,6 +1,6 @@
 //! What a distance after the alignment says: the same fruit, or a stranger that hangs there by chance.
 
-use crate::index::Index;
+use crate::neighbours::index::Index;
 use nalgebra::Point3;
 use std::f64::consts::PI;
 
@@ -13,11 +13,11 @@ const MEDIAN_OF_CHI_3: f64 = 1.538_172_254_5;
 
 /// The map's local density.
 #[derive(Debug)]
-pub(crate) struct Evidence {
+pub(crate) struct PairOdds {
     fruits: Index<3>,
 }
 
-impl Evidence {
+impl PairOdds {
     pub(crate) fn new(fruits: Index<3>) -> Self {
         Self { fruits }
     }
@@ -48,7 +48,7 @@ mod tests {
     #[test]
     fn near_is_the_same_and_far_a_stranger() {
         let lattice = (0..1000).map(|i| [i % 10, i / 10 % 10, i / 100].map(|x| 0.2 * f64::from(x))).collect();
-        let evidence = Evidence::new(Index::new(lattice));
+        let evidence = PairOdds::new(Index::new(lattice));
         let middle = Point3::new(1.0, 1.0, 1.0);
         assert!(evidence.odds(&middle, 0.02, 0.02) > 10.0);
         assert!(evidence.odds(&middle, 0.12, 0.02) < 0.1);
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn noise_is_read_from_the_median() {
         let distances: Vec<_> = [0.02, 0.03, 0.04].map(|d| d * MEDIAN_OF_CHI_3).to_vec();
-        assert!((Evidence::noise_per_axis(&distances) - 0.03).abs() < 1e-12);
-        assert!(Evidence::noise_per_axis(&[]).is_nan());
+        assert!((PairOdds::noise_per_axis(&distances) - 0.03).abs() < 1e-12);
+        assert!(PairOdds::noise_per_axis(&[]).is_nan());
     }
 }

@@ -5,13 +5,13 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// `map = scale * rotation * query + translation`, both clouds about their own centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pose {
+pub(crate) struct Placement {
     pub(crate) rotation: Matrix3<f64>,
     pub(crate) translation: Vector3<f64>,
     pub(crate) scale: f64,
 }
 
-impl Pose {
+impl Placement {
     pub(crate) fn identity() -> Self {
         Self { rotation: Matrix3::identity(), translation: Vector3::zeros(), scale: 1.0 }
     }
@@ -58,7 +58,7 @@ impl Pose {
         cosine.clamp(-1.0, 1.0).acos()
     }
 
-    /// Pose in the clouds' own frames.
+    /// Placement in the clouds' own frames.
     pub(crate) fn to_similarity(self, centre_query: &Vector3<f64>, centre_map: &Vector3<f64>) -> Similarity {
         let mut rotation = Rotation3::from_matrix_unchecked(self.rotation);
         rotation.renormalize();
@@ -66,7 +66,7 @@ impl Pose {
         Similarity { rotation, translation, scale: self.scale }
     }
 
-    /// The reverse of [`Pose::to_similarity`].
+    /// The reverse of [`Placement::to_similarity`].
     pub(crate) fn from_similarity(t: &Similarity, centre_query: &Vector3<f64>, centre_map: &Vector3<f64>) -> Self {
         Self {
             rotation: *t.rotation.matrix(),
@@ -135,7 +135,7 @@ impl Moments {
     /// Minimises the sum of w |m - s exp(w x) R q - t|^2 to first order in the turn: three linear equations instead
     /// of a singular value decomposition. `prior` (inverse variance in units of one pair's weight over square metres)
     /// holds the turn at `start` where the pairs do not fix it.
-    pub(crate) fn step(&self, start: &Pose, scale: Scale, prior: f64) -> Option<Pose> {
+    pub(crate) fn step(&self, start: &Placement, scale: Scale, prior: f64) -> Option<Placement> {
         if self.weight <= 0.0 {
             return None;
         }
@@ -157,7 +157,7 @@ impl Moments {
             Scale::Metric => start.scale,
             Scale::Free => (cross * rotation.transpose()).trace() / square.trace(),
         };
-        (scale > 0.0 && scale.is_finite()).then(|| Pose {
+        (scale > 0.0 && scale.is_finite()).then(|| Placement {
             rotation,
             translation: mean_map - rotation * mean_query * scale,
             scale,
@@ -178,7 +178,7 @@ mod tests {
             shift in prop::array::uniform3(-1.0..1.0f64),
             scale in 0.7..1.4f64,
         ) {
-            let truth = Pose {
+            let truth = Placement {
                 rotation: Rotation3::new(Vector3::from(turn)).into_inner(),
                 translation: Vector3::from(shift),
                 scale,
@@ -188,7 +188,7 @@ mod tests {
                 let p = Vector3::from(*p);
                 moments.add(&p, &truth.apply(&p), 1.0);
             }
-            let mut pose = Pose { rotation: Matrix3::identity(), translation: Vector3::zeros(), scale: 1.0 };
+            let mut pose = Placement { rotation: Matrix3::identity(), translation: Vector3::zeros(), scale: 1.0 };
             for _ in 0..30 {
                 pose = moments.step(&pose, Scale::Free, 0.0).expect("random points span space");
             }

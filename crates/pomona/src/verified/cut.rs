@@ -1,10 +1,8 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
-use super::grid::CellHasher;
-use super::pose::{Moments, Pose};
+use super::placement::{Moments, Placement};
+use crate::neighbours::cells::CellMap;
 use nalgebra::Vector3;
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
 /// Fruits that share one pose.
@@ -16,7 +14,7 @@ pub(crate) struct Cell {
     pub(super) around: Arc<[(u32, f64)]>,
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
-    pub(super) pose: Pose,
+    pub(super) pose: Placement,
     /// Whether growth has come here.
     pub(super) reached: bool,
     pub(super) log_odds: f64,
@@ -37,7 +35,7 @@ pub(super) fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
 }
 
 /// Number of the cell at each place of the grid.
-pub(super) type CellIndex = HashMap<[i64; 3], usize, BuildHasherDefault<CellHasher>>;
+pub(super) type CellIndex = CellMap<usize>;
 
 pub(super) fn key_of(p: &Vector3<f64>, edge: f64) -> [i64; 3] {
     [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
@@ -82,7 +80,7 @@ impl Cut {
                 rows: rows.into(),
                 around: around(&index, &keys[i], &centres, &centres[i], edge),
                 moments: Moments::default(),
-                pose: Pose::identity(),
+                pose: Placement::identity(),
                 reached: false,
                 log_odds: 0.0,
             })

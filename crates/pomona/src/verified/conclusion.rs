@@ -1,12 +1,12 @@
 //! The answer to a query: the best finding settled, its pairs, its rivals.
 
-use super::association::Association;
 use super::decision::{Finding, Search, Stages};
 use super::overlap::Overlap;
+use super::pairing::Pairing;
 use super::settlement::{Settled, settle};
-use super::size::Sizes;
+use super::size::Diameters;
+use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::cloud::FruitCloud;
-use crate::matching::{Match, Pair, Registration, Verdict};
 
 impl Search<'_> {
     /// The best finding settled; `NoMatch` where its pairs say less than `least_told`, nats.
@@ -22,7 +22,7 @@ impl Search<'_> {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
         let best = findings.remove(0);
-        let sizes = Sizes::new(query, map, self.query, self.map);
+        let sizes = Diameters::new(query, map, self.query, self.map);
         let Settled { overlap, marginals } = settle(&best.growth, self.noise_m, sizes.as_ref());
         if let Some(least) = least_told {
             let told = marginals.told();
@@ -51,7 +51,7 @@ impl Search<'_> {
     }
 
     /// Pairs in the rows of the clouds, in the order of the query.
-    fn in_rows(&self, pairs: &[Association]) -> Vec<Pair> {
+    fn in_rows(&self, pairs: &[Pairing]) -> Vec<Pair> {
         let mut pairs: Vec<Pair> = pairs
             .iter()
             .map(|pair| Pair {

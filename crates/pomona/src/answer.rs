@@ -1,0 +1,65 @@
+//! What a match gives: a verdict, a registration, pairs.
+
+use crate::geometry::Similarity;
+
+/// What a match says. All four are results, none is an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// One registration stands out and its pairs are reported.
+    Found,
+    /// Fewer fruits than a constellation needs.
+    TooFew,
+    /// Several different registrations explain the clouds equally well; they are reported as alternatives.
+    Ambiguous,
+    /// No registration explains the clouds better than chance.
+    NoMatch,
+}
+
+/// One fruit found again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// Row in the query.
+    pub query: usize,
+    /// Row in the map.
+    pub map: usize,
+    /// Probability that the two are one fruit. Paper: of the residual under the noise, against a stranger at the density of
+    /// fruits about it.
+    pub probability: f64,
+    /// Distance after the registration that the pair belongs to, metres of the map.
+    pub distance_m: f64,
+    /// What speaks for the pair: votes of constellations (paper) or log-odds in nats (verified).
+    pub support: f64,
+}
+
+/// A registration with its evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Registration {
+    /// Takes points of the query into the map.
+    pub map_from_query: Similarity,
+    /// Evidence against chance, nats. Paper: log-odds of the pairs' residuals, summed over pairs.
+    pub log_odds: f64,
+}
+
+/// The answer to one query.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Match {
+    /// What the match says.
+    pub verdict: Verdict,
+    /// The registration; `None` for `TooFew` and `NoMatch`.
+    pub registration: Option<Registration>,
+    /// Other registrations as good as the first; empty unless `Ambiguous`.
+    pub alternatives: Vec<Registration>,
+    /// Fruits found again, sorted by query row; one to one.
+    pub pairs: Vec<Pair>,
+    /// Relative noise per axis in metres, as given or as estimated; NaN where nothing was found.
+    pub noise_m: f64,
+    /// What happened, stage by stage: name and count, for `--explain`.
+    pub stages: Vec<(&'static str, f64)>,
+}
+
+impl Match {
+    /// A result without a registration.
+    pub(crate) fn without_answer(verdict: Verdict, stages: Vec<(&'static str, f64)>) -> Self {
+        Self { verdict, registration: None, alternatives: Vec::new(), pairs: Vec::new(), noise_m: f64::NAN, stages }
+    }
+}
