@@ -119,7 +119,7 @@ def scan(
     if json:
         say_json(found)
     else:
-        say(*scan_output.as_lines(found))
+        say(*scan_output.as_lines(found, survey))
     if survey.stopped is not None:
         raise typer.Exit(INTERRUPTED)
 
