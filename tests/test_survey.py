@@ -273,6 +273,18 @@ def test_where_the_track_breaks_a_new_session_begins(pomona, shared_data, tmp_pa
     assert f"row-part1.gpkg: frames 0 to 5, {len(first.cloud)} fruits\n" in printed
 
 
+def test_odometry_reads_no_poses_that_it_overrides(pomona, shared_data, tmp_path):
+    stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
+    code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "bare.csv")
+    assert code == 0, told
+    (tmp_path / "2024-08-09" / "poses_tum.txt").write_text("0.0 1 2\nnonsense\n")
+    found = ("--odometry", "--poses", tmp_path / "no.tum")
+    code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "found.csv", *found)
+    assert code == 0, told
+    assert "no times of frames are taken from there" in told
+    assert (tmp_path / "found.csv").read_bytes() == (tmp_path / "bare.csv").read_bytes()
+
+
 def test_depth_can_be_measured_otherwise(pomona, shared_data, tmp_path):
     stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
     clouds = {}
