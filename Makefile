@@ -5,6 +5,8 @@ RUN = $(UV) run --frozen
 UV_VERSION = 0.13.8
 FUZZ_SECONDS ?= 600
 FUZZ_SEED ?= 1
+# A panic names its source file: in a wheel without the folders of who built it.
+NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
 
 .DEFAULT_GOAL := help
 .PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit wheel docs clean help
@@ -57,7 +59,7 @@ audit: install ## licences of all dependencies, and advisories as far as they ca
 	$(RUN) python -m audit
 
 wheel: install ## a wheel for others, into dist/, looked at before it is called done
-	$(RUN) maturin build --release --locked --out dist
+	RUSTFLAGS="$(NAMELESS)" $(RUN) maturin build --release --locked --out dist
 	$(RUN) python -m audit.wheel dist
 
 docs: $(UV) ## the documentation site, into site/

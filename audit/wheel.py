@@ -20,7 +20,13 @@ def faults(wheel: Path) -> list[str]:
         sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
         about = next((name for name in sizes if name.endswith(".dist-info/METADATA")), None)
         text = "" if about is None else archive.read(about).decode("utf-8")
-    return [*_of_extension(sizes), *_of_metadata(text), *_of_files(sizes)]
+        told = [name for name in sizes if any(folder in archive.read(name) for folder in _own_folders())]
+    named = [f"{name}: names a folder of who built it" for name in told]
+    return [*_of_extension(sizes), *_of_metadata(text), *_of_files(sizes), *named]
+
+
+def _own_folders() -> list[bytes]:
+    return [f"{folder}/".encode() for folder in (Path.home(), Path(__file__).parents[1])]
 
 
 def _of_extension(sizes: dict[str, int]) -> list[str]:

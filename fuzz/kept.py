@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ def seeds() -> list[bytes]:
 def _see(frame: Frame) -> Look:
     boxes = Detections(np.array([[1.0, 2, 3, 4], [2, 2, 5, 6]]), np.array([0.9, 0.5]), ("a", "b"))
     ones = np.ones(2)
-    lifted = Lifted(np.arange(2), np.ones((2, 3)), np.stack([np.eye(3)] * 2), ones, ones, ones, ones, Counter())
+    lifted = Lifted(np.arange(2), np.ones((2, 3)), np.stack([np.eye(3)] * 2), ones, ones, ones, ones, {})
     return Look(frame.number, boxes, lifted, None)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -332,6 +333,20 @@ def test_a_broken_euroc_folder_is_refused(euroc, file, text, parts):
 def test_euroc_needs_both_cameras(euroc):
     shutil.rmtree(euroc / "mav0" / "cam1")
     refused(euroc, "cam1", "not found")
+
+
+@pytest.mark.parametrize(
+    ("layout", "poses"),
+    [("kitti", "poses.txt"), ("tum", "groundtruth.txt"), ("euroc", "mav0/state_groundtruth_estimate0/data.csv")],
+)
+def test_poses_that_nobody_wants_may_be_broken(request, layout, poses):
+    folder = request.getfixturevalue(layout)
+    (folder / poses).write_text("1 2 nonsense\n")
+    refused(folder, Path(poses).name)
+    opened = open_recording(folder, own_poses=False)
+    assert opened.trajectory is None
+    assert next(opened.frames()).session_from_camera is None
+    assert folder / poses not in set(opened.inputs())
 
 
 def test_what_is_accepted_is_listed(tmp_path):

@@ -115,3 +115,61 @@ def test_what_holds_no_poses_is_refused(video, tmp_path, text, parts):
 def test_poses_that_are_not_there(video, tmp_path):
     with pytest.raises(PomonaError, match=r"none\.txt: not found"):
         open_recording(video, poses=tmp_path / "none.txt")
+
+
+def test_times_in_whole_milliseconds_are_those_of_the_pictures(tmp_path):
+    write_calibration(tmp_path)
+    video = write_video(tmp_path / "row.mkv")
+    poses = tmp_path / "poses.txt"
+    poses.write_text("".join(f"{at_s + 0.001:.3f} {at_s} 0 0 0 0 0 1\n" for at_s in np.arange(12) / 10))
+    recording = open_recording(video, poses=poses)  # the first pose is a millisecond after the first picture
+    assert recording.numbers == tuple(range(12))
+    np.testing.assert_allclose(recording.trajectory.session_from_camera[:, 0, 3], np.arange(12) / 10, atol=0.002)
+    poses.write_text("".join(f"{at_s} {at_s} 0 0 0 0 0 1\n" for at_s in (0.0, 0.4, 0.8)))  # no two of them 0.1 s apart
+    with pytest.warns(PomonaWarning, match="9 of 12 frames have no pose within 0.1 s"):
+        assert open_recording(video, poses=poses).numbers == (0, 4, 8)
+
+
+def test_a_folder_with_times_takes_its_own_poses_by_time(tmp_path):
+    folder = make_recording(tmp_path / "folder", (0.0, 0.1, 0.2, 0.3), poses=False)
+    write_tum(folder / "poses_tum.txt", np.arange(1.05, 1.26, 0.05))
+    with pytest.raises(PomonaError, match=r"found 5 poses, expected one for each of the 4 frames, or .* times\.txt"):
+        open_recording(folder)
+    (folder / "times.txt").write_text("1.0\n1.1\n1.2\n1.3\n")
+    with pytest.warns(PomonaWarning, match=r"poses_tum\.txt: 2 of 4 frames have no pose within 0.1 s"):
+        recording = open_recording(folder)
+    assert [(frame.number, frame.time_s) for frame in recording.frames()] == [(1, 1.1), (2, 1.2)]
+    np.testing.assert_allclose(recording.trajectory.session_from_camera, [pose(1.1), pose(1.2)], atol=1e-6)
+    assert {folder / "times.txt", folder / "poses_tum.txt"} <= set(recording.inputs())
+
+
+BROKEN = "0.0 1 2\n0.1 nonsense\n"
+
+
+def test_nothing_is_read_of_poses_that_are_overridden(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", (0.0, 0.1, 0.2))
+    (folder / "poses_tum.txt").write_text(BROKEN)
+    other = write_tum(tmp_path / "other.tum", [0.0, 0.1, 0.2])
+    code, _, told = pomona("scan", folder, "-o", tmp_path / "own.csv")
+    assert (code, "line 1: found 3 numbers" in told) == (2, True)
+    code, _, told = pomona("scan", folder, "-o", tmp_path / "given.csv", "--poses", other)
+    assert code == 0, told
+    assert f"{folder / 'poses_tum.txt'}: times: found 2 numbers, expected 3" in told
+
+
+def test_times_of_poses_that_are_overridden_are_still_those_of_the_frames(tmp_path):
+    folder = make_recording(tmp_path / "row", (0.0, 0.1, 0.2))
+    with pytest.warns(PomonaWarning, match="1 of 3 frames have no pose"):
+        recording = open_recording(folder, poses=write_tum(tmp_path / "other.tum", [0.1, 0.2]))
+    assert recording.numbers == (1, 2)
+    assert folder / "poses_tum.txt" not in set(recording.inputs())
+    (folder / "poses_tum.txt").unlink()
+    with pytest.raises(PomonaError, match="found 2 poses, expected one for each of the 3 frames"):
+        open_recording(folder, poses=tmp_path / "other.tum")
+
+
+def test_a_bag_opens_without_its_poses(tmp_path):
+    bag = write_bag(tmp_path / "row", stereo(4), "mcap")
+    opened = open_recording(bag, own_poses=False)
+    assert (opened.trajectory, len(opened)) == (None, 4)
+    assert "poses=none" in str(opened.description()["topics"])

@@ -273,6 +273,18 @@ def test_where_the_track_breaks_a_new_session_begins(pomona, shared_data, tmp_pa
     assert f"row-part1.gpkg: frames 0 to 5, {len(first.cloud)} fruits\n" in printed
 
 
+def test_odometry_reads_no_poses_that_it_overrides(pomona, shared_data, tmp_path):
+    stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
+    code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "bare.csv")
+    assert code == 0, told
+    (tmp_path / "2024-08-09" / "poses_tum.txt").write_text("0.0 1 2\nnonsense\n")
+    found = ("--odometry", "--poses", tmp_path / "no.tum")
+    code, _, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "found.csv", *found)
+    assert code == 0, told
+    assert "no times of frames are taken from there" in told
+    assert (tmp_path / "found.csv").read_bytes() == (tmp_path / "bare.csv").read_bytes()
+
+
 def test_depth_can_be_measured_otherwise(pomona, shared_data, tmp_path):
     stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
     clouds = {}
@@ -294,3 +306,18 @@ def test_letters_of_the_preview_are_legible_whatever_the_size(size_px):
     (_, letter_px), _ = cv2.getTextSize("7", cv2.FONT_HERSHEY_SIMPLEX, 0.38 * lettering(height_px), 1)
     assert letter_px >= 8
     assert 1 / 100 <= letter_px / height_px <= 1 / 50
+
+
+def test_the_table_adds_up_and_is_in_the_json_too(pomona, shared_data, tmp_path):
+    stereo_row(shared_data, tmp_path / "2024-08-09", range(6))
+    boxes = tmp_path / "2024-08-09" / "detections.csv"
+    lines = boxes.read_text().splitlines()
+    boxes.write_text("\n".join([*lines, "3,10,10,40,40", "3,600,1,620,21"]) + "\n")
+    code, printed, told = pomona("scan", tmp_path / "2024-08-09", "-o", tmp_path / "row.csv", "--json")
+    assert code == 0, told
+    found = json.loads(printed)
+    assert sum(found["boxes"].values()) == found["n_boxes"] == len(lines) + 1
+    assert sum(found["tracks"].values()) == found["n_tracks"]
+    assert found["tracks"]["fruit"] == found["n_fruits"] > 10
+    assert found["boxes"]["fruit"] < found["n_boxes"]
+    assert len(found["tracks"]) > 1

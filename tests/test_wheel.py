@@ -38,6 +38,8 @@ def test_a_good_wheel_has_no_faults(tmp_path: Path) -> None:
         ({"pomona/_core.abi3.so": None}, "found no compiled core"),
         ({"pomona/py.typed": None}, "found no pomona/py.typed"),
         ({"pomona-0.1.0.dist-info/METADATA": b"Author: us\n"}, "METADATA: found no Classifier"),
+        ({"pomona/_core.abi3.so": f"\0{Path.home()}/.cargo/a.rs".encode()}, "names a folder of who built it"),
+        ({"pomona-0.1.0.dist-info/a.json": f"file://{ROOT}/crates".encode()}, "a.json: names a folder"),
     ],
 )
 def test_what_is_wrong_with_a_wheel_is_told(tmp_path: Path, changed: dict[str, bytes | None], said: str) -> None:

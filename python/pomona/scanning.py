@@ -156,7 +156,7 @@ def scan(
         require_outputs([Output(path, SCANNED) for path in (target, *parts_there(target))], [])
     require_date(date)
     ready = prepared(
-        open_recording(recording) if isinstance(recording, str | Path) else recording,
+        open_recording(recording, own_poses=not odometry) if isinstance(recording, str | Path) else recording,
         detections=None if detections is None else Path(detections),
         model=None if model is None else Path(model),
         outputs=[] if target is None else [target],

@@ -87,7 +87,9 @@ def scan(
     require_date(date)
     overrides = Settings.load(config, {}).overrides
     chosen = None if topics is None else parsed_topics(topics)
-    whole = open_recording(recording, calibration=calibration, topics=chosen, poses=poses)
+    # What is overridden is not read.
+    given = None if odometry else poses
+    whole = open_recording(recording, calibration=calibration, topics=chosen, poses=given, own_poses=not odometry)
     _require_drawable(whole, preview)
     ready = prepared(
         whole,
@@ -119,7 +121,7 @@ def scan(
     if json:
         say_json(found)
     else:
-        say(*scan_output.as_lines(found))
+        say(*scan_output.as_lines(found, survey))
     if survey.stopped is not None:
         raise typer.Exit(INTERRUPTED)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pomona.cli.terminal import tell
 
 if TYPE_CHECKING:
+    from collections import Counter
     from collections.abc import Mapping
     from pathlib import Path
     from typing import Any
@@ -60,6 +61,9 @@ def summary(recording: Recording, survey: Survey, written: Mapping[int, Path]) -
         "stopped_after_frame": survey.stopped,
         "n_boxes": survey.detections,
         "n_refused": {reason.value: count for reason, count in sorted(survey.refused.items())},
+        "boxes": {fate.name.lower(): count for fate, count in sorted(survey.tally.boxes.items())},
+        "n_tracks": survey.tally.tracks.total(),
+        "tracks": {fate.name.lower(): count for fate, count in sorted(survey.tally.tracks.items())},
         "n_fruits": sum(len(part.cloud) for part in survey.parts),
         "parts": [_of_part(part, written.get(number)) for number, part in enumerate(survey.parts)],
         "median_diameter_mm": float(1000 * np.median(diameters_m)) if len(diameters_m) else None,
@@ -77,15 +81,22 @@ def _of_part(part: Part, path: Path | None) -> dict[str, Any]:
     }
 
 
-def as_lines(found: dict[str, Any]) -> list[str]:
-    """Say the same in words."""
+def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
+    """Say the same in words, with a table of what became of boxes and tracks."""
     lines = [f"{found['output'][0]}: {_fruits(found)}, from {found['n_boxes']} boxes in {found['n_frames']} frames"]
-    lines += [f"  {count} boxes without a place: {reason}" for reason, count in found["n_refused"].items()]
     if found["stopped_after_frame"] is not None:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
         lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
-    return lines
+    return lines + _table("boxes", survey.tally.boxes) + _table("tracks", survey.tally.tracks)
+
+
+def _table(what: str, fates: Counter[Any]) -> list[str]:
+    """Say what became of all of them, the most first; the rows add up to the first one."""
+    if not fates:
+        return []
+    ranked = sorted(fates.items(), key=lambda row: (-row[1], row[0]))
+    return [f"  {fates.total():>8} {what}", *(f"  {count:>8}   {fate}" for fate, count in ranked)]
 
 
 def _fruits(found: dict[str, Any]) -> str:

@@ -2,12 +2,12 @@
 
 from pomona.plot.drawing import PlotView, draw_match
 from pomona.plot.files import PICTURE_SUFFIXES, require_picture_name, save_picture
-from pomona.plot.projections import View, side_and_plan, view_from_above
+from pomona.plot.projections import Projection, side_and_plan, view_from_above
 
 __all__ = [
     "PICTURE_SUFFIXES",
     "PlotView",
-    "View",
+    "Projection",
     "draw_match",
     "require_picture_name",
     "save_picture",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.quiver import Quiver
     from numpy.typing import NDArray
 
-    from pomona.plot.projections import View
+    from pomona.plot.projections import Projection
 
 __all__ = ["Arrows"]
 
@@ -43,7 +43,7 @@ class Arrows:
         fitting = [times for times in MAGNIFICATIONS if times * usual_m * sheet.in_per_m <= USUAL_IN]
         return cls(was, found, max(fitting, default=1), sheet.in_per_m)
 
-    def draw(self, axes: Axes, view: View) -> Quiver | None:
+    def draw(self, axes: Axes, view: Projection) -> Quiver | None:
         """Draw them in a panel; None where nothing moved."""
         start, end = view.project(self.was), view.project(self.found)
         if np.array_equal(start, end):

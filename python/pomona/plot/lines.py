@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.plot.projections import View, view_from_above
+from pomona.plot.projections import Projection, view_from_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def draw_lines(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     return figure
 
 
-def _project_query(positions: NDArray[np.float64], match: Match, view: View) -> NDArray[np.float64]:
+def _project_query(positions: NDArray[np.float64], match: Match, view: Projection) -> NDArray[np.float64]:
     if match.map_from_query is not None:
         return view.project(positions @ match.map_from_query[:3, :3].T + match.map_from_query[:3, 3])
     return view_from_above(positions).project(positions)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["View", "side_and_plan", "view_from_above"]
+__all__ = ["Projection", "side_and_plan", "view_from_above"]
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Projection:
     """The plane a cloud is drawn in.
 
     Attributes
@@ -30,7 +30,7 @@ class View:
         return positions @ self.axes.T
 
 
-def view_from_above(positions: NDArray[np.float64], up: ArrayLike | None = None) -> View:
+def view_from_above(positions: NDArray[np.float64], up: ArrayLike | None = None) -> Projection:
     """Look down the vertical with the row to the right; without a vertical, onto the two largest extents.
 
     Parameters
@@ -42,7 +42,7 @@ def view_from_above(positions: NDArray[np.float64], up: ArrayLike | None = None)
     """
     if up is None:
         along, across = _principal_axes(positions)[:2]
-        return View(
+        return Projection(
             np.stack([along, across]), ("along the largest extent", "along the second extent, vertical unknown")
         )
     vertical = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
@@ -52,10 +52,12 @@ def view_from_above(positions: NDArray[np.float64], up: ArrayLike | None = None)
     if np.linalg.norm(along) < 1e-9:  # all fruits on one vertical: any horizontal direction will do
         along = np.cross(vertical, np.eye(3)[np.argmin(np.abs(vertical))])
     along /= np.linalg.norm(along)
-    return View(np.stack([along, np.cross(vertical, along)]), ("along the row", "across the row, seen from above"))
+    return Projection(
+        np.stack([along, np.cross(vertical, along)]), ("along the row", "across the row, seen from above")
+    )
 
 
-def side_and_plan(positions: NDArray[np.float64], up: ArrayLike | None = None) -> tuple[View, View]:
+def side_and_plan(positions: NDArray[np.float64], up: ArrayLike | None = None) -> tuple[Projection, Projection]:
     """Look at the row from its side and from above, the row to the right in both; parameters as above.
 
     Without a vertical the extents stand for it: a row is longer than high, and higher than deep.
@@ -63,14 +65,14 @@ def side_and_plan(positions: NDArray[np.float64], up: ArrayLike | None = None) -
     if up is None:
         along, second, third = _principal_axes(positions)
         return (
-            View(np.stack([along, second]), ("along the row", "second extent")),
-            View(np.stack([along, third]), ("along the row", "third extent")),
+            Projection(np.stack([along, second]), ("along the row", "second extent")),
+            Projection(np.stack([along, third]), ("along the row", "third extent")),
         )
     plan = view_from_above(positions, up)
     vertical = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
     return (
-        View(np.stack([plan.axes[0], vertical]), ("along the row", "height")),
-        View(plan.axes, ("along the row", "across the row")),
+        Projection(np.stack([plan.axes[0], vertical]), ("along the row", "height")),
+        Projection(plan.axes, ("along the row", "across the row")),
     )
 
 

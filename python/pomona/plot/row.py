@@ -9,7 +9,7 @@ import numpy as np
 
 from pomona.plot.arrows import Arrows
 from pomona.plot.fates import Fates
-from pomona.plot.projections import View, side_and_plan
+from pomona.plot.projections import Projection, side_and_plan
 from pomona.plot.sheet import FAINT, INK, Sheet
 from pomona.plot.trees import Trees
 
@@ -97,7 +97,7 @@ def _centred(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return points - points.mean(axis=0) if len(points) else points
 
 
-def _draw_fates(sheet: Sheet, views: tuple[View, View], fates: Fates) -> None:
+def _draw_fates(sheet: Sheet, views: tuple[Projection, Projection], fates: Fates) -> None:
     arrows = Arrows.on(sheet, fates.was, fates.found)
     kinds = ((fates.was, FOUND), (fates.new, NEW), (fates.missed, MISSED), (fates.elsewhere, ELSEWHERE))
     for axes, view in zip(sheet.panels, views, strict=True):

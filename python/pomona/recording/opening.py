@@ -29,6 +29,7 @@ def open_recording(
     calibration: str | Path | None = None,
     topics: Mapping[str, str] | None = None,
     poses: str | Path | None = None,
+    own_poses: bool = True,
 ) -> Recording:
     """Open a recording and check what can be checked without decoding it.
 
@@ -42,7 +43,11 @@ def open_recording(
         Of a bag: the topic of `left`, `right`, `depth`, `left_info`, `right_info`, `depth_info` or `poses`, where it is
         not found by its name.
     poses : str or Path, optional
-        TUM or KITTI text to take the poses of the left camera from, instead of those of the recording.
+        TUM or KITTI text to take the poses of the left camera from, instead of those of the recording, which are then
+        not read.
+    own_poses : bool
+        Whether poses that came with the recording are read. Without them its frames are all there, and broken ones
+        stop nothing.
 
     Raises
     ------
@@ -51,7 +56,7 @@ def open_recording(
     """
     place, given = Path(path), None if calibration is None else Path(calibration)
     try:
-        recording = _open(place, given, topics)
+        recording = _open(place, given, topics, own_poses and poses is None)
     except OSError as error:
         raise PomonaError(f"{error.filename or place}: cannot be read: {error.strerror or error}") from None
     if poses is None:
@@ -61,14 +66,14 @@ def open_recording(
     return with_poses(recording, Path(poses))
 
 
-def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> RectifiedRecording:
+def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None, own_poses: bool) -> RectifiedRecording:
     if not place.is_dir():
         require_file(place, ACCEPTED)
     from pomona.recording import bags
     from pomona.recording.video.stereo_video import VIDEO_SUFFIXES, left_and_right, open_video
 
     if bags.recognises(place):
-        return bags.open_bag(place, given, topics)
+        return bags.open_bag(place, given, topics, own_poses=own_poses)
     if topics:
         raise PomonaError(f"{place}: topics: found no bag, expected one for --topics")
     if not place.is_dir():
@@ -81,22 +86,23 @@ def _open(place: Path, given: Path | None, topics: Mapping[str, str] | None) -> 
         if place.suffix.lower() not in VIDEO_SUFFIXES:
             raise PomonaError(f"{place}: found a file, expected {ACCEPTED}")
         return open_video(place, given)
-    return _open_layout(place, given) or (open_video(place, given) if left_and_right(place) else _refuse(place))
+    layout = _open_layout(place, given, own_poses)
+    return layout or (open_video(place, given) if left_and_right(place) else _refuse(place))
 
 
-def _open_layout(folder: Path, calibration: Path | None) -> RectifiedRecording | None:
+def _open_layout(folder: Path, calibration: Path | None, own_poses: bool) -> RectifiedRecording | None:
     """Open a folder of pictures, None where it is none."""
     from pomona.recording.formats import euroc, kitti, tum_rgbd
     from pomona.recording.formats.folder import FolderRecording
 
     if euroc.recognises(folder):
-        return euroc.open_euroc(folder, calibration)
+        return euroc.open_euroc(folder, calibration, own_poses=own_poses)
     if tum_rgbd.recognises(folder):
-        return tum_rgbd.open_tum_rgbd(folder, calibration)
+        return tum_rgbd.open_tum_rgbd(folder, calibration, own_poses=own_poses)
     if kitti.recognises(folder):
-        return kitti.open_kitti(folder, calibration)
+        return kitti.open_kitti(folder, calibration, own_poses=own_poses)
     if any((folder / kind).is_dir() for kind in ("left", "right", "depth")):
-        return FolderRecording.open(folder, calibration)
+        return FolderRecording.open(folder, calibration, own_poses=own_poses)
     return None
 
 

@@ -15,6 +15,9 @@ __all__ = ["posed_rows", "poses_at"]
 LONGEST_GAP_S = 0.1
 """Over a longer gap a hand-held camera does not move evenly."""
 
+SAME_S = 0.005
+"""Times that are so near are one: clocks are written in milliseconds, and in these a camera in a row moves 5 mm."""
+
 
 def poses_at(
     times_s: NDArray[np.float64],
@@ -38,7 +41,7 @@ def poses_at(
     poses : (F, 4, 4) float64
         Of the rows that have one; the identity elsewhere.
     has_pose : (F,) bool
-        False outside the known times, and inside gaps over `longest_gap_s`.
+        False outside the known times, and inside gaps over `longest_gap_s`; a pose within `SAME_S` is taken as it is.
     """
     from scipy.spatial.transform import Rotation, Slerp
 
@@ -49,6 +52,9 @@ def poses_at(
     before = np.where(known_s[after] == times_s, after, after - 1).clip(0)
     has_pose = (known_s[before] <= times_s) & (times_s <= known_s[after])
     has_pose &= known_s[after] - known_s[before] <= longest_gap_s
+    nearest = np.where(times_s - known_s[before] <= known_s[after] - times_s, before, after)
+    same = ~has_pose & (np.abs(known_s[nearest] - times_s) <= SAME_S)
+    poses[same] = known[nearest[same]]
     wanted_s = times_s[has_pose]
     if len(known_s) == 1:
         poses[has_pose] = known[0]
@@ -56,7 +62,7 @@ def poses_at(
         poses[has_pose, :3, :3] = Slerp(known_s, Rotation.from_matrix(known[:, :3, :3]))(wanted_s).as_matrix()
         for axis in range(3):
             poses[has_pose, axis, 3] = np.interp(wanted_s, known_s, known[:, axis, 3])
-    return poses, has_pose
+    return poses, has_pose | same
 
 
 def posed_rows(path: Path, has_pose: NDArray[np.bool_], longest_gap_s: float = LONGEST_GAP_S) -> NDArray[np.int64]:

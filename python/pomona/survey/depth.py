@@ -6,7 +6,7 @@ centre lies behind the surface by the radius of the cone there. Equations and li
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -55,8 +55,8 @@ class Lifted:
     support : (M,) float64
         Part of the outline's pixels whose depth is on the fruit, 0 to 1; 0 where the depth is not measured but what
         the usual size of the picture's fruits says, with a sigma of 15 % or more.
-    refused : Counter of Refusal
-        Boxes that could not be lifted, by reason.
+    refused : mapping of int to Refusal
+        Row of each box that could not be lifted, and why.
     """
 
     rows: NDArray[np.int64]
@@ -66,7 +66,7 @@ class Lifted:
     diameter_sigmas_m: Array
     hidden: Array
     support: Array
-    refused: Counter[Refusal]
+    refused: Mapping[int, Refusal]
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -125,7 +125,7 @@ def lift(
         diameter_sigmas_m=diameter_sigmas_m,
         hidden=hidden,
         support=support,
-        refused=Counter(_REFUSED[int(code)] for code in outcome[outcome != _LIFTED]),
+        refused={row: _REFUSED[code] for row, code in enumerate(outcome.tolist()) if code != _LIFTED},
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
-from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]
 
-FORMAT = 2
+FORMAT = 3
 
 APPEARANCE = ("colours", "fruitness", "fruit_px", "elsewhere")
 
@@ -104,7 +103,7 @@ def _require_same(note: Path, ours: str) -> None:
 def _write(file: Path, look: Look) -> None:
     arrays: dict[str, Any] = {name: getattr(look.lifted, name) for name in LIFTED}
     arrays |= {"boxes_px": look.detections.boxes_px, "scores": look.detections.scores}
-    arrays["refused"] = np.array(json.dumps({reason.name: count for reason, count in look.lifted.refused.items()}))
+    arrays["refused"] = np.array(json.dumps({row: reason.name for row, reason in look.lifted.refused.items()}))
     if look.detections.ids is not None:
         arrays["ids"] = np.array(json.dumps(look.detections.ids))
     arrays |= {name: values for name in APPEARANCE if (values := getattr(look, name)) is not None}
@@ -130,9 +129,18 @@ def _read(file: Path, frame: int) -> Look:
                 Detections(arrays["boxes_px"], arrays["scores"], ids),
                 Lifted(
                     **{name: arrays[name] for name in LIFTED},
-                    refused=Counter({Refusal[name]: count for name, count in refused.items()}),
+                    refused=_refused(refused, len(arrays["boxes_px"])),
                 ),
                 **{name: arrays.get(name) for name in APPEARANCE},
             )
     except UNREADABLE as error:
         raise PomonaError(f"{file}: not a kept frame ({str(error)[:MOST_REASON]}): remove it") from None
+
+
+def _refused(found: object, n_boxes: int) -> dict[int, Refusal]:
+    if not isinstance(found, dict):
+        raise ValueError("refused is no object")
+    refused = {int(row): Refusal[name] for row, name in found.items()}
+    if not refused.keys() <= set(range(n_boxes)):
+        raise ValueError("refused names a box that is not there")
+    return refused

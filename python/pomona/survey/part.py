@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from pomona.survey.pose_source import PoseSource
 from pomona.survey.registration import Fruits
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of
+from pomona.survey.tally import Tally, TrackFate, often_enough, track_fates
 from pomona.survey.tracking import Tracker, Tracks
 from pomona.trajectory import Trajectory
 
@@ -61,6 +62,8 @@ class Part:
         Why the part before it ended; None of the first.
     frames_in_view : float or None
         Frames for which a fruit stays in view; None where boxes were not tracked.
+    tally : Tally
+        What became of its boxes and tracks.
     """
 
     cloud: FruitCloud
@@ -68,6 +71,7 @@ class Part:
     boxes: Boxes
     began: str | None = None
     frames_in_view: float | None = None
+    tally: Tally = field(default_factory=Tally)
 
 
 class OpenPart:
@@ -150,13 +154,14 @@ class OpenPart:
         """Make the fruits of all the frames, at these poses (F, 4, 4)."""
         sightings = Sightings.of(self._looks)
         tracks = None if self._tracker is None else self._tracker.finish(min_views=1)
-        owners = self._named() if tracks is None else self._tracked(tracks)
+        first = joined = owners = self._named() if tracks is None else self._tracked(tracks)
         frames = [look.frame for look in self._looks]
         probability = frames_in_view = None
         if tracks is not None:
             # Fragments of one fruit that drift kept apart come together once poses and places are refined.
             measured, row_of = self._fused(sightings, owners, poses)
             tracks = _joined(tracks, measured, row_of)
+            joined = self._tracked(tracks)
             belief = self._believing(tracks, self._looks, poses)
             rows, frames_in_view = np.flatnonzero(belief.is_believed), belief.frames_in_view
             owners, probability = self._tracked(tracks.select(rows)), belief.probability[rows]
@@ -164,8 +169,14 @@ class OpenPart:
         if probability is not None:
             of_cloud = np.argsort(row_of[:-1])[len(row_of) - 1 - len(cloud) :]
             cloud = _with_probability(cloud, probability[of_cloud])
+        fates = Counter({TrackFate.FRUIT: len(cloud), TrackFate.NO_PLACE: len(owners.names) - len(cloud)})
+        if tracks is not None:
+            seen = often_enough(self._believing, tracks, self._looks, poses)
+            fates = track_fates(len(first.names), belief.is_believed, seen, len(cloud))
         trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), poses)
-        return Part(cloud, trajectory, _boxes(self._looks, row_of[owners.fruits]), self._began, frames_in_view)
+        boxes = _boxes(self._looks, row_of[owners.fruits])
+        tally = Tally.of(self._looks, boxes.fruits, first.fruits, joined.fruits, fates)
+        return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally)
 
     def _owners(self) -> _Owners:
         return self._named() if self._tracker is None else self._tracked(self._tracker.finish(min_views=1))

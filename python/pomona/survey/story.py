@@ -28,6 +28,7 @@ from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing
+from pomona.survey.tally import Tally, tell_little
 from pomona.survey.tracking import Tracker
 from pomona.trajectory import Trajectory
 
@@ -70,6 +71,11 @@ class Survey:
         """Number of the part with the most frames, from 0: of those with fruits, if any has; then of most fruits."""
         sizes = [(len(part.cloud) > 0, len(part.trajectory), len(part.cloud)) for part in self.parts]
         return sizes.index(max(sizes))
+
+    @property
+    def tally(self) -> Tally:
+        """What became of the boxes and tracks of all parts."""
+        return sum((part.tally for part in self.parts), Tally())
 
     @property
     def cloud(self) -> FruitCloud:
@@ -144,6 +150,7 @@ def scan(
     survey = findings.survey(camera)
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
+    tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
     return survey
 
 
@@ -195,7 +202,7 @@ class _Findings:
         time_s = float(frame.number if frame.time_s is None else frame.time_s)
         self._parts[place.part].add(look, time_s, place.session_from_camera, left)
         self._detections += len(look.detections)
-        self._refused += look.lifted.refused
+        self._refused.update(look.lifted.refused.values())
 
     def survey(self, camera: PoseSource) -> Survey:
         if not self._parts:

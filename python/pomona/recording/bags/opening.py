@@ -19,7 +19,9 @@ from pomona.recording.bags.topics import chosen_topics
 __all__ = ["open_bag"]
 
 
-def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, str] | None = None) -> BagRecording:
+def open_bag(
+    path: Path, calibration: Path | None = None, topics: Mapping[str, str] | None = None, *, own_poses: bool = True
+) -> BagRecording:
     """Open a bag: it is read once from beginning to end, and its pictures are not decoded.
 
     Parameters
@@ -30,6 +32,8 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
         Instead of the camera_info in it.
     topics : mapping, optional
         Topic of each role of `ROLES`, where they are not found by their names.
+    own_poses : bool
+        Whether poses in it are read.
 
     Raises
     ------
@@ -40,6 +44,7 @@ def open_bag(path: Path, calibration: Path | None = None, topics: Mapping[str, s
         import rosbags  # noqa: F401
     except ImportError:
         raise missing_extra(path) from None
+    topics = topics if own_poses else {**(topics or {}), "poses": "none"}
     file = open_messages(path)
     roles = chosen_topics(path, file.topics, topics)
     try:

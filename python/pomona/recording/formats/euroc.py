@@ -37,7 +37,7 @@ def recognises(folder: Path) -> bool:
     return any((place / "cam0" / "data.csv").is_file() for place in (folder / "mav0", folder))
 
 
-def open_euroc(folder: Path, calibration: Path | None = None) -> ListedRecording:
+def open_euroc(folder: Path, calibration: Path | None = None, *, own_poses: bool = True) -> ListedRecording:
     """Open the folder above or of `mav0`; a frame's number is its row in the data.csv of cam0, from 0.
 
     Raises
@@ -56,7 +56,7 @@ def open_euroc(folder: Path, calibration: Path | None = None) -> ListedRecording
         optics = find_optics(root, size_px, stereo=True, given=calibration)
     listing, poses = [root / "cam0" / "data.csv", root / "cam1" / "data.csv"], None
     truth = root / TRUTH / "data.csv"
-    if truth.is_file():
+    if own_poses and truth.is_file():
         known_ns, session_from_body = _truth(truth)
         # Differences of nanoseconds are exact as integers, and only then.
         start_ns = int(known_ns[0])

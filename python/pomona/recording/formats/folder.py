@@ -19,9 +19,11 @@ from pomona.recording.calibration.rectification import Optics
 from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
+from pomona.recording.formats.frame_times import times_beside_poses, times_in
 from pomona.recording.frame import Frame, chosen_rows
 from pomona.recording.pictures import UnreadablePictureError, numbered_pictures, picture_size
 from pomona.recording.poses import read_tum
+from pomona.recording.poses_in_time import posed_rows, poses_at
 from pomona.recording.rectified_pictures import read_rectified, size_of_first
 from pomona.trajectory import Trajectory
 
@@ -38,18 +40,24 @@ class FolderRecording:
     ----------
     pictures : mapping
         For each of `left`, `right`, `depth` that exists: frame number to file.
+    times_s : (F,) float64 or None
+        Time of each frame: those of `times.txt`, else of the poses that came with it.
+    listing : tuple of Path
+        Files that say when the frames were taken and where the camera was.
     """
 
     path: Path
     optics: Optics
     numbers: tuple[int, ...]
     pictures: dict[str, dict[int, Path]]
+    times_s: NDArray[np.float64] | None
     trajectory: Trajectory | None
     name: str
+    listing: tuple[Path, ...]
     date: str | None
 
     @classmethod
-    def open(cls, folder: Path, calibration: Path | None = None) -> FolderRecording:
+    def open(cls, folder: Path, calibration: Path | None = None, *, own_poses: bool = True) -> FolderRecording:
         """Open a folder; nothing is decoded yet.
 
         Parameters
@@ -58,6 +66,8 @@ class FolderRecording:
             With `left/`, `right/`, `depth/`.
         calibration : Path, optional
             File or folder of the calibration; else `calibration.json` in the folder, else another kind there.
+        own_poses : bool
+            Whether `poses_tum.txt` is read for more than the times of the frames.
 
         Raises
         ------
@@ -69,25 +79,29 @@ class FolderRecording:
         numbers = _numbers(folder, pictures)
         optics = _optics(folder, pictures, calibration)
         about = _about(folder)
+        timing, poses = folder / "times.txt", folder / "poses_tum.txt"
+        times_s, trajectory = times_in(timing, len(numbers)), None
+        if not own_poses:
+            times_s = times_beside_poses(poses, len(numbers)) if times_s is None else times_s
+        elif poses.is_file():
+            trajectory = _trajectory(poses, numbers, times_s, optics)
+            numbers, times_s = tuple(trajectory.frames.tolist()), trajectory.times_s
         return cls(
             path=folder,
             optics=optics,
             numbers=numbers,
             pictures=pictures,
-            trajectory=_trajectory(folder / "poses_tum.txt", numbers, optics),
+            times_s=times_s,
+            trajectory=trajectory,
             name=str(about.get("name") or folder.resolve().name),
             date=_date(folder, about),
+            listing=tuple(file for file in (timing, *((poses,) if own_poses else ())) if file.is_file()),
         )
 
     @property
     def calibration(self) -> Calibration:
         """The rectified left camera."""
         return self.optics.calibration
-
-    @property
-    def times_s(self) -> NDArray[np.float64] | None:
-        """Those of the poses."""
-        return None if self.trajectory is None else self.trajectory.times_s
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -98,7 +112,7 @@ class FolderRecording:
         for row, number in chosen_rows(self.numbers, numbers):
             yield Frame(
                 number=number,
-                time_s=None if posed is None else float(posed.times_s[row]),
+                time_s=None if self.times_s is None else float(self.times_s[row]),
                 session_from_camera=None if posed is None else posed.session_from_camera[row],
                 read_left=self._reader("left", number),
                 read_right=self._reader("right", number),
@@ -108,7 +122,8 @@ class FolderRecording:
     def inputs(self) -> Iterator[Path]:
         """Give calibration, poses, detections and pictures."""
         yield from self.optics.inputs
-        for name in ("recording.json", "poses_tum.txt", "detections.csv"):
+        yield from self.listing
+        for name in ("recording.json", "detections.csv"):
             if (self.path / name).is_file():
                 yield self.path / name
         for files in self.pictures.values():
@@ -116,7 +131,7 @@ class FolderRecording:
 
     def description(self) -> dict[str, Any]:
         """Say what was found."""
-        times_s = None if self.trajectory is None else self.trajectory.times_s.tolist()
+        times_s = None if self.times_s is None else self.times_s.tolist()
         counts = {kind: len(files) for kind, files in self.pictures.items()}
         boxes = (self.path / "detections.csv").is_file()
         return describe(self, "recording folder", times_s, counts, detections=boxes)
@@ -171,14 +186,21 @@ def _require_size(own: Path, calibration: Calibration, files: tuple[Path, ...]) 
         raise PomonaError(f"{own}: width, height: found {found}, expected {expected} as {files[0].name} is")
 
 
-def _trajectory(path: Path, numbers: tuple[int, ...], optics: Optics) -> Trajectory | None:
-    if not path.is_file():
-        return None
-    times_s, session_from_camera = read_tum(path)
-    if len(times_s) != len(numbers):
-        raise PomonaError(f"{path}: found {len(times_s)} poses, expected one for each of the {len(numbers)} frames")
-    session_from_camera[:, :3, :3] = session_from_camera[:, :3, :3] @ optics.rectified_from_left.T
-    return Trajectory(np.array(numbers, np.int64), times_s, session_from_camera)
+def _trajectory(
+    path: Path, numbers: tuple[int, ...], times_s: NDArray[np.float64] | None, optics: Optics
+) -> Trajectory:
+    """Poses of the frames that have one: by time, or one for each where nothing but the poses has times."""
+    known_s, known = read_tum(path)
+    rows = np.arange(len(numbers))
+    if times_s is not None:
+        poses, has_pose = poses_at(times_s, known_s, known)
+        rows = posed_rows(path, has_pose)
+        known_s, known = times_s[rows], poses[rows]
+    elif len(known_s) != len(numbers):
+        expected = f"one for each of the {len(numbers)} frames, or the times of the frames in times.txt"
+        raise PomonaError(f"{path}: found {len(known_s)} poses, expected {expected}")
+    known[:, :3, :3] = known[:, :3, :3] @ optics.rectified_from_left.T
+    return Trajectory(np.array(numbers, np.int64)[rows], known_s, known)
 
 
 def _about(folder: Path) -> dict[str, Any]:

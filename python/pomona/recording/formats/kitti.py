@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.reading import number_in, read_text
+from pomona.reading import read_text
 from pomona.recording.calibration.rectification import Optics, rectified
 from pomona.recording.calibration.rig import Rig, RigCamera
+from pomona.recording.formats.frame_times import numbers_in, times_in
 from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pictures import numbered_pictures
 from pomona.recording.poses import read_kitti
@@ -31,7 +32,7 @@ def recognises(folder: Path) -> bool:
     return (folder / "calib.txt").is_file() and any((folder / left).is_dir() for left, _ in SIDES)
 
 
-def open_kitti(folder: Path, _calibration: Path | None = None) -> ListedRecording:
+def open_kitti(folder: Path, _calibration: Path | None = None, *, own_poses: bool = True) -> ListedRecording:
     """Open a folder; its own calib.txt is its calibration.
 
     Raises
@@ -42,11 +43,11 @@ def open_kitti(folder: Path, _calibration: Path | None = None) -> ListedRecordin
     sides = next(pair for pair in SIDES if (folder / pair[0]).is_dir())
     numbers, left, right = _pairs(folder, sides)
     left_projection, right_projection = _projections(folder / "calib.txt", sides)
-    times_s = _times_s(folder / "times.txt", len(numbers))
+    times_s = times_in(folder / "times.txt", len(numbers))
     optics = _optics(folder / "calib.txt", left_projection, right_projection, size_of_first(left))
-    poses = _poses(folder / "poses.txt", left_projection, len(numbers))
+    poses = _poses(folder / "poses.txt", left_projection, len(numbers)) if own_poses else None
     clock_s = np.arange(len(numbers)) / RATE_HZ if times_s is None else times_s
-    listing = (folder / name for name in ("poses.txt", "times.txt"))
+    listing = (folder / name for name in (*(("poses.txt",) if own_poses else ()), "times.txt"))
     return ListedRecording(
         path=folder,
         kind="KITTI folder",
@@ -84,7 +85,7 @@ def _projections(path: Path, sides: tuple[str, str]) -> tuple[NDArray[np.float64
         rows = [named[name] for name in wanted]
     if len(rows) != 2:
         raise PomonaError(f"{path}: found {len(rows)} projections, expected two lines of 12 numbers: left and right")
-    left, right = (_numbers(path, f"projection {row + 1}", cells, 12).reshape(3, 4) for row, cells in enumerate(rows))
+    left, right = (numbers_in(path, f"projection {row + 1}", cells, 12).reshape(3, 4) for row, cells in enumerate(rows))
     return left, right
 
 
@@ -103,24 +104,6 @@ def _poses(path: Path, left: NDArray[np.float64], n_frames: int) -> NDArray[np.f
     camera0_from_left = np.eye(4)
     camera0_from_left[:3, 3] = -np.linalg.solve(left[:, :3], left[:, 3])
     return np.asarray(poses @ camera0_from_left)
-
-
-def _times_s(path: Path, n_frames: int) -> NDArray[np.float64] | None:
-    if not path.is_file():
-        return None
-    times_s = _numbers(path, "times", _text(path), n_frames)
-    back = np.flatnonzero(np.diff(times_s) <= 0)
-    if len(back):
-        row = int(back[0]) + 1
-        raise PomonaError(f"{path}: line {row + 1}: time {times_s[row]:g} s does not come after {times_s[row - 1]:g} s")
-    return times_s
-
-
-def _numbers(path: Path, what: str, text: str, count: int) -> NDArray[np.float64]:
-    numbers = [number_in(str(path), what, cell) for cell in text.split()]
-    if len(numbers) != count:
-        raise PomonaError(f"{path}: {what}: found {len(numbers)} numbers, expected {count} finite ones")
-    return np.array(numbers)
 
 
 def _text(path: Path) -> str:

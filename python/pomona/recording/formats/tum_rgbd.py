@@ -33,7 +33,7 @@ def recognises(folder: Path) -> bool:
     return (folder / "depth.txt").is_file() and (folder / "rgb.txt").is_file()
 
 
-def open_tum_rgbd(folder: Path, calibration: Path | None = None) -> ListedRecording:
+def open_tum_rgbd(folder: Path, calibration: Path | None = None, *, own_poses: bool = True) -> ListedRecording:
     """Open a folder; a frame's number is its row in `rgb.txt`, from 0.
 
     Raises
@@ -47,7 +47,7 @@ def open_tum_rgbd(folder: Path, calibration: Path | None = None) -> ListedRecord
     optics = find_optics(folder, size_of_first(colour), stereo=False, given=calibration, depth_unit_m=DEPTH_UNIT_M)
     listing, poses = [folder / "rgb.txt", folder / "depth.txt"], None
     truth = folder / "groundtruth.txt"
-    if truth.is_file():
+    if own_poses and truth.is_file():
         poses, has_pose = poses_at(colour_s[rows[:, 0]], *read_tum(truth))
         posed = posed_rows(truth, has_pose)
         rows, poses = rows[posed], poses[posed]
