@@ -1,4 +1,4 @@
-//! Bundle adjustment and the pose of a picture among known points.
+//! Bundle adjustment of a session.
 
 use crate::cloud::points;
 use numpy::{
@@ -6,25 +6,20 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pomona::bundle::{
-    Adjustment, KnownPoints, LocateSettings, Measured, Observation, Pose, Problem, RelativePose, Settings, State,
-    StereoCamera, adjust as adjust_bundle, locate as locate_picture,
+    Measured, Observation, Pose, Problem, RelativePose, Settings, State, StereoCamera, adjust as adjust_bundle,
 };
-use pomona::nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, Vector2, Vector3};
+use pomona::nalgebra::{Matrix3, Matrix6, Rotation3, Translation3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-fn wrong(error: impl std::fmt::Display) -> PyErr {
+pub fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// fx, fy, cx, cy, baseline.
-type Camera = [f64; 5];
+/// Sightings are places; there are no pictures to project into.
+const NO_CAMERA: StereoCamera = StereoCamera { focal_px: [1.0; 2], centre_px: [0.0; 2], baseline_m: 1.0 };
 
-fn stereo([fx, fy, cx, cy, baseline_m]: Camera) -> StereoCamera {
-    StereoCamera { focal_px: [fx, fy], centre_px: [cx, cy], baseline_m }
-}
-
-/// Observations, as Python passes them: which pose sees which point where, and how surely.
+/// Sightings, as Python passes them: which pose sees which point at which place, and how surely.
 #[derive(FromPyObject)]
 pub struct Seen<'py> {
     #[pyo3(item)]
@@ -38,17 +33,22 @@ pub struct Seen<'py> {
 }
 
 impl Seen<'_> {
-    fn append(&self, measured: fn(Vector3<f64>) -> Measured, all: &mut Vec<Observation>) -> PyResult<()> {
+    fn to_observations(&self) -> PyResult<Vec<Observation>> {
         let (poses, seen) = (rows("poses", &self.poses)?, rows("points", &self.points)?);
         let values = points(&self.values)?;
         let whitenings = matrices(&self.whitenings)?;
         if poses.len() != values.len() || seen.len() != values.len() || whitenings.len() != values.len() {
             return Err(wrong("observations: found arrays of different lengths"));
         }
-        for (((pose, point), value), whitening) in poses.into_iter().zip(seen).zip(values).zip(whitenings) {
-            all.push(Observation { pose, point, measured: measured(value.coords), whitening });
-        }
-        Ok(())
+        let rows = poses.into_iter().zip(seen).zip(values.into_iter().zip(whitenings));
+        Ok(rows
+            .map(|((pose, point), (value, whitening))| Observation {
+                pose,
+                point,
+                measured: Measured::Place(value.coords),
+                whitening,
+            })
+            .collect())
     }
 }
 
@@ -86,103 +86,33 @@ impl Between<'_> {
     }
 }
 
-/// Poses (K, 4, 4), points (P, 3), covariances of the points (P, 3, 3), squared errors of pictures, then places (M,),
-/// information of the wanted pairs (Q, 6, 6), zeros where there is none.
-type Adjusted<'py> = (
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray3<f64>>,
-);
+/// Poses (K, 4, 4), points (P, 3), covariances of the points (P, 3, 3), squared errors of the sightings (M,).
+type Adjusted<'py> =
+    (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>);
 
-/// The poses and points that explain best what was measured.
+/// The poses and points of a session that explain best what was measured.
 #[pyfunction]
-#[pyo3(signature = (camera, poses, fixed, points, *, pictures, places, relative_poses, wanted, max_steps, first_scale))]
-#[expect(clippy::needless_pass_by_value, clippy::too_many_arguments, reason = "arguments arrive by value from Python")]
+#[pyo3(signature = (poses, fixed, points, *, places, relative_poses))]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn adjust<'py>(
     py: Python<'py>,
-    camera: Camera,
     poses: PyReadonlyArray3<'py, f64>,
     fixed: PyReadonlyArray1<'py, bool>,
     points: PyReadonlyArray2<'py, f64>,
-    pictures: Option<Seen<'py>>,
-    places: Option<Seen<'py>>,
+    places: Seen<'py>,
     relative_poses: Option<Between<'py>>,
-    wanted: Vec<(usize, usize)>,
-    max_steps: Option<usize>,
-    first_scale: Option<f64>,
 ) -> PyResult<Adjusted<'py>> {
-    let mut observations = Vec::new();
-    if let Some(pictures) = &pictures {
-        pictures.append(Measured::Picture, &mut observations)?;
-    }
-    if let Some(places) = &places {
-        places.append(Measured::Place, &mut observations)?;
-    }
     let relative_poses = relative_poses.map_or(Ok(Vec::new()), |between| between.to_relative_poses())?;
     let initial = State { poses: self::poses(&poses)?, points: self::points(&points)? };
-    let n_poses = initial.poses.len();
-    if wanted.iter().any(|&(first, second)| first.max(second) >= n_poses) {
-        return Err(wrong(format!("wanted: expected rows below {n_poses}")));
-    }
-    let problem = Problem { camera: stereo(camera), fixed: fixed.as_array().to_vec(), observations, relative_poses };
-    let defaults = Settings::default();
-    let settings = Settings {
-        max_steps: max_steps.unwrap_or(defaults.max_steps),
-        first_scale: first_scale.unwrap_or(defaults.first_scale),
-        ..defaults
-    };
-    let run = || {
-        let found = adjust_bundle(&problem, initial, &settings)?;
-        let information = if wanted.is_empty() { Vec::new() } else { found.relative_information(&wanted) };
-        Ok((found, information))
-    };
-    let (found, information): (Adjustment, _) = py.detach(run).map_err(|error: pomona::Error| wrong(error))?;
+    let (fixed, observations) = (fixed.as_array().to_vec(), places.to_observations()?);
+    let problem = Problem { camera: NO_CAMERA, fixed, observations, relative_poses };
+    let found = py.detach(|| adjust_bundle(&problem, initial, &Settings::after_drift())).map_err(wrong)?;
     Ok((
         pose_array(py, &found.state.poses)?,
         array(py, found.state.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect(), [found.state.points.len(), 3])?,
         blocks(py, found.point_covariances.iter().copied())?,
         PyArray1::from_vec(py, found.squared_errors),
-        blocks(py, information.iter().map(|block| block.unwrap_or_else(Matrix6::zeros)))?,
     ))
-}
-
-/// Pose (4, 4), information (6, 6), which matches agree (N,).
-type Place<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<bool>>);
-
-/// The pose of one picture among known points, or None where fewer than four matches agree.
-#[pyfunction]
-#[pyo3(signature = (camera, known, covariances, pixels, expected, *, sigma_px))]
-#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
-pub fn locate<'py>(
-    py: Python<'py>,
-    camera: Camera,
-    known: PyReadonlyArray2<'py, f64>,
-    covariances: PyReadonlyArray3<'py, f64>,
-    pixels: PyReadonlyArray2<'py, f64>,
-    expected: [[f64; 4]; 4],
-    sigma_px: f64,
-) -> PyResult<Option<Place<'py>>> {
-    if pixels.shape()[1] != 2 {
-        return Err(wrong("pixels: expected an array of shape (N, 2)"));
-    }
-    let known = KnownPoints {
-        points: points(&known)?,
-        covariances: matrices(&covariances)?,
-        pixels: pixels.as_array().outer_iter().map(|row| Vector2::new(row[0], row[1])).collect(),
-    };
-    let settings = LocateSettings { sigma_px, ..LocateSettings::default() };
-    let expected = pose(&expected);
-    let found = py.detach(|| locate_picture(&stereo(camera), &known, &expected, &settings)).map_err(wrong)?;
-    let Some(found) = found else { return Ok(None) };
-    let matrix = found.pose.to_matrix();
-    let rows = |rows: Vec<f64>, n: usize| PyArray1::from_vec(py, rows).reshape([n, n]);
-    Ok(Some((
-        rows(matrix.transpose().as_slice().to_vec(), 4)?,
-        rows(found.information.as_slice().to_vec(), 6)?,
-        PyArray1::from_vec(py, found.inliers),
-    )))
 }
 
 fn rows(name: &str, rows: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
@@ -209,13 +139,13 @@ fn poses(all: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Pose>> {
     Ok(squares::<4>(all)?.map(|block| pose(&block)).collect())
 }
 
-fn pose(matrix: &[[f64; 4]; 4]) -> Pose {
+pub fn pose(matrix: &[[f64; 4]; 4]) -> Pose {
     let rotation = Matrix3::from_fn(|row, column| matrix[row][column]);
     let translation = Translation3::new(matrix[0][3], matrix[1][3], matrix[2][3]);
     Pose::from_parts(translation, Rotation3::from_matrix_unchecked(rotation))
 }
 
-fn array<T: Element, const D: usize>(
+pub fn array<T: Element, const D: usize>(
     py: Python<'_>,
     values: Vec<T>,
     shape: [usize; D],
@@ -227,13 +157,18 @@ where
     PyArray1::from_vec(py, values).reshape(shape)
 }
 
-fn pose_array<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArray3<f64>>> {
+/// A pose as (4, 4).
+pub fn pose_matrix<'py>(py: Python<'py>, pose: &Pose) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    array(py, pose.to_matrix().transpose().as_slice().to_vec(), [4, 4])
+}
+
+pub fn pose_array<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let values = poses.iter().flat_map(|pose| pose.to_matrix().transpose().as_slice().to_vec()).collect();
     array(py, values, [poses.len(), 4, 4])
 }
 
 /// Symmetric blocks as (N, D, D).
-fn blocks<const D: usize>(
+pub fn blocks<const D: usize>(
     py: Python<'_>,
     all: impl Iterator<Item = pomona::nalgebra::SMatrix<f64, D, D>>,
 ) -> PyResult<Bound<'_, PyArray3<f64>>> {

@@ -26,6 +26,7 @@ pub mod index;
 pub mod lifting;
 pub mod matching;
 mod meanings;
+pub mod odometry;
 mod paper;
 pub mod ransac;
 pub mod row_search;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -76,7 +76,7 @@ class Camera(Protocol):
         """
 
 
-def camera_of(recording: Recording, *, odometry: bool = False) -> Camera:
+def camera_of(recording: Recording, *, odometry: bool = False, config: Mapping[str, Any] | None = None) -> Camera:
     """Choose where poses come from.
 
     Parameters
@@ -85,6 +85,8 @@ def camera_of(recording: Recording, *, odometry: bool = False) -> Camera:
         With poses, or with one frame, or with left and right (or left and depth) pictures.
     odometry : bool
         Use odometry even where there are poses.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`; the odometry's is `odometry`.
 
     Raises
     ------
@@ -95,7 +97,7 @@ def camera_of(recording: Recording, *, odometry: bool = False) -> Camera:
         return _Recorded(recording)
     if len(recording) == 1 and not odometry:
         return _Recorded(recording)
-    return _Followed(recording)
+    return _Followed(recording, config)
 
 
 class _Recorded:
@@ -129,7 +131,7 @@ class _Followed:
         When the recording has no left pictures, or neither right pictures with a baseline nor depth.
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, config: Mapping[str, Any] | None) -> None:
         pictures = recording.description()["pictures"]
         stereo = "right" in pictures and recording.calibration.baseline_m is not None
         if "left" not in pictures or not (stereo or "depth" in pictures):
@@ -139,7 +141,7 @@ class _Followed:
             )
         self.needs: tuple[Kind, ...] = ("left", "right") if stereo else ("left", "depth")
         self._stereo, self._path = stereo, recording.path
-        self._odometry = StereoOdometry(recording.calibration)
+        self._odometry = StereoOdometry(recording.calibration, config)
         self._count_of: dict[int, int] = {}
 
     def __call__(self, frame: Frame) -> Place:
