@@ -9,7 +9,8 @@ use numpy::{
 use pomona::Config;
 use pomona::nalgebra::{Vector2, Vector3};
 use pomona::odometry::{
-    Eyes, Lens, Motion, Odometry, OdometryConfig, Passage, PicturesConfig, Places, corners, follow, rejoined,
+    Eyes, FoundAgain, Lens, Motion, Odometry, OdometryConfig, Passage, PicturesConfig, Places, corners, follow,
+    rejoined,
 };
 use pomona::row_search::Grey;
 use pyo3::prelude::*;
@@ -55,7 +56,7 @@ impl Eyes for PyEyes<'_> {
         })
     }
 
-    fn find_again(&mut self) -> Result<Vec<(Vector3<f64>, Vector2<f64>)>, Failure> {
+    fn find_again(&mut self) -> Result<Vec<FoundAgain>, Failure> {
         Python::attach(|py| {
             let found = self.0.bind(py).call_method0("find_again")?;
             let (seen, there): (PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, f64>) = found.extract()?;

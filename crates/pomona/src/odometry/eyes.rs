@@ -2,6 +2,9 @@
 
 use nalgebra::{Vector2, Vector3};
 
+/// A point of the newest keyframe, u, v, disparity, and where a picture shows it.
+pub type FoundAgain = (Vector3<f64>, Vector2<f64>);
+
 /// The picture of one frame, beside that of the newest keyframe.
 ///
 /// Coordinates are those of the camera that the odometry was given.
@@ -20,11 +23,11 @@ pub trait Eyes {
         expected_px: &[Vector2<f64>],
     ) -> Result<Vec<Option<Vector2<f64>>>, Self::Error>;
 
-    /// Points of the newest keyframe, as u, v, disparity, and where the picture shows them, with no idea where.
+    /// Points of the newest keyframe and where the picture shows them, with no idea where.
     ///
     /// # Errors
     /// What the pictures say.
-    fn find_again(&mut self) -> Result<Vec<(Vector3<f64>, Vector2<f64>)>, Self::Error>;
+    fn find_again(&mut self) -> Result<Vec<FoundAgain>, Self::Error>;
 
     /// u, v, disparity of points at known places with expected disparities, then of new corners, so many in each cell with
     /// those that are known; NaN for a disparity that is not found.

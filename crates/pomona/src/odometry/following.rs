@@ -189,7 +189,7 @@ impl Block {
             [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
         let mut pixels = [[0.0; LANES + 2]; LANES + 2];
         let (width, height) = (picture.width as isize, picture.height() as isize);
-        let fits = left >= 0 && top >= 0 && left + LANES as isize + 2 <= width && top + side as isize + 1 <= height;
+        let fits = left >= 0 && top >= 0 && left + LANES as isize + 2 <= width && top + (side as isize) < height;
         for (row, values) in pixels.iter_mut().enumerate().take(side + 1) {
             let y = reflected(top + row as isize, height) * picture.width;
             if fits {

@@ -24,7 +24,7 @@ use nalgebra::{Matrix6, Vector2, Vector3};
 
 pub use config::{OdometryConfig, PicturesConfig};
 pub use corners::corners;
-pub use eyes::Eyes;
+pub use eyes::{Eyes, FoundAgain};
 pub use following::follow;
 pub use rejoining::{Passage, Places, rejoined};
 

@@ -35,7 +35,7 @@ impl Part {
         let per_cell = with.1.most_per_cell;
         let (way, last_frame) = (Way::default(), frame);
         let mut part = Self { way, window, reference, last_frame, last_pose: here, velocity: None, per_cell };
-        part.add_keyframe(eyes, frame, here, Vec::new(), with)?;
+        part.add_keyframe(eyes, frame, here, &[], with)?;
         let (offered, expected) = (part.reference.numbers.len(), with.1.min_inliers);
         if offered < expected {
             return Ok(Err(format!("found {offered} points with depth, expected at least {expected}")));
@@ -123,7 +123,7 @@ impl Part {
             let wanted = (self.per_cell * config.wanted_inliers).div_ceil(found.agreeing.len());
             self.per_cell = wanted.clamp(config.least_per_cell, config.most_per_cell);
             let carried = self.reference.carried_on(found, with.0);
-            self.last_pose = self.add_keyframe(eyes, frame, found.pose, carried, with)?;
+            self.last_pose = self.add_keyframe(eyes, frame, found.pose, &carried, with)?;
             return Ok(true);
         }
         self.way.placed.push(Placed {
@@ -151,7 +151,7 @@ impl Part {
         eyes: &mut E,
         frame: usize,
         pose: Pose,
-        carried: Vec<(Sighting, f64)>,
+        carried: &[(Sighting, f64)],
         (lens, config): (&Lens, &OdometryConfig),
     ) -> Result<Pose, E::Error> {
         let places_px: Vec<Vector2<f64>> = carried.iter().map(|(one, _)| one.seen.xy()).collect();

@@ -72,7 +72,7 @@ impl Eyes for Frame<'_> {
         Ok(from_px.iter().map(found).collect())
     }
 
-    fn find_again(&mut self) -> Result<Vec<(Vector3<f64>, Vector2<f64>)>, Wrong> {
+    fn find_again(&mut self) -> Result<Vec<FoundAgain>, Wrong> {
         Ok(Vec::new())
     }
 
@@ -257,7 +257,7 @@ fn more_corners_are_wanted_where_few_agree() {
         fn follow(&mut self, a: &[Vector2<f64>], b: &[Vector2<f64>]) -> Result<Vec<Option<Vector2<f64>>>, Wrong> {
             self.0.follow(a, b)
         }
-        fn find_again(&mut self) -> Result<Vec<(Vector3<f64>, Vector2<f64>)>, Wrong> {
+        fn find_again(&mut self) -> Result<Vec<FoundAgain>, Wrong> {
             self.0.find_again()
         }
         fn measure(&mut self, a: &[Vector2<f64>], b: &[f64], per_cell: usize) -> Result<Vec<Vector3<f64>>, Wrong> {

@@ -111,7 +111,7 @@ mod tests {
         let mut unit = || random.below(1 << 20) as f64 / f64::from(1 << 20);
         let corner = |k: usize| {
             let (x, y, noise) = (640.0 * unit(), 360.0 * unit(), 6.0 * (unit() - 0.5));
-            let off = if k % 5 == 0 { noise } else { 0.1 * noise };
+            let off = if k.is_multiple_of(5) { noise } else { 0.1 * noise };
             Vector3::new(x, y, lower_px + turned_rad * (x - 320.0) + 0.001 * (y - 180.0) + off)
         };
         (0..n).map(corner).collect()
