@@ -123,12 +123,8 @@ impl Template {
         if !is_near(picture, corner, side) {
             return None;
         }
-        let mut wide = [[0.0; LANES + 1]; LANES + 1];
         let around = Block::new(picture, corner - Vector2::repeat(1.0), side + 2);
-        for (row, values) in wide.iter_mut().enumerate().take(side + 2) {
-            values[..LANES].copy_from_slice(&around.row(row));
-            values[LANES] = around.last(row);
-        }
+        let wide: [[f32; LANES + 2]; LANES + 1] = std::array::from_fn(|row| around.wide_row(row));
         let mut all = Self {
             side,
             values: [[0.0; LANES]; LANES],
@@ -136,19 +132,24 @@ impl Template {
             down: [[0.0; LANES]; LANES],
             inverse: Matrix2::zeros(),
         };
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        let counts: Row = std::array::from_fn(|lane| f32::from(u8::from(lane < side)));
+        let (mut xx, mut xy, mut yy) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for row in 0..side {
             let [above, here, below] = [&wide[row], &wide[row + 1], &wide[row + 2]];
-            for column in 0..side {
-                let (left, middle, right) = (column, column + 1, column + 2);
-                // Scharr's weights: the gradient of a plane, and nearly the same in all directions.
-                let side_of = |at: usize| (3.0 * (above[at] + below[at]) + 10.0 * here[at]) / 32.0;
-                let line = |row: &[f32; LANES + 1]| (3.0 * (row[left] + row[right]) + 10.0 * row[middle]) / 32.0;
-                let (x, y) = (side_of(right) - side_of(left), line(below) - line(above));
-                (all.values[row][column], all.across[row][column], all.down[row][column]) = (here[middle], x, y);
-                (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+            // Scharr's weights: the gradient of a plane, and nearly the same in all directions.
+            let slopes: [f32; LANES + 2] = std::array::from_fn(|k| (below[k] - above[k]) / 32.0);
+            let smooth: [f32; LANES + 2] =
+                std::array::from_fn(|k| (3.0 * (above[k] + below[k]) + 10.0 * here[k]) / 32.0);
+            for lane in 0..LANES {
+                let x = counts[lane] * (smooth[lane + 2] - smooth[lane]);
+                let y = counts[lane] * (3.0 * (slopes[lane] + slopes[lane + 2]) + 10.0 * slopes[lane + 1]);
+                (all.values[row][lane], all.across[row][lane], all.down[row][lane]) = (here[lane + 1], x, y);
+                xx[lane] += x * x;
+                xy[lane] += x * y;
+                yy[lane] += y * y;
             }
         }
+        let [xx, xy, yy] = [xx, xy, yy].map(|lanes| lanes.iter().sum::<f32>());
         let least = (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt()) / 2.0;
         all.inverse = Matrix2::new(xx, xy, xy, yy).try_inverse()?;
         (least >= MIN_EIGENVALUE * (side * side) as f32).then_some(all)
@@ -213,11 +214,14 @@ impl Block {
         std::array::from_fn(|k| a * here[k] + b * here[k + 1] + c * below[k] + d * below[k + 1])
     }
 
-    /// The value after those of [`Self::row`].
-    fn last(&self, row: usize) -> f32 {
+    /// The same with one value more, and another one that does not count.
+    fn wide_row(&self, row: usize) -> [f32; LANES + 2] {
         let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
         let [a, b, c, d] = self.weights;
-        a * here[LANES] + b * here[LANES + 1] + c * below[LANES] + d * below[LANES + 1]
+        std::array::from_fn(|k| {
+            let next = (k + 1).min(LANES + 1);
+            a * here[k] + b * here[next] + c * below[k] + d * below[next]
+        })
     }
 }
 

@@ -52,7 +52,8 @@ impl<'a> Picture<'a> {
         }
         let column = x as usize;
         let part = x - column as f64;
-        let (low, high) = (self.at(column, row), self.at(column + 1, row));
+        let both = &self.values[(row * self.width + column) * CHANNELS..][..2 * CHANNELS];
+        let (low, high) = both.split_at(CHANNELS);
         Some(std::array::from_fn(|c| f64::from(low[c]) + part * (f64::from(high[c]) - f64::from(low[c]))))
     }
 }
