@@ -1,7 +1,7 @@
 //! Where the camera went, from stereo or depth pictures alone.
 //!
 //! Points are followed from the newest keyframe to each picture, a pose is taken on which they agree, and keyframes are
-//! adjusted together in a [window](window). A frame that cannot be placed has no pose; when the next one cannot be placed
+//! adjusted together in a window. A frame that cannot be placed has no pose; when the next one cannot be placed
 //! either, a new part begins there, in a frame of reference of its own: a break is told and never bridged by a guess.
 //!
 //! No pictures here: what they show is asked through [`Eyes`], some times a frame. Equations and figures:
