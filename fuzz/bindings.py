@@ -33,16 +33,11 @@ def _default_config(_: Drawn) -> None:
 def _adjust(draw: Drawn) -> None:
     k, p = draw.count() % 6, draw.count()
     _core.adjust(
-        draw.choice(None, _camera(draw, 640, 480)),
         draw.poses(k),
         draw.rows(k, 2).astype(bool),
         draw.numbers(p, 3),
-        pictures=draw.choice(None, _seen(draw, k, p)),
-        places=draw.choice(None, _seen(draw, k, p)),
+        places=_seen(draw, k, p),
         relative_poses=draw.choice(None, _between(draw, k)),
-        wanted=draw.choice([], [(0, 1)], [(0, 0)], [(5, 2**40)]),
-        max_steps=draw.choice(None, 0, 1, 3),
-        first_scale=draw.choice(None, draw.number()),
     )
 
 
@@ -59,17 +54,58 @@ def _between(draw: Drawn, k: int) -> Any:
     return {**rows, "first_from_second": draw.poses(m), "information": information}
 
 
-def _locate(draw: Drawn) -> None:
-    n = draw.count()
-    expected = draw.poses(1)
-    _core.locate(
-        _camera(draw, 640, 480),
-        draw.numbers(n, 3) + np.array([0, 0, 3.0]),
-        draw.covariances(n),
-        300 + 50 * draw.numbers(n, 2),
-        expected[0] if expected.shape == (1, 4, 4) else expected,
-        sigma_px=draw.positive(),
+class _Eyes:
+    """Pictures that answer anything."""
+
+    def __init__(self, draw: Drawn) -> None:
+        self._draw = draw
+
+    def follow(self, from_px: Any, expected_px: Any) -> Any:
+        n = len(from_px)
+        places = expected_px + self._draw.choice(0.0, self._draw.number())
+        return places, np.ones(n + self._draw.choice(0, 0, 0, 1), bool)
+
+    def find_again(self) -> Any:
+        n = self._draw.count()
+        return 20 + 10 * self._draw.numbers(n, 3), 100 + 50 * self._draw.numbers(n, 2)
+
+    def measure(self, known_px: Any, disparities_px: Any, per_cell: int) -> Any:
+        known = np.column_stack([known_px, disparities_px])
+        new = np.array([160.0, 120.0, 15.0]) + 10 * self._draw.numbers(per_cell + self._draw.count(), 3)
+        return np.concatenate([known, new]) if new.shape[1:] == (3,) else new
+
+
+def _follow(draw: Drawn) -> None:
+    odometry = _core.Odometry(_camera(draw, 320, 240), config="{}")
+    eyes = _Eyes(draw)
+    for _ in range(6):
+        odometry.take(eyes)
+    odometry.skip("unreadable")
+    odometry.trajectory()
+
+
+def _rejoin(draw: Drawn) -> None:
+    before, part = draw.count(), draw.count()
+    pose = draw.poses(1)
+    matrix = pose[0] if pose.shape == (1, 4, 4) else pose
+    _core.rejoin(
+        (draw.numbers(before, 3), draw.covariances(before)),
+        (draw.numbers(part, 3), draw.covariances(part)),
+        last=matrix,
+        step=[draw.number(), 0.1, 0.0],
+        first=np.eye(4),
     )
+
+
+def _exposure_tables(draw: Drawn) -> None:
+    height, width, channels = draw.choice((48, 64, 3), (1, 1, 1), (0, 0, 3), (24, 320, 0))
+    _core.exposure_tables(draw.bytes_of(height, width, channels), draw.bytes_of(height, width, channels))
+
+
+def _row_alignment(draw: Drawn) -> None:
+    corners = 100 * draw.numbers(draw.choice(0, 120, 300), 3)
+    _core.row_alignment(corners, (320.0, draw.choice(180.0, draw.number())))
+    _core.row_reach_px(draw.choice(0, 640, 2**40))
 
 
 def _search_rows(draw: Drawn) -> None:
@@ -135,5 +171,6 @@ def _read_pair(draw: Drawn) -> None:
 
 
 _CALLS: tuple[Callable[[Drawn], None], ...] = (
-    *(_adjust, _locate, _search_rows, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
+    *(_adjust, _follow, _search_rows, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
+    *(_rejoin, _exposure_tables, _row_alignment),
 )

@@ -65,27 +65,24 @@ SHEARED = np.eye(4) + np.eye(4, k=1)
 
 @pytest.mark.parametrize("pose", [SHEARED, 1.1 * np.eye(4), np.full((4, 4), np.nan)], ids=["sheared", "scaled", "nan"])
 def test_every_pose_is_looked_at_where_it_comes_in(pose):
-    places, empty = np.zeros((0, 3)), np.zeros((0, 3, 3))
     told = "session_from_camera: found a matrix that does not turn and move"
     with pytest.raises(ValueError, match=told):
-        _core.locate(camera(), places, empty, np.zeros((0, 2)), pose, sigma_px=0.5)
-    with pytest.raises(ValueError, match=told):
         adjusted(pose[None])
+    places = (np.zeros((0, 3)), np.zeros((0, 3, 3)))
+    with pytest.raises(ValueError, match=told):
+        _core.rejoin(places, places, last=pose, step=[1.0, 0.0, 0.0], first=np.eye(4))
+
+
+NOTHING_SEEN = {
+    "poses": np.zeros(0, np.int64),
+    "points": np.zeros(0, np.int64),
+    "values": np.zeros((0, 3)),
+    "whitenings": np.zeros((0, 3, 3)),
+}
 
 
 def adjusted(poses):
-    return _core.adjust(
-        None,
-        poses,
-        np.ones(len(poses), bool),
-        np.zeros((0, 3)),
-        pictures=None,
-        places=None,
-        relative_poses=None,
-        wanted=[],
-        max_steps=0,
-        first_scale=None,
-    )
+    return _core.adjust(poses, np.ones(len(poses), bool), np.zeros((0, 3)), places=NOTHING_SEEN, relative_poses=None)
 
 
 def test_a_pose_crosses_the_border_to_the_last_bit():
@@ -94,3 +91,78 @@ def test_a_pose_crosses_the_border_to_the_last_bit():
     np.testing.assert_array_equal(adjusted(turned[None])[0][0], turned)
     with pytest.raises(ValueError, match=r"poses: found an array of shape \[1, 3, 4\], expected \(F, 4, 4\)"):
         adjusted(turned[None, :3])
+
+
+GREY = np.ascontiguousarray(PICTURE[..., 0])
+POINTS = np.array([[20.0, 20.0], [40.0, 30.0]])
+
+
+class Eyes:
+    """Pictures in which nothing moves."""
+
+    def __init__(self, follow=None, measure=None):
+        self._follow, self._measure = follow, measure
+
+    def follow(self, from_px, _):
+        return (from_px, np.ones(len(from_px), bool)) if self._follow is None else self._follow
+
+    def find_again(self):
+        return np.zeros((0, 3)), np.zeros((0, 2))
+
+    def measure(self, *_):
+        if self._measure is not None:
+            return self._measure
+        x, y = np.meshgrid(np.arange(4.0, 60.0, 8.0), np.arange(4.0, 44.0, 8.0))
+        return np.column_stack([x.ravel(), y.ravel(), 5.0 + 0.02 * x.ravel()])
+
+
+def test_odometry_asks_eyes_and_believes_what_agrees():
+    odometry = _core.Odometry(camera(), config="{}")
+    pose, part, broken, lost, _, keyframe = odometry.take(Eyes())
+    np.testing.assert_array_equal(pose, np.eye(4))
+    assert (part, broken, lost, keyframe) == (0, None, None, True)
+    pose, _, _, _, inliers, keyframe = odometry.take(Eyes())
+    np.testing.assert_allclose(pose, np.eye(4), atol=1e-9)
+    assert (inliers, keyframe) == (35, False)
+
+
+def test_eyes_that_answer_something_else_are_a_value_error():
+    odometry = _core.Odometry(camera(baseline_m=None), config="{}")
+    with pytest.raises(ValueError, match="measure: found 2 columns, expected 3"):
+        odometry.take(Eyes(measure=POINTS))
+    odometry.take(Eyes())
+    with pytest.raises(ValueError, match="follow: expected 35 places and whether each was found"):
+        odometry.take(Eyes(follow=(POINTS, np.ones(2, bool))))
+    with pytest.raises(AttributeError, match="find_again"):
+        odometry.take(SimpleNamespace(follow=lambda start, _: (start, np.zeros(len(start), bool))))
+
+
+def test_settings_of_odometry_are_looked_at():
+    for kind in (lambda config: _core.Odometry(camera(), config=config), _core.Looking):
+        with pytest.raises(ValueError, match=r"setting odometry\.pictures\.window_px: found 99, expected 3 to 15"):
+            kind('{"odometry": {"pictures": {"window_px": 99}}}')
+
+
+def test_points_are_followed_in_whole_pictures():
+    looking = _core.Looking("{}")
+    places, found = looking.follow([GREY], [GREY], POINTS, POINTS + 0.3)
+    assert found.all()
+    np.testing.assert_allclose(places, POINTS, atol=0.02)
+    with pytest.raises(ValueError, match="expected: found 1 rows, expected 2"):
+        looking.follow([GREY], [GREY], POINTS, POINTS[:1])
+    nothing = np.zeros((0, 0), np.uint8)
+    assert not looking.follow([nothing], [nothing], POINTS, POINTS)[1].any()
+    assert not looking.follow([], [], POINTS, POINTS)[1].any()
+    assert looking.corners(nothing, POINTS, 3).shape == (0, 2)
+
+
+def test_parts_need_a_covariance_for_each_place():
+    pose = np.eye(4)
+    with pytest.raises(ValueError, match="places: found another number of covariances"):
+        _core.rejoin(
+            (np.zeros((2, 3)), np.zeros((1, 3, 3))),
+            (np.zeros((2, 3)), np.zeros((2, 3, 3))),
+            last=pose,
+            step=[1.0, 0.0, 0.0],
+            first=pose,
+        )

@@ -12,9 +12,6 @@ PYTHON = Path(__file__).parents[1] / "python"
 ROOM_NAMES = {"opening", "files"}
 """Modules that do the same job in each room: from a path to the thing in it, and the files of the room."""
 
-AWAITED = {"part", "trajectory", "Part"}
-"""Of `odometry/`, whose logic is on its way into the core."""
-
 
 def modules() -> dict[str, ast.Module]:
     found = {}
@@ -102,4 +99,4 @@ def test_no_name_stands_twice():
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(f"{name}.{node.name}")
     twice = {name: where for name, where in places.items() if len(where) > 1}
-    assert set(twice) <= ROOM_NAMES | AWAITED, twice
+    assert set(twice) <= ROOM_NAMES, twice

@@ -11,6 +11,7 @@ from tests.drive_scene import CALIBRATION, Drive, drive, sideways
 from pomona import PomonaError
 from pomona.odometry import Motion, OdometryTrajectory, StereoOdometry
 from pomona.recording import Calibration, open_recording
+from pomona.survey.pose_source import pose_source_of
 
 BLACK = np.zeros((240, 320), np.uint8)
 
@@ -141,6 +142,27 @@ def test_pictures_of_another_size_are_refused() -> None:
     without = StereoOdometry(Calibration(width=320, height=240, fx=260.0, fy=260.0, cx=160.0, cy=120.0))
     with pytest.raises(PomonaError, match="no baseline"):
         without(BLACK, BLACK)
+
+
+def test_settings_are_the_core_s(scene: Drive) -> None:
+    strict = StereoOdometry(CALIBRATION, {"odometry": {"min_inliers": 5000}})
+    assert (strict(*scene.pictures(0)[:2]).lost or "").endswith("points with depth, expected at least 5000")
+    dense = StereoOdometry(CALIBRATION, {"odometry": {"keyframe_rad": 0.001}})
+    run(scene, range(4), dense)
+    assert len(dense.trajectory().frames) == 4
+    assert [motion.keyframe for motion in run(scene, range(4, 6), dense)[1]] == [True, True]
+    with pytest.raises(PomonaError, match=r"odometry: setting odometry\.gate: found -1, expected a positive number"):
+        StereoOdometry(CALIBRATION, {"odometry": {"gate": -1.0}})
+    with pytest.raises(PomonaError, match="unknown field `windows_px`"):
+        StereoOdometry(CALIBRATION, {"odometry": {"pictures": {"windows_px": 3}}})
+
+
+def test_a_scan_hands_its_settings_on(shared_data) -> None:
+    recording = open_recording(shared_data / "rendered_row" / "2024-08-09")
+    camera = pose_source_of(recording, odometry=True, config={"odometry": {"min_inliers": 100_000}})
+    place = camera(next(iter(recording.frames())))
+    assert place.session_from_camera is None
+    assert (place.broken or "").endswith("expected at least 100000")
 
 
 @pytest.mark.parametrize("date", ["2024-08-09", "2024-08-28"])

@@ -1,5 +1,7 @@
 """Stereo depth at the fruits, on pairs made of spheres and on rendered ones with exact truth."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -41,6 +43,20 @@ def test_fruits_are_lifted_to_where_they_are_with_covariances_that_hold():
     for error, covariance in zip(errors, lifted.covariances, strict=True):
         assert error @ np.linalg.solve(covariance, error) < 11.3  # 99 % of chi^2 with 3 degrees
     np.testing.assert_allclose(lifted.diameters_m, 0.075, atol=0.002)
+
+
+def test_a_large_picture_is_matched_with_some_of_its_pixels():
+    # 100 px wide and more: every eighth pixel of a box, every third row and column of a window.
+    large = replace(PAIR, width=1280, height=960, fx=1680.0, fy=1680.0, cx=640.0, cy=480.0)
+    left, right, depth_m = pair(APPLES, camera=large)
+    boxes = np.array([box_of(sphere, large) for sphere in APPLES])
+    found = StereoDepth(large)(left, right, boxes)
+    np.testing.assert_allclose(found.disparity_px, 4 * true_disparities(APPLES), atol=0.3)
+    assert (found.support > 0.8).all()
+    measured = found.depth_m > 0
+    assert np.median(np.abs(found.depth_m[measured] / depth_m[measured] - 1)) < 0.02
+    for xmin, ymin, xmax, ymax in boxes.round().astype(int):
+        assert measured[ymin:ymax, xmin:xmax].all()
 
 
 def test_depth_is_measured_around_the_boxes_and_nowhere_else():

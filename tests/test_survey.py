@@ -124,7 +124,8 @@ def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, monkey
     assert "stopped after frame" in printed
     session = load_session(tmp_path / "session.gpkg")
     assert len(session.cloud) == 3
-    assert 2 <= len(session.trajectory) < len(STEPS_M)
+    # Frames are looked at ahead, so the signal may come while the first is still followed.
+    assert 1 <= len(session.trajectory) <= 2
     assert signal.getsignal(signal.SIGINT) is before
 
 

@@ -1,11 +1,15 @@
-from typing import Protocol, TypedDict, final
+from collections.abc import Sequence
+from typing import Protocol, Self, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "MOST_MISALIGNED",
+    "Looking",
     "MapIndex",
     "Match",
+    "Odometry",
     "Tracker",
     "Tracks",
     "__version__",
@@ -13,16 +17,21 @@ __all__ = [
     "believed",
     "default_config",
     "describe",
+    "exposure_gains",
+    "exposure_tables",
     "fuse_fruits",
     "lift",
-    "locate",
     "look_of",
     "one_fruit_each",
     "read_pair",
+    "rejoin",
+    "row_alignment",
+    "row_reach_px",
     "search_rows",
     "setting_meanings",
 ]
 
+MOST_MISALIGNED: tuple[float, float]
 __version__: str
 
 class _Arrays(TypedDict):
@@ -173,6 +182,57 @@ def one_fruit_each(
     config: str,
 ) -> NDArray[np.int64]: ...
 
+@final
+class Looking:
+    def __new__(cls, config: str) -> Self: ...
+    @property
+    def settings(self) -> str: ...
+    def corners(self, picture: NDArray[np.uint8], taken: NDArray[np.float64], per_cell: int) -> NDArray[np.float64]: ...
+    def follow(
+        self,
+        first: Sequence[NDArray[np.uint8]],
+        second: Sequence[NDArray[np.uint8]],
+        points: NDArray[np.float64],
+        expected: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
+
+class _Eyes(Protocol):
+    def follow(
+        self, from_px: NDArray[np.float64], expected_px: NDArray[np.float64], /
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
+    def find_again(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def measure(
+        self, known_px: NDArray[np.float64], disparities_px: NDArray[np.float64], per_cell: int, /
+    ) -> NDArray[np.float64]: ...
+
+_Motion = tuple[NDArray[np.float64] | None, int, str | None, str | None, int, bool]
+
+@final
+class Odometry:
+    def __new__(cls, camera: _Camera, *, config: str) -> Self: ...
+    @property
+    def disparities_px(self) -> tuple[float, float]: ...
+    def take(self, eyes: _Eyes) -> _Motion: ...
+    def skip(self, reason: str) -> _Motion: ...
+    def trajectory(
+        self,
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        float,
+    ]: ...
+
+_Places = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+def rejoin(
+    before: _Places, part: _Places, *, last: NDArray[np.float64], step: list[float], first: NDArray[np.float64]
+) -> NDArray[np.float64] | None: ...
+
 class _Seen(TypedDict):
     poses: NDArray[np.int64]
     points: NDArray[np.int64]
@@ -186,27 +246,13 @@ class _Between(TypedDict):
     information: NDArray[np.float64]
 
 def adjust(
-    camera: _Camera | None,
     poses: NDArray[np.float64],
     fixed: NDArray[np.bool_],
     points: NDArray[np.float64],
     *,
-    pictures: _Seen | None,
-    places: _Seen | None,
+    places: _Seen,
     relative_poses: _Between | None,
-    wanted: list[tuple[int, int]],
-    max_steps: int | None,
-    first_scale: float | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
-def locate(
-    camera: _Camera,
-    known: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    pixels: NDArray[np.float64],
-    expected: NDArray[np.float64],
-    *,
-    sigma_px: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]] | None: ...
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def search_rows(
     left: NDArray[np.uint8], right: NDArray[np.uint8], points: NDArray[np.float64], farthest_px: int
 ) -> NDArray[np.float64]: ...
@@ -240,3 +286,9 @@ def read_pair(
     *,
     nearest_m: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...
+def exposure_gains(picture: NDArray[np.uint8], reference: NDArray[np.uint8]) -> list[float]: ...
+def exposure_tables(picture: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDArray[np.uint8] | None: ...
+def row_alignment(
+    corners: NDArray[np.float64], centre_px: tuple[float, float]
+) -> tuple[float, float, bool, bool] | None: ...
+def row_reach_px(width: int) -> int: ...

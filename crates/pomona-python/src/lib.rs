@@ -7,11 +7,13 @@ mod cloud;
 mod descriptor;
 mod lifting;
 mod matching;
+mod odometry;
 mod pose;
 mod row_search;
 mod stereo;
 mod tracking;
 
+use pomona::stereo::alignment::CORRECTED;
 use pyo3::prelude::*;
 
 #[pymodule]
@@ -19,6 +21,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_class::<odometry::PyLooking>()?;
+    module.add_class::<odometry::PyOdometry>()?;
     module.add_class::<tracking::PyTracker>()?;
     module.add_class::<tracking::PyTracks>()?;
     module.add_function(wrap_pyfunction!(tracking::one_fruit_each, module)?)?;
@@ -28,9 +32,14 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lifting::fuse_fruits, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;
-    module.add_function(wrap_pyfunction!(bundle::locate, module)?)?;
+    module.add_function(wrap_pyfunction!(odometry::rejoin, module)?)?;
     module.add_function(wrap_pyfunction!(row_search::search_rows, module)?)?;
     module.add_function(wrap_pyfunction!(stereo::read_pair, module)?)?;
+    module.add_function(wrap_pyfunction!(stereo::exposure_gains, module)?)?;
+    module.add_function(wrap_pyfunction!(stereo::exposure_tables, module)?)?;
+    module.add_function(wrap_pyfunction!(stereo::row_alignment, module)?)?;
+    module.add_function(wrap_pyfunction!(stereo::row_reach_px, module)?)?;
+    module.add("MOST_MISALIGNED", (CORRECTED[0], CORRECTED[1]))?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     module.add_function(wrap_pyfunction!(matching::setting_meanings, module)?)?;
     Ok(())

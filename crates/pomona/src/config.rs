@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::meanings::settings;
+use crate::odometry::{OdometryConfig, PicturesConfig};
 use crate::paper::constellation::MAX_NEIGHBOURS;
 use crate::paper::ransac::RansacConfig;
 use crate::tracking::TrackingConfig;
@@ -27,6 +28,8 @@ pub struct Config {
     pub verified: VerifiedConfig,
     /// Fruits followed through the frames of a recording.
     pub tracking: TrackingConfig,
+    /// Where the camera went, from the pictures.
+    pub odometry: OdometryConfig,
 }
 }
 
@@ -102,6 +105,8 @@ impl Config {
             ("paper.ransac.", RansacConfig::MEANINGS),
             ("verified.", VerifiedConfig::MEANINGS),
             ("tracking.", TrackingConfig::MEANINGS),
+            ("odometry.", OdometryConfig::MEANINGS),
+            ("odometry.pictures.", PicturesConfig::MEANINGS),
         ];
         tables
             .into_iter()
@@ -126,7 +131,8 @@ impl Config {
         within("paper.ransac.confidence", paper.ransac.confidence, 0.0, 1.0 - f64::EPSILON)?;
         within("paper.ransac.max_samples", paper.ransac.max_samples as f64, 1.0, f64::MAX)?;
         self.verified.validate()?;
-        self.tracking.validate()
+        self.tracking.validate()?;
+        self.odometry.validate()
     }
 }
 

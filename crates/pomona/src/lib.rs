@@ -76,6 +76,7 @@ pub mod look;
 pub mod matching;
 mod meanings;
 pub mod neighbours;
+pub mod odometry;
 pub mod paper;
 pub mod pose;
 mod random;

@@ -12,6 +12,13 @@ pub struct Grey<'a> {
     pub width: usize,
 }
 
+impl Grey<'_> {
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.pixels.len() / self.width.max(1)
+    }
+}
+
 /// What counts as a match.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowSearch {
@@ -38,7 +45,7 @@ const PEAK_PX: usize = 2;
 /// or the patch reaches over the edge.
 pub fn disparity(left: Grey<'_>, right: Grey<'_>, (column, row): (usize, usize), search: &RowSearch) -> Option<usize> {
     let r = search.radius_px.min(7);
-    let height = left.pixels.len() / left.width.max(1);
+    let height = left.height();
     if column < r || row < r || column + r >= left.width || row + r >= height || right.pixels.len() != left.pixels.len()
     {
         return None;
@@ -89,14 +96,27 @@ fn similarities(
     }
     let n = (side * side) as f64;
     let own = square - sum * sum / n;
+    let (sums, squares) = (running(&sums), running(&squares));
     let similarity = |place: usize| {
-        let over = |columns: &[f32]| columns[place..place + side].iter().map(|&one| f64::from(one)).sum::<f64>();
+        let over = |columns: &[f64]| columns[place + side] - columns[place];
         let (other_sum, other_square) = (over(&sums), over(&squares));
         let other = other_square - other_sum * other_sum / n;
         let common = f64::from(products[place]) - sum * other_sum / n;
         if other < 1.0 { -1.0 } else { common / (own * other).sqrt() }
     };
     (own >= 1.0).then(|| (0..places).map(similarity).collect())
+}
+
+/// Sums of the values before each place; whole numbers, so that their differences are exact.
+fn running(values: &[f32]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(values.len() + 1);
+    let mut total = 0.0;
+    sums.push(total);
+    for &value in values {
+        total += f64::from(value);
+        sums.push(total);
+    }
+    sums
 }
 
 #[cfg(test)]

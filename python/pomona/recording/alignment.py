@@ -1,11 +1,8 @@
 """Whether the rows of left and right pictures are the same, and what to do where they are not.
 
 A rectified pair shows a point in the same row of both pictures. Where one camera was knocked since it was calibrated,
-the right picture is lower by `lower_px` and turned by `turned_rad` about its principal point,
-
-    y_right - y_left = lower_px + turned_rad (x_right - cx) + stretch (y_left - cy) + noise,
-
-and corners that are found in both pictures tell, whatever their depth. Small errors are taken out of the right picture.
+the right picture lies lower and is turned: corners that are found in both pictures tell, whatever their depth. The core
+fits and decides (`stereo/alignment.rs`); small errors are taken out of the right picture.
 """
 
 from __future__ import annotations
@@ -20,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona import _core
 from pomona.errors import PomonaWarning
-from pomona.recording.calibration import Calibration
 from pomona.recording.frame import Frame, Recording
 from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
@@ -32,19 +29,8 @@ __all__ = ["Alignment", "StraightenedRecording", "alignment_of", "straightened"]
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-TOLD = (0.3, np.radians(0.08))
-"""Offset, pixels, and turn from which on rows count as misaligned; half a pixel, or 0.1 degrees, is always told then:
-measured values err by up to 0.2 px and 0.02 degrees, and true ones of good pairs stay below 0.15 px."""
-
-CORRECTED = (3.3, np.radians(0.55))
-"""What is taken out at most. More is no knock, but another calibration, and the turn about the camera's other axes,
-which rows do not show, would be as large."""
-
 LOOKED_AT = 6
 """Frames, evenly over the recording, that are measured."""
-
-ENOUGH = 100
-"""Corners found in both pictures, over all frames, without which nothing is said."""
 
 CORNERS, PATCH_PX, MIN_DISTANCE_PX = 250, 15, 8
 
@@ -53,11 +39,6 @@ LEAST_CORRELATION = 0.85
 
 LARGEST_SHARE = 0.25
 """Of the width of the picture, as disparity."""
-
-SPREAD_PX = 0.5
-"""Deviations beyond this count less (Tukey's weights): wrong matches, one in five on foliage."""
-
-ROUNDS = 30
 
 
 @dataclass(frozen=True)
@@ -70,20 +51,16 @@ class Alignment:
         By how much the right picture shows everything lower.
     turned_rad : float
         By how much it is turned about its principal point, clockwise as seen.
+    is_off : bool
+        Whether it is to be told.
+    is_correctable : bool
+        Whether it is small enough to be taken out.
     """
 
     lower_px: float
     turned_rad: float
-
-    @property
-    def is_off(self) -> bool:
-        """Whether it is to be told."""
-        return abs(self.lower_px) >= TOLD[0] or abs(self.turned_rad) >= TOLD[1]
-
-    @property
-    def is_correctable(self) -> bool:
-        """Whether it is small enough to be taken out."""
-        return abs(self.lower_px) <= CORRECTED[0] and abs(self.turned_rad) <= CORRECTED[1]
+    is_off: bool
+    is_correctable: bool
 
     def __str__(self) -> str:
         return (
@@ -97,7 +74,8 @@ def straightened(recording: Recording) -> Recording:
     if found is None or not found.is_off:
         return recording
     if not found.is_correctable:
-        most = f"{CORRECTED[0]:g} px and {np.degrees(CORRECTED[1]):.1f} degrees"
+        most_px, most_rad = _core.MOST_MISALIGNED
+        most = f"{most_px:g} px and {np.degrees(most_rad):.1f} degrees"
         message = f"{recording.path}: {found}, more than the {most} that are taken out: calibrate the cameras again"
         warnings.warn(message, PomonaWarning, stacklevel=3)
         return recording
@@ -117,7 +95,8 @@ def alignment_of(recording: Recording) -> Alignment | None:
             found = np.concatenate([found, row_errors(frame.read_left(), frame.read_right())])
         except UnreadablePictureError:
             continue
-    return None if len(found) < ENOUGH else _fitted(found, recording.calibration)
+    fitted = _core.row_alignment(found, (recording.calibration.cx, recording.calibration.cy))
+    return None if fitted is None else Alignment(*fitted)
 
 
 def row_errors(left: Picture, right: Picture) -> Array:
@@ -126,7 +105,7 @@ def row_errors(left: Picture, right: Picture) -> Array:
 
     greys = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) if one.ndim == 3 else one for one in (left, right)]
     height, width = greys[0].shape
-    half, reach = PATCH_PX // 2, int(np.ceil(CORRECTED[0] + CORRECTED[1] * width / 2 + 2))
+    half, reach = PATCH_PX // 2, _core.row_reach_px(width)
     corners = cv2.goodFeaturesToTrack(greys[0], CORNERS, 0.01, MIN_DISTANCE_PX)
     farthest = int(LARGEST_SHARE * width)
     found = []
@@ -147,22 +126,6 @@ def _vertex(three: NDArray[Any]) -> float:
     before, peak, after = map(float, three)
     bend = before - 2 * peak + after
     return 0.5 * (before - after) / bend if bend < 0 else 0.0
-
-
-def _fitted(found: Array, calibration: Calibration) -> Alignment:
-    """Fit offset, turn and stretch by reweighted least squares, from the median on."""
-    x, y, lower = found.T
-    terms = np.stack([np.ones(len(x)), x - calibration.cx, y - calibration.cy], axis=1)
-    solution = np.array([np.median(lower), 0.0, 0.0])
-    # The first rounds let corners at the sides of a turned picture count, the later ones only those that agree.
-    for spread_px in np.geomspace(8 * SPREAD_PX, SPREAD_PX, ROUNDS):
-        off = (lower - terms @ solution) / (4 * spread_px)
-        weights = np.maximum(1 - off**2, 0.0) ** 2
-        matrix = terms.T @ (weights[:, None] * terms)
-        if np.linalg.matrix_rank(matrix) < 3:
-            break
-        solution = np.linalg.solve(matrix, terms.T @ (weights * lower))
-    return Alignment(float(solution[0]), float(solution[1]))
 
 
 @dataclass(frozen=True, eq=False)

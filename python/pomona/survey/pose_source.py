@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -75,7 +75,9 @@ class PoseSource(Protocol):
         """
 
 
-def pose_source_of(recording: Recording, *, odometry: bool = False) -> PoseSource:
+def pose_source_of(
+    recording: Recording, *, odometry: bool = False, config: Mapping[str, Any] | None = None
+) -> PoseSource:
     """Choose where poses come from.
 
     Parameters
@@ -84,6 +86,8 @@ def pose_source_of(recording: Recording, *, odometry: bool = False) -> PoseSourc
         With poses, or with one frame, or with left and right (or left and depth) pictures.
     odometry : bool
         Use odometry even where there are poses.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`; the odometry's is `odometry`.
 
     Raises
     ------
@@ -94,7 +98,7 @@ def pose_source_of(recording: Recording, *, odometry: bool = False) -> PoseSourc
         return _Recorded(recording)
     if len(recording) == 1 and not odometry:
         return _Recorded(recording)
-    return _Followed(recording)
+    return _Followed(recording, config)
 
 
 class _Recorded:
@@ -128,7 +132,7 @@ class _Followed:
         When the recording has no left pictures, or neither right pictures with a baseline nor depth.
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, config: Mapping[str, Any] | None) -> None:
         pictures = recording.description()["pictures"]
         stereo = "right" in pictures and recording.calibration.baseline_m is not None
         if "left" not in pictures or not (stereo or "depth" in pictures):
@@ -138,7 +142,7 @@ class _Followed:
             )
         self.needs: tuple[Kind, ...] = ("left", "right") if stereo else ("left", "depth")
         self._stereo, self._path = stereo, recording.path
-        self._odometry = StereoOdometry(recording.calibration)
+        self._odometry = StereoOdometry(recording.calibration, config)
         self._count_of: dict[int, int] = {}
 
     def __call__(self, frame: Frame) -> Place:

@@ -20,9 +20,6 @@ __all__ = ["Motions", "Refined", "SeenFruits", "refine"]
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-FIRST_SCALE = 1000.0
-"""A fruit that is seen again may lie 30 sigma from where drift says: the adjustment begins with a loss that wide."""
-
 
 @dataclass(frozen=True, eq=False)
 class SeenFruits:
@@ -115,11 +112,9 @@ def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions |
     fixed[:1] = True
     try:
         found = _core.adjust(
-            None,  # sightings are places; there are no pictures to project into
             poses,
             fixed,
             _medians(poses, sightings),
-            pictures=None,
             places={
                 "poses": np.ascontiguousarray(sightings.frames, np.int64),
                 "points": np.ascontiguousarray(sightings.fruits, np.int64),
@@ -134,14 +129,10 @@ def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions |
                 "first_from_second": np.ascontiguousarray(motions.first_from_second, np.float64),
                 "information": np.ascontiguousarray(motions.information, np.float64),
             },
-            wanted=[],
-            max_steps=None,
-            first_scale=FIRST_SCALE,
         )
     except ValueError as error:
         raise PomonaError(f"refinement: {error}") from None
-    adjusted, centres, covariances, squared_errors, _ = found
-    return Refined(adjusted, centres, covariances, squared_errors)
+    return Refined(*found)
 
 
 def _check(poses: Array, sightings: SeenFruits) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections import Counter
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -37,6 +37,8 @@ __all__ = ["Progress", "Survey", "scan"]
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
 
+LOOKS_AHEAD = 2
+"""Frames that are looked at before the camera is followed to them: neither waits for an uneven other."""
 
 FEW_FRAMES = 5
 """Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
@@ -115,7 +117,7 @@ def scan(
     retrack : bool
         Track the boxes even where they have ids.
     config : mapping, optional
-        Values of the core's tables that differ from `pomona.default_config()`; the tracker's is `tracking`.
+        Values of the core's tables that differ from `pomona.default_config()`; `tracking` and `odometry` are used here.
     keep : Kept, optional
         Where what single frames show is kept, so that a scan that is started again need not look twice.
     progress : callable, optional
@@ -132,14 +134,13 @@ def scan(
     if not (depth == "auto" and "depth" in recording.description()["pictures"]):
         recording = straightened(recording)
     seeing = Seeing(recording, detector, depth=depth)
-    camera = pose_source_of(recording, odometry=odometry)
+    camera = pose_source_of(recording, odometry=odometry, config=config)
     named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
     findings = _Findings(partial(_open_part, recording, None if named else config or {}))
     look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
-    with ThreadPoolExecutor(1, "pomona-look") as looker, closing(frames):
-        for done, frame in enumerate(frames, start=1):
-            look = looker.submit(look_at, frame)  # while this thread follows the camera
+    with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
+        for done, (frame, look) in enumerate(_looked_at(frames, look_at, looker), start=1):
             findings.add(frame, _placed(camera, frame), look)
             if progress is not None:
                 progress(done, len(recording), findings.n_fruits)
@@ -152,6 +153,18 @@ def scan(
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
     return survey
+
+
+def _looked_at(
+    frames: Iterable[Frame], look_at: Callable[[Frame], Look], looker: Executor
+) -> Iterator[tuple[Frame, Future[Look]]]:
+    """Give each frame and its look, which another thread takes; those of the next frames are begun already."""
+    begun: deque[tuple[Frame, Future[Look]]] = deque()
+    for frame in frames:
+        begun.append((frame, looker.submit(look_at, frame)))
+        if len(begun) > LOOKS_AHEAD:
+            yield begun.popleft()
+    yield from begun
 
 
 def _placed(camera: PoseSource, frame: Frame) -> Place:

@@ -50,6 +50,16 @@ impl Default for Settings {
     }
 }
 
+/// A fruit that is seen again may lie 30 sigma from where drift says: the adjustment begins with a loss that wide.
+const AFTER_DRIFT: f64 = 1000.0;
+
+impl Settings {
+    /// For a session that comes back to what it has seen, its poses many sigma off.
+    pub fn after_drift() -> Self {
+        Self { first_scale: AFTER_DRIFT, ..Self::default() }
+    }
+}
+
 /// What an adjustment found.
 #[derive(Debug, Clone)]
 pub struct Adjustment {

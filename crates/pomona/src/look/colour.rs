@@ -16,6 +16,9 @@ const PRIOR_PIXELS: f64 = 200.0;
 /// Part of a box on every side that is left out of its middle: corners show leaves.
 const MARGIN: usize = 5;
 
+/// Columns of the picture that are looked at outside boxes, and rows as far apart.
+const COLUMNS: usize = 320;
+
 /// A pixel of a greater probability is rather fruit than not.
 pub(crate) const FRUIT: f32 = 0.5;
 
@@ -39,9 +42,10 @@ impl FruitColour {
                 inside[bin(picture.at(column, row))] += 1.0;
             }
         }
-        // Every second pixel of every second row is enough of the rest.
-        for row in (0..height).step_by(2) {
-            for column in (0..width).step_by(2).filter(|&column| !boxed[row * width + column]) {
+        // Of the rest every second pixel of every second row is enough, fewer of a large picture.
+        let step = (width / COLUMNS).max(2);
+        for row in (0..height).step_by(step) {
+            for column in (0..width).step_by(step).filter(|&column| !boxed[row * width + column]) {
                 outside[bin(picture.at(column, row))] += 1.0;
             }
         }

@@ -6,7 +6,9 @@
 //! picture agrees and no other disparity is nearly as good. How nearly, the margin, is also what says how sure it is. Of a
 //! fruit that does not match, hidden from the right camera or from both, the size still says roughly how far it is.
 
+pub mod alignment;
 mod disc;
+pub mod exposure;
 mod picture;
 mod sizes;
 mod surroundings;

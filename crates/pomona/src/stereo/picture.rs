@@ -52,7 +52,8 @@ impl<'a> Picture<'a> {
         }
         let column = x as usize;
         let part = x - column as f64;
-        let (low, high) = (self.at(column, row), self.at(column + 1, row));
+        let both = &self.values[(row * self.width + column) * CHANNELS..][..2 * CHANNELS];
+        let (low, high) = both.split_at(CHANNELS);
         Some(std::array::from_fn(|c| f64::from(low[c]) + part * (f64::from(high[c]) - f64::from(low[c]))))
     }
 }
@@ -87,25 +88,35 @@ impl Bounds {
         for one in boxes {
             wanted[one.top..one.bottom].fill(true);
         }
+        let mut line = vec![0; width];
         for row in (0..height).filter(|&row| wanted[row]) {
+            let values = &picture.values()[row * width * CHANNELS..][..width * CHANNELS];
             for channel in 0..CHANNELS {
-                bounds.fill(picture, row, channel);
+                let along = values.iter().skip(channel).step_by(CHANNELS);
+                match matches {
+                    Side::Left => line.iter_mut().rev().zip(along).for_each(|(one, &value)| *one = value),
+                    Side::Right => line.iter_mut().zip(along).for_each(|(one, &value)| *one = value),
+                }
+                bounds.fill(&line, row, channel);
             }
         }
         bounds
     }
 
-    fn fill(&mut self, picture: Picture, row: usize, channel: usize) {
-        let last = self.width - 1;
-        let value = |column: usize| u16::from(picture.at(column, row)[channel]);
-        for column in 0..self.width {
-            let here = value(column);
-            let left = u16::midpoint(here, value(column.saturating_sub(1)));
-            let right = u16::midpoint(here, value((column + 1).min(last)));
-            let place = self.place(column, row);
-            let [lower, upper] = &mut self.planes[channel];
-            lower[place] = here.min(left).min(right) as u8;
-            upper[place] = here.max(left).max(right) as u8;
+    /// Fills a row from its values in the order of memory.
+    fn fill(&mut self, line: &[u8], row: usize, channel: usize) {
+        let here = row * self.width..(row + 1) * self.width;
+        let [lower, upper] = &mut self.planes[channel];
+        let (lower, upper) = (&mut lower[here.clone()], &mut upper[here]);
+        lower.copy_from_slice(line);
+        upper.copy_from_slice(line);
+        let neighbours = || line.iter().zip(&line[1.min(line.len())..]).map(|(&one, &next)| one.midpoint(next));
+        for from in 0..2.min(line.len()) {
+            let bounds = lower[from..].iter_mut().zip(&mut upper[from..]);
+            for ((low, high), between) in bounds.zip(neighbours()) {
+                *low = between.min(*low);
+                *high = between.max(*high);
+            }
         }
     }
 

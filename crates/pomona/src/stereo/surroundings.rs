@@ -14,6 +14,9 @@ const JUMP: i16 = 60;
 /// Disparities up to this multiple of the fruit's are tried: what is nearer covers it from a third of the way.
 const NEARER: f64 = 1.6;
 
+/// More pixels say no more: of a larger window every second, third, ... along both sides is matched.
+const MOST_PIXELS: usize = 2500;
+
 /// A window: the disparity of its pixels, row by row.
 pub(crate) struct Surroundings {
     pub(crate) pixels: PixelBox,
@@ -25,16 +28,31 @@ impl Surroundings {
     pub(crate) fn new(left: Picture, right: &Bounds, pixels: PixelBox, first: usize, fruit_px: f64) -> Self {
         let end = (NEARER * fruit_px).ceil() as usize + 1;
         let count = end.saturating_sub(first).max(3);
+        let step = step_of(pixels);
+        let (width, height) = (pixels.width().div_ceil(step), pixels.height().div_ceil(step));
         let mut costs = vec![0_u8; count];
-        let mut volume = Vec::with_capacity(pixels.width() * pixels.height() * count);
-        for (column, row) in pixels.pixels() {
-            right.costs(left.at(column, row), column, row, first, &mut costs);
-            volume.extend(costs.iter().map(|&cost| i16::from(cost)));
+        let mut volume = Vec::with_capacity(width * height * count);
+        for row in (pixels.top..pixels.bottom).step_by(step) {
+            for column in (pixels.left..pixels.right).step_by(step) {
+                right.costs(left.at(column, row), column, row, first, &mut costs);
+                volume.extend(costs.iter().map(|&cost| i16::from(cost)));
+            }
         }
-        let sums = aggregated(&volume, pixels.width(), pixels.height(), count);
-        let disparities_px = sums.chunks_exact(count).map(|sums| (first as f64 + least(sums)) as f32).collect();
-        Self { pixels, disparities_px }
+        let sums = aggregated(&volume, width, height, count);
+        let matched: Vec<f32> = sums.chunks_exact(count).map(|sums| (first as f64 + least(sums)) as f32).collect();
+        let nearest =
+            |(column, row): (usize, usize)| matched[(row - pixels.top) / step * width + (column - pixels.left) / step];
+        Self { pixels, disparities_px: pixels.pixels().map(nearest).collect() }
     }
+}
+
+/// Pixels from one that is matched to the next.
+fn step_of(pixels: PixelBox) -> usize {
+    let mut step = 1;
+    while pixels.width().div_ceil(step) * pixels.height().div_ceil(step) > MOST_PIXELS {
+        step += 1;
+    }
+    step
 }
 
 /// Sums of the four paths.

@@ -171,11 +171,11 @@ mod tests {
     }
 
     #[test]
-    fn walls_and_cordons_are_as_dense_as_crowns_that_are() {
-        // 14 and 12 cm are less than the spacings, 18 and 15 cm: round kernels find 0.5 and 0.3.
-        for size in [[2.0, 2.0, 2.0], [5.0, 0.14, 3.0], [60.0, 0.12, 0.12]] {
-            let found = seen(900, size);
-            assert!((0.6..1.33).contains(&found), "{found} of {size:?}");
+    fn walls_and_cordons_are_nearly_as_dense_as_they_are() {
+        let found = [[2.0, 2.0, 2.0], [5.0, 0.14, 3.0], [60.0, 0.12, 0.12]].map(|size| seen(900, size));
+        // 14 and 12 cm are less than the spacings, 18 and 15 cm: round kernels find 0.45 and 0.16.
+        for (found, least) in found.into_iter().zip([0.7, 0.6, 0.45]) {
+            assert!((least..1.25).contains(&found), "{found}, expected {least} at least");
         }
     }
 }

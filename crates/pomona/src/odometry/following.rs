@@ -1,0 +1,302 @@
+//! Points followed from one picture to another: the method of Lucas and Kanade on pyramids (Bouguet, 2000), forth and back.
+//!
+//! A window T around a point of the first picture and the second picture J at x + d differ by what the gradients g of T and
+//! a step explain,
+//!
+//! ```text
+//! (sum g g^T) step = sum g (T - J(x + d)),    d <- d + step,
+//! ```
+//!
+//! from the coarsest pictures to the finest. Only windows are looked at, so a call costs what its points cost, whatever the
+//! size of the pictures.
+
+use super::config::PicturesConfig;
+use crate::row_search::Grey;
+use nalgebra::{Matrix2, Vector2};
+
+/// Values of a row of a window that are computed at once; those beyond its side weigh nothing.
+const LANES: usize = 16;
+
+/// Sides of windows go up to this: with a pixel beside, a row fits.
+pub(super) const MAX_WINDOW_PX: usize = LANES - 1;
+
+/// Least eigenvalue of the mean of g g^T, squared grey steps a pixel: below, a window shows nothing that has a place.
+const MIN_EIGENVALUE: f32 = 0.1;
+
+/// Two steps that undo each other to this many pixels go on for ever; the place between is taken.
+const SWINGING_PX: f32 = 0.01;
+
+type Row = [f32; LANES];
+
+/// Where the second picture shows points (x, y) of the first, given where they are expected; none for a point that is not
+/// found, does not come home, or whose window the edge cuts.
+///
+/// Pictures come with their halvings, finest first; as many are used as both have.
+pub fn follow(
+    first: &[Grey<'_>],
+    second: &[Grey<'_>],
+    points: &[Vector2<f64>],
+    expected: &[Vector2<f64>],
+    config: &PicturesConfig,
+) -> Vec<Option<Vector2<f64>>> {
+    let levels = first.len().min(second.len());
+    let edge = (config.window_px / 2) as f64;
+    let one = |(point, expected): (&Vector2<f64>, &Vector2<f64>)| {
+        let start = point.cast::<f32>();
+        let there = descended(&first[..levels], &second[..levels], start, expected.cast(), config)?;
+        let back = descended(&second[..1], &first[..1], there, start, config)?;
+        let there: Vector2<f64> = there.cast();
+        let (width, height) = (second[0].width as f64, second[0].height() as f64);
+        let inside = there.x >= edge && there.x < width - edge && there.y >= edge && there.y < height - edge;
+        (inside && f64::from((back - start).norm()) < config.forth_and_back_px).then_some(there)
+    };
+    if levels == 0 { vec![None; points.len()] } else { points.iter().zip(expected).map(one).collect() }
+}
+
+/// From the coarsest pictures to the finest.
+fn descended(
+    first: &[Grey<'_>],
+    second: &[Grey<'_>],
+    point: Vector2<f32>,
+    expected: Vector2<f32>,
+    config: &PicturesConfig,
+) -> Option<Vector2<f32>> {
+    let mut guess = expected;
+    for level in (0..first.len()).rev() {
+        let scale = 1.0 / (1 << level) as f32;
+        let found = settled(first[level], second[level], point * scale, guess * scale, config);
+        // What a coarse picture does not show, a finer one may.
+        match found {
+            Some(place) => guess = place / scale,
+            None if level == 0 => return None,
+            None => {}
+        }
+    }
+    Some(guess)
+}
+
+/// Steps at one level until they are small; none where the window shows nothing or leaves the picture.
+fn settled(
+    first: Grey<'_>,
+    second: Grey<'_>,
+    point: Vector2<f32>,
+    guess: Vector2<f32>,
+    config: &PicturesConfig,
+) -> Option<Vector2<f32>> {
+    let side = config.window_px;
+    let half = Vector2::repeat((side - 1) as f32 / 2.0);
+    let template = Template::new(first, point - half, side)?;
+    let (mut corner, mut before) = (guess - half, Vector2::zeros());
+    for step_number in 0..config.max_steps {
+        let step = template.step(second, corner)?;
+        corner += step;
+        if f64::from(step.norm()) <= config.settled_px {
+            break;
+        }
+        if step_number > 0 && (step + before).abs().max() < SWINGING_PX {
+            corner -= step * 0.5;
+            break;
+        }
+        before = step;
+    }
+    is_near(second, corner, side).then_some(corner + half)
+}
+
+/// Whether a window touches the picture.
+fn is_near(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> bool {
+    let reach = |at: f32, size: usize| size > 0 && at >= -(side as f32) && at < size as f32;
+    reach(corner.x, picture.width) && reach(corner.y, picture.height())
+}
+
+/// A window of the first picture, its gradients, and the inverse of their sum of squares.
+struct Template {
+    side: usize,
+    values: [Row; LANES],
+    across: [Row; LANES],
+    down: [Row; LANES],
+    inverse: Matrix2<f32>,
+}
+
+impl Template {
+    /// The window with its first value at `corner`; none where it shows nothing.
+    fn new(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> Option<Self> {
+        if !is_near(picture, corner, side) {
+            return None;
+        }
+        let around = Block::new(picture, corner - Vector2::repeat(1.0), side + 2);
+        let wide: [[f32; LANES + 2]; LANES + 1] = std::array::from_fn(|row| around.wide_row(row));
+        let mut all = Self {
+            side,
+            values: [[0.0; LANES]; LANES],
+            across: [[0.0; LANES]; LANES],
+            down: [[0.0; LANES]; LANES],
+            inverse: Matrix2::zeros(),
+        };
+        let counts: Row = std::array::from_fn(|lane| f32::from(u8::from(lane < side)));
+        let (mut xx, mut xy, mut yy) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for row in 0..side {
+            let [above, here, below] = [&wide[row], &wide[row + 1], &wide[row + 2]];
+            // Scharr's weights: the gradient of a plane, and nearly the same in all directions.
+            let slopes: [f32; LANES + 2] = std::array::from_fn(|k| (below[k] - above[k]) / 32.0);
+            let smooth: [f32; LANES + 2] =
+                std::array::from_fn(|k| (3.0 * (above[k] + below[k]) + 10.0 * here[k]) / 32.0);
+            for lane in 0..LANES {
+                let x = counts[lane] * (smooth[lane + 2] - smooth[lane]);
+                let y = counts[lane] * (3.0 * (slopes[lane] + slopes[lane + 2]) + 10.0 * slopes[lane + 1]);
+                (all.values[row][lane], all.across[row][lane], all.down[row][lane]) = (here[lane + 1], x, y);
+                xx[lane] += x * x;
+                xy[lane] += x * y;
+                yy[lane] += y * y;
+            }
+        }
+        let [xx, xy, yy] = [xx, xy, yy].map(|lanes| lanes.iter().sum::<f32>());
+        let least = (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt()) / 2.0;
+        all.inverse = Matrix2::new(xx, xy, xy, yy).try_inverse()?;
+        (least >= MIN_EIGENVALUE * (side * side) as f32).then_some(all)
+    }
+
+    /// The step that explains best what differs with the window at `corner`; none where that leaves the picture.
+    fn step(&self, picture: Grey<'_>, corner: Vector2<f32>) -> Option<Vector2<f32>> {
+        if !is_near(picture, corner, self.side) {
+            return None;
+        }
+        let block = Block::new(picture, corner, self.side);
+        let (mut across, mut down) = ([0.0; LANES], [0.0; LANES]);
+        for row in 0..self.side {
+            let seen = block.row(row);
+            let [values, by_x, by_y] = [&self.values[row], &self.across[row], &self.down[row]];
+            for lane in 0..LANES {
+                let off = values[lane] - seen[lane];
+                across[lane] += off * by_x[lane];
+                down[lane] += off * by_y[lane];
+            }
+        }
+        Some(self.inverse * Vector2::new(across.iter().sum(), down.iter().sum()))
+    }
+}
+
+/// Whole pixels around a window, and how much each of four neighbours counts between them.
+struct Block {
+    pixels: [[f32; LANES + 2]; LANES + 2],
+    weights: [f32; 4],
+}
+
+impl Block {
+    fn new(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> Self {
+        let whole = corner.map(f32::floor);
+        let part = corner - whole;
+        let (left, top) = (whole.x as isize, whole.y as isize);
+        let weights =
+            [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
+        let mut pixels = [[0.0; LANES + 2]; LANES + 2];
+        let (width, height) = (picture.width as isize, picture.height() as isize);
+        let fits = left >= 0 && top >= 0 && left + LANES as isize + 2 <= width && top + (side as isize) < height;
+        for (row, values) in pixels.iter_mut().enumerate().take(side + 1) {
+            let y = reflected(top + row as isize, height) * picture.width;
+            if fits {
+                let seen = &picture.pixels[y + left as usize..][..LANES + 2];
+                for (value, &pixel) in values.iter_mut().zip(seen) {
+                    *value = f32::from(pixel);
+                }
+            } else {
+                for (column, value) in values.iter_mut().enumerate() {
+                    *value = f32::from(picture.pixels[y + reflected(left + column as isize, width)]);
+                }
+            }
+        }
+        Self { pixels, weights }
+    }
+
+    /// Values between the pixels, along one row of the window.
+    fn row(&self, row: usize) -> Row {
+        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
+        let [a, b, c, d] = self.weights;
+        std::array::from_fn(|k| a * here[k] + b * here[k + 1] + c * below[k] + d * below[k + 1])
+    }
+
+    /// The same with one value more, and another one that does not count.
+    fn wide_row(&self, row: usize) -> [f32; LANES + 2] {
+        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
+        let [a, b, c, d] = self.weights;
+        std::array::from_fn(|k| {
+            let next = (k + 1).min(LANES + 1);
+            a * here[k] + b * here[next] + c * below[k] + d * below[next]
+        })
+    }
+}
+
+/// The pixel that stands for one beyond the edge: as far inside, the edge itself once.
+fn reflected(at: isize, size: isize) -> usize {
+    let period = (2 * (size - 1)).max(1);
+    let within = at.rem_euclid(period);
+    within.min(period - within).min(size - 1) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::SplitMix;
+
+    const SIZE: [usize; 2] = [160, 120];
+
+    /// Smooth waves of all directions, moved by (x, y).
+    fn waves(x: f64, y: f64) -> Vec<u8> {
+        let mut random = SplitMix(6);
+        let mut unit = || random.below(1 << 20) as f64 / f64::from(1 << 20);
+        let waves: Vec<[f64; 3]> =
+            (0..40).map(|_| [0.9 * (unit() - 0.5), 0.9 * (unit() - 0.5), std::f64::consts::TAU * unit()]).collect();
+        let value = |column: f64, row: f64| {
+            let sum: f64 = waves.iter().map(|[a, b, phase]| (a * column + b * row + phase).sin()).sum();
+            (128.0 + 12.0 * sum).clamp(0.0, 255.0).round() as u8
+        };
+        let places = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
+        places.map(|(column, row)| value(column as f64 - x, row as f64 - y)).collect()
+    }
+
+    fn grey(pixels: &[u8]) -> Grey<'_> {
+        Grey { pixels, width: SIZE[0] }
+    }
+
+    fn followed(shift: [f64; 2], expected_off: [f64; 2], point: [f64; 2]) -> Option<Vector2<f64>> {
+        let (first, second) = (waves(0.0, 0.0), waves(shift[0], shift[1]));
+        let point = Vector2::from(point);
+        let expected = point + Vector2::from(shift) + Vector2::from(expected_off);
+        follow(&[grey(&first)], &[grey(&second)], &[point], &[expected], &PicturesConfig::default())[0]
+    }
+
+    #[test]
+    fn a_shift_is_found_to_a_part_of_a_pixel() {
+        for shift in [[0.0, 0.0], [3.3, -1.7], [-20.25, 8.5]] {
+            let found = followed(shift, [0.8, -0.6], [80.0, 60.0]).expect("plenty to see");
+            let off = found - Vector2::new(80.0, 60.0) - Vector2::from(shift);
+            assert!(off.norm() < 0.1, "{shift:?}: {off}");
+        }
+    }
+
+    #[test]
+    fn what_is_nowhere_near_or_shows_nothing_is_not_found() {
+        assert_eq!(followed([0.0, 0.0], [0.0, 500.0], [80.0, 60.0]), None);
+        let flat = vec![90; SIZE[0] * SIZE[1]];
+        let point = [Vector2::new(80.0, 60.0)];
+        assert_eq!(follow(&[grey(&flat)], &[grey(&flat)], &point, &point, &PicturesConfig::default()), [None]);
+        let nowhere = [Vector2::new(f64::NAN, 60.0)];
+        let waves = waves(0.0, 0.0);
+        assert_eq!(follow(&[grey(&waves)], &[grey(&waves)], &point, &nowhere, &PicturesConfig::default()), [None]);
+    }
+
+    #[test]
+    fn another_scene_does_not_lead_home() {
+        let (first, second) = (waves(0.0, 0.0), waves(900.0, 700.0));
+        let config = PicturesConfig::default();
+        let points: Vec<_> = (0..60).map(|k| Vector2::new(f64::from(20 + 2 * k), f64::from(20 + k))).collect();
+        let found = follow(&[grey(&first)], &[grey(&second)], &points, &points, &config);
+        assert!(found.iter().flatten().count() < 30, "{found:?}");
+    }
+
+    #[test]
+    fn windows_at_the_edge_are_followed_until_it_cuts_them() {
+        assert!(followed([0.0, 0.0], [0.5, 0.5], [7.0, 8.0]).is_some());
+        assert_eq!(followed([-4.0, 0.0], [0.0, 0.0], [8.0, 60.0]), None);
+        assert_eq!([reflected(-3, 10), reflected(11, 10), reflected(0, 1), reflected(25, 10)], [3, 7, 0, 7]);
+    }
+}
