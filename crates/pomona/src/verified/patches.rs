@@ -22,7 +22,7 @@ pub(super) const HOLD: f64 = 2.0;
 /// Share of the distance by which a crown may have bent between visits; recordings show 1 to 3 %.
 pub(super) const DRIFT: f64 = 0.02;
 
-/// Cells of a patch's own fit, by their weight (see [`super::cells`]): those next to it.
+/// Cells of a patch's own fit, by their weight (see [`super::cut`]): those next to it.
 const NEXT: f64 = 0.3;
 
 /// Cells at the least that are worth a thread of their own.
