@@ -68,8 +68,8 @@ impl VerifiedConfig {
 
     /// What the pairs of an answer must say together for "the same fruit", nats.
     ///
-    /// They are settled with every fruit predicted without its own partner, so that no fit stretches their tail:
-    /// Markov's inequality is taken as it stands.
+    /// They are settled with every fruit predicted without its own partner, so that no fit stretches their tail. The form
+    /// is that of Markov's inequality, which does not hold here: only what speaks for pairs is summed.
     pub(crate) fn least_told(&self, poses: f64, share: f64) -> f64 {
         (poses * share).max(1.0).ln() - self.false_alarm_rate.ln()
     }
