@@ -2,6 +2,6 @@
 
 from pomona.odometry.motion import Motion
 from pomona.odometry.stereo_odometry import StereoOdometry
-from pomona.odometry.trajectory import OdometryTrajectory
+from pomona.odometry.way import OdometryTrajectory
 
 __all__ = ["Motion", "OdometryTrajectory", "StereoOdometry"]

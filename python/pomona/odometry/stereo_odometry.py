@@ -15,7 +15,7 @@ from pomona.odometry.disparity import DepthDisparities, PairDisparities, halving
 from pomona.odometry.eyes import Eyes, Measure, View
 from pomona.odometry.motion import Motion
 from pomona.odometry.picture_settings import PictureSettings
-from pomona.odometry.trajectory import OdometryTrajectory
+from pomona.odometry.way import OdometryTrajectory
 from pomona.recording import Calibration
 from pomona.stereo.exposure import like
 
