@@ -140,7 +140,6 @@ PLANTINGS = {
         wood="arms",
         wires_m=(0.9,),
         reach_along_m=0.6,
-        spacing_m=1.2,
         scatter_m=(0.05, 0.05),
         fruits_per_tree=(20, 30),
         cluster_sizes=(0.8, 0.2),
