@@ -1,13 +1,17 @@
 """`pomona.match` and `pomona.Index`: what both methods must keep to."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import pomona
+from pomona import FruitCloud
 from pomona.matching import Match
 
+TESTDATA = Path(__file__).parents[1] / "testdata"
 METHODS = ["paper", "verified"]
 TURN = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()
 SHIFT = np.array([3.0, -1.0, 0.5])
@@ -27,6 +31,15 @@ def row(n: int = 120, seed: int = 0) -> NDArray[np.float64]:
 def as_tuple(match: Match) -> tuple[object, ...]:
     assert match.map_from_query is not None
     return match.status, match.map_from_query.tolist(), match.pairs.tolist(), match.probabilities.tolist()
+
+
+def test_an_answer_has_pairs() -> None:
+    """Two rows without a common fruit, whose outlines lie on each other by chance."""
+    query, map = (FruitCloud.read(TESTDATA / f"matching/outline_of_strangers_{name}.csv") for name in ("query", "map"))
+    match = pomona.match(query, map, up=(0.0, 0.0, 1.0))
+    assert match.status == "NoMatch"
+    assert match.map_from_query is None
+    assert dict(match.stages)["verified"] == 1.0, "no longer what it tests"
 
 
 @pytest.mark.parametrize("method", METHODS)

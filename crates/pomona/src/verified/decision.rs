@@ -110,17 +110,15 @@ pub(crate) fn search(
         best.growth.reach_all();
     }
     let outlined = findings.first().is_some_and(|best| best.outlined);
-    if outlined {
-        return search.answer(findings, map, query, None, stages);
-    }
-    let answer = search.answer(findings, map, query, Some(search.least_told()), stages);
+    let least = (!outlined).then(|| search.least_told());
+    let answer = search.answer(findings, map, query, least, stages);
     // Where the noise is heavy, pairs say little even under the true pose: then the outline may still tell.
     let unconfirmed = answer.verdict == Verdict::NoMatch && answer.stages.iter().any(|stage| stage.0 == "settled_nats");
     let answer = match unconfirmed.then(|| search.by_outline()).flatten() {
         Some(found) => search.answer(vec![found], map, query, None, answer.stages),
         None => answer,
     };
-    // Under a noise that is told far too small, the right pose has no pair.
+    // Under a noise that is told far too small, the right pose has no pair; an outline of strangers has none either.
     if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
 }
 
