@@ -21,9 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["FruitPlaces", "hang_fruits"]
 
-_STALKS_M = (0.014, 0.032)
+_STALKS_M, _STALKS_IN_CLUSTER_M = (0.014, 0.032), (0.018, 0.045)
 _LOWEST_SPUR_M = 0.35
-_ROUNDS, _ROUNDS_ON_ITS_SPUR = 240, 10
+_BEARING_IN_LIGHT = 2.5
+"""Log-odds of a spur at the tree's face to bear against one at its middle: flower buds form where there is light."""
+
+_ROUNDS, _ROUNDS_ON_ITS_SPUR = 200, 60
 _WOOD_POINTS = 3 * NODES
 """Of an axis, at which fruits keep clear of it."""
 
@@ -68,7 +71,8 @@ def hang_fruits(
     tips = spurs.roots(wood.nodes_m) + spurs.offsets_m
     high = np.flatnonzero(tips[:, 2] > _LOWEST_SPUR_M)
     of_tree = [high[spurs.trees[high] == tree] for tree in range(design.n_trees)]
-    on, slots = _clusters(rng, design, of_tree, trees)
+    bearing = _BEARING_IN_LIGHT * np.minimum(np.abs(tips[:, 1]) / design.training.depth_m, 1.0)
+    on, slots, alone = _clusters(rng, design, of_tree, bearing, trees)
     heights = design.apple.height_share * diameters_m
     n = len(trees)
     found = FruitPlaces(on, np.zeros((n, 3)), np.zeros(n), np.full((n, 3), np.nan))
@@ -81,7 +85,7 @@ def hang_fruits(
         if round_ >= _ROUNDS_ON_ITS_SPUR:
             on[open_] = [int(rng.choice(of_tree[tree])) for tree in trees[open_]]
             slots[open_] = rng.uniform(0.0, 2.0 * np.pi, len(open_))
-        hangs, stalks = _proposed(rng, slots[open_])
+        hangs, stalks = _proposed(rng, slots[open_], alone[open_])
         centres = tips[on[open_]] + hangs * (stalks + heights[open_] / 2.0)[:, None]
         free = _clear_of_wood(wood_tree, points, radii, centres, diameters_m[open_] / 2.0)
         free &= _clear_of_fruits(centres, diameters_m[open_] / 2.0, found.centres_m, diameters_m / 2.0, free)
@@ -95,10 +99,17 @@ def hang_fruits(
 
 
 def _clusters(
-    rng: np.random.Generator, design: RowDesign, of_tree: list[NDArray[np.int64]], trees: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Spur of each fruit, and its azimuth in its cluster; spurs are taken once before any is taken twice."""
-    on, azimuths = np.empty(len(trees), np.int64), np.empty(len(trees))
+    rng: np.random.Generator,
+    design: RowDesign,
+    of_tree: list[NDArray[np.int64]],
+    bearing: NDArray[np.float64],
+    trees: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Spur of each fruit, its azimuth in its cluster, whether it is alone; no spur twice before all once.
+
+    `bearing`, (S,), are log-odds of a spur to bear: sorted with Gumbel's noise they are drawn without replacement.
+    """
+    on, azimuths, alone = np.empty(len(trees), np.int64), np.empty(len(trees)), np.empty(len(trees), bool)
     for tree, spurs in enumerate(of_tree):
         fruits = np.flatnonzero(trees == tree)
         if len(fruits) and len(spurs) == 0:
@@ -106,23 +117,24 @@ def _clusters(
         sizes = 1 + rng.choice(len(design.cluster_sizes), len(fruits), p=design.cluster_sizes)
         cluster = np.repeat(np.arange(len(fruits)), sizes)[: len(fruits)]
         number = np.arange(len(fruits)) - np.searchsorted(cluster, cluster)
-        order = rng.permutation(spurs)
+        order = spurs[np.argsort(-bearing[spurs] - rng.gumbel(size=len(spurs)))]
         on[fruits] = order[cluster % max(len(order), 1)] if len(fruits) else 0
+        alone[fruits] = sizes[cluster] == 1 if len(fruits) else True
         start = rng.uniform(0.0, 2.0 * np.pi, len(fruits) + 1)
         azimuths[fruits] = start[cluster] + 2.0 * np.pi * number / sizes[cluster] if len(fruits) else 0.0
-    return on, azimuths
+    return on, azimuths, alone
 
 
 def _proposed(
-    rng: np.random.Generator, azimuths: NDArray[np.float64]
+    rng: np.random.Generator, azimuths: NDArray[np.float64], alone: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Directions in which fruits hang, mostly down, and lengths of stalks."""
+    """Directions in which fruits hang, and lengths of stalks: those of a cluster push one another up."""
     n = len(azimuths)
-    tilt = np.abs(rng.normal(0.35, 0.35, n)).clip(0.0, 1.4)
+    tilt = np.where(alone, np.abs(rng.normal(0.0, 0.4, n)), rng.uniform(0.2, 1.5, n))
     azimuth = azimuths + rng.normal(0.0, 0.5, n)
     level = np.sin(tilt)
     hangs = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(tilt)], axis=1)
-    return unit(hangs), rng.uniform(*_STALKS_M, n)
+    return unit(hangs), np.where(alone, rng.uniform(*_STALKS_M, n), rng.uniform(*_STALKS_IN_CLUSTER_M, n))
 
 
 def _wood_points(wood: WoodAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
