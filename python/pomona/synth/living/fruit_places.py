@@ -1,4 +1,4 @@
-"""Where fruits hang: in clusters under the tips of spurs, as big as at the harvest beside one another and the wood."""
+"""Where fruits hang: in clusters under the tips of spurs, with room beside one another and the wood when full grown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from pomona.errors import PomonaError
 from pomona.synth.living.axis_growth import unit
-from pomona.synth.living.wood import NODES, along_axes
+from pomona.synth.living.contact import WoodPoints
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,13 +27,11 @@ _BEARING_IN_LIGHT = 2.5
 """Log-odds of a spur at the tree's face to bear against one at its middle: flower buds form where there is light."""
 
 _ROUNDS, _ROUNDS_ON_ITS_SPUR = 200, 60
-_WOOD_POINTS = 3 * NODES
-"""Of an axis, at which fruits keep clear of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class FruitPlaces:
-    """Places of fruits at the harvest on unbent wood.
+    """Places of full-grown fruits on unbent wood.
 
     Attributes
     ----------
@@ -76,8 +74,7 @@ def hang_fruits(
     heights = design.apple.height_share * diameters_m
     n = len(trees)
     found = FruitPlaces(on, np.zeros((n, 3)), np.zeros(n), np.full((n, 3), np.nan))
-    points, radii = _wood_points(wood)
-    wood_tree = cKDTree(points)
+    rods = WoodPoints(wood.nodes_m, wood.radii_m)
     open_ = np.arange(n)
     for round_ in range(_ROUNDS):
         if len(open_) == 0:
@@ -87,7 +84,7 @@ def hang_fruits(
             slots[open_] = rng.uniform(0.0, 2.0 * np.pi, len(open_))
         hangs, stalks = _proposed(rng, slots[open_], alone[open_])
         centres = tips[on[open_]] + hangs * (stalks + heights[open_] / 2.0)[:, None]
-        free = _clear_of_wood(wood_tree, points, radii, centres, diameters_m[open_] / 2.0)
+        free = rods.depths_m(centres, diameters_m[open_] / 2.0).max(axis=1) <= 0.0
         free &= _clear_of_fruits(centres, diameters_m[open_] / 2.0, found.centres_m, diameters_m / 2.0, free)
         placed = open_[free]
         found.hangs[placed], found.stalks_m[placed], found.centres_m[placed] = hangs[free], stalks[free], centres[free]
@@ -135,24 +132,6 @@ def _proposed(
     level = np.sin(tilt)
     hangs = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(tilt)], axis=1)
     return unit(hangs), np.where(alone, rng.uniform(*_STALKS_M, n), rng.uniform(*_STALKS_IN_CLUSTER_M, n))
-
-
-def _wood_points(wood: WoodAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    axes = np.repeat(np.arange(len(wood)), _WOOD_POINTS)
-    places = np.tile(np.linspace(0.0, 1.0, _WOOD_POINTS), len(wood))
-    return along_axes(wood.nodes_m, axes, places), along_axes(wood.radii_m, axes, places)
-
-
-def _clear_of_wood(
-    wood_tree: cKDTree,
-    points: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    fruit_radii: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    near = min(8, len(points))
-    gaps, which = wood_tree.query(centres, k=near)
-    return np.asarray((gaps >= fruit_radii[:, None] + radii[which]).all(axis=1))
 
 
 def _clear_of_fruits(
