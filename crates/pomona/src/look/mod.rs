@@ -42,11 +42,13 @@ pub fn look_of(picture: Picture, boxes_px: &[[f64; 4]]) -> Look {
 /// Mean probability of being fruit in the ellipse of a box, and the pixels that rather are.
 fn fruitness(picture: Picture, one: &PixelBox, colours: &FruitColour) -> (f64, f64) {
     let (mut sum, mut count, mut fruit) = (0.0, 0.0, 0.0);
-    for (column, row) in one.pixels().filter(|&(column, row)| in_ellipse(one, column, row)) {
-        let probability = colours.of(picture.at(column, row));
-        sum += f64::from(probability);
-        count += 1.0;
-        fruit += f64::from(u8::from(probability > FRUIT));
+    for (row, columns) in one.rows_in(|column, row| in_ellipse(one, column, row)) {
+        count += columns.len() as f64;
+        for &colour in &picture.row(row)[columns] {
+            let probability = colours.of(colour);
+            sum += f64::from(probability);
+            fruit += f64::from(u8::from(probability > FRUIT));
+        }
     }
     (if count > 0.0 { sum / count } else { 0.0 }, fruit)
 }

@@ -28,6 +28,9 @@ const SWINGING_PX: f32 = 0.01;
 
 type Row = [f32; LANES];
 
+/// Pixels of a row, one more than there are values between them.
+type Line = [f32; LANES + 1];
+
 /// Where the second picture shows points (x, y) of the first, given where they are expected; none for a point that is not
 /// found, does not come home, or whose window the edge cuts.
 ///
@@ -123,8 +126,11 @@ impl Template {
         if !is_near(picture, corner, side) {
             return None;
         }
-        let around = Block::new(picture, corner - Vector2::repeat(1.0), side + 2);
-        let wide: [[f32; LANES + 2]; LANES + 1] = std::array::from_fn(|row| around.wide_row(row));
+        let window = Window::new(picture, corner - Vector2::repeat(1.0), side + 2);
+        let mut wide = [[0.0; LANES + 2]; LANES + 1];
+        for (row, values) in wide.iter_mut().enumerate().take(side + 2) {
+            *values = window.wide_row(row);
+        }
         let mut all = Self {
             side,
             values: [[0.0; LANES]; LANES],
@@ -160,68 +166,71 @@ impl Template {
         if !is_near(picture, corner, self.side) {
             return None;
         }
-        let block = Block::new(picture, corner, self.side);
+        let window = Window::new(picture, corner, self.side);
         let (mut across, mut down) = ([0.0; LANES], [0.0; LANES]);
-        for row in 0..self.side {
-            let seen = block.row(row);
-            let [values, by_x, by_y] = [&self.values[row], &self.across[row], &self.down[row]];
+        let mut here: Line = window.pixels(0);
+        let templates = self.values.iter().zip(&self.across).zip(&self.down).take(self.side);
+        for (row, ((values, by_x), by_y)) in templates.enumerate() {
+            let below: Line = window.pixels(row + 1);
             for lane in 0..LANES {
-                let off = values[lane] - seen[lane];
+                let off = values[lane] - window.between(&here[lane..], &below[lane..]);
                 across[lane] += off * by_x[lane];
                 down[lane] += off * by_y[lane];
             }
+            here = below;
         }
         Some(self.inverse * Vector2::new(across.iter().sum(), down.iter().sum()))
     }
 }
 
-/// Whole pixels around a window, and how much each of four neighbours counts between them.
-struct Block {
-    pixels: [[f32; LANES + 2]; LANES + 2],
+/// A window between the pixels of a picture.
+struct Window<'a> {
+    picture: Grey<'a>,
+    left: isize,
+    top: isize,
+    /// Whether the picture holds all of it.
+    is_inside: bool,
+    /// How much each of four neighbours counts.
     weights: [f32; 4],
 }
 
-impl Block {
-    fn new(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> Self {
+impl<'a> Window<'a> {
+    fn new(picture: Grey<'a>, corner: Vector2<f32>, side: usize) -> Self {
         let whole = corner.map(f32::floor);
         let part = corner - whole;
         let (left, top) = (whole.x as isize, whole.y as isize);
         let weights =
             [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
-        let mut pixels = [[0.0; LANES + 2]; LANES + 2];
-        let (width, height) = (picture.width as isize, picture.height() as isize);
-        let fits = left >= 0 && top >= 0 && left + LANES as isize + 2 <= width && top + (side as isize) < height;
-        for (row, values) in pixels.iter_mut().enumerate().take(side + 1) {
-            let y = reflected(top + row as isize, height) * picture.width;
-            if fits {
-                let seen = &picture.pixels[y + left as usize..][..LANES + 2];
-                for (value, &pixel) in values.iter_mut().zip(seen) {
-                    *value = f32::from(pixel);
-                }
-            } else {
-                for (column, value) in values.iter_mut().enumerate() {
-                    *value = f32::from(picture.pixels[y + reflected(left + column as isize, width)]);
-                }
-            }
+        let (right, bottom) = (left + LANES as isize + 2, top + side as isize);
+        let is_inside = left >= 0 && top >= 0 && right <= picture.width as isize && bottom < picture.height() as isize;
+        Self { picture, left, top, is_inside, weights }
+    }
+
+    /// Whole pixels of a row.
+    fn pixels<const N: usize>(&self, row: usize) -> [f32; N] {
+        let Grey { pixels, width } = self.picture;
+        if self.is_inside {
+            let seen = &pixels[(self.top as usize + row) * width + self.left as usize..][..N];
+            return std::array::from_fn(|k| f32::from(seen[k]));
         }
-        Self { pixels, weights }
+        let first = reflected(self.top + row as isize, self.picture.height() as isize) * width;
+        std::array::from_fn(|k| f32::from(pixels[first + reflected(self.left + k as isize, width as isize)]))
     }
 
-    /// Values between the pixels, along one row of the window.
-    fn row(&self, row: usize) -> Row {
-        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
-        let [a, b, c, d] = self.weights;
-        std::array::from_fn(|k| a * here[k] + b * here[k + 1] + c * below[k] + d * below[k + 1])
-    }
-
-    /// The same with one value more, and another one that does not count.
+    /// Values of a row of the window with two more; the last of them does not count.
     fn wide_row(&self, row: usize) -> [f32; LANES + 2] {
-        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
+        let [here, below]: [[f32; LANES + 2]; 2] = [self.pixels(row), self.pixels(row + 1)];
+        let mut values = [0.0; LANES + 2];
+        for k in 0..=LANES {
+            values[k] = self.between(&here[k..], &below[k..]);
+        }
+        values
+    }
+
+    /// The value between the first two pixels of two rows.
+    fn between(&self, here: &[f32], below: &[f32]) -> f32 {
         let [a, b, c, d] = self.weights;
-        std::array::from_fn(|k| {
-            let next = (k + 1).min(LANES + 1);
-            a * here[k] + b * here[next] + c * below[k] + d * below[next]
-        })
+        a * here[0] + b * here[1] + c * below[0] + d * below[1]
     }
 }
 
