@@ -108,11 +108,12 @@ def _row_alignment(draw: Drawn) -> None:
     _core.row_reach_px(draw.choice(0, 640, 2**40))
 
 
-def _search_rows(draw: Drawn) -> None:
+def _disparities(draw: Drawn) -> None:
     shape = draw.choice((0, 0), (1, 1), (3, 40), (24, 32), (48, 64))
-    left, right = draw.bytes_of(*shape), draw.bytes_of(*shape)
+    lefts = [draw.bytes_of(*shape) for _ in range(draw.choice(1, 1, 0, 3))]
+    rights = [draw.bytes_of(*draw.choice(shape, shape, (3, 40))) for _ in range(draw.choice(len(lefts), 1))]
     points = draw.numbers(draw.count(), draw.choice(2, 2, 3, 0)) * 20
-    _core.search_rows(left, right, points, draw.choice(0, 1, 10, 2**40, -1))
+    _core.Looking("{}").disparities(lefts, rights, points, draw.choice(0.0, 1.0, 10.0, 2.0**40, draw.number()))
 
 
 def _describe(draw: Drawn) -> None:
@@ -171,6 +172,6 @@ def _read_pair(draw: Drawn) -> None:
 
 
 _CALLS: tuple[Callable[[Drawn], None], ...] = (
-    *(_adjust, _follow, _search_rows, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
+    *(_adjust, _follow, _disparities, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
     *(_rejoin, _exposure_tables, _row_alignment),
 )

@@ -153,7 +153,27 @@ def test_points_are_followed_in_whole_pictures():
     nothing = np.zeros((0, 0), np.uint8)
     assert not looking.follow([nothing], [nothing], POINTS, POINTS)[1].any()
     assert not looking.follow([], [], POINTS, POINTS)[1].any()
-    assert looking.corners(nothing, POINTS, 3).shape == (0, 2)
+    assert looking.corners([nothing], POINTS, 3).shape == (0, 2)
+    assert looking.corners([], POINTS, 3).shape == (0, 2)
+
+
+def test_disparities_are_looked_for_in_pairs_of_one_size():
+    looking = _core.Looking("{}")
+    found = looking.disparities([GREY], [np.roll(GREY, -4, axis=1)], POINTS, 9.0)
+    np.testing.assert_array_equal(found, 4.0)
+    assert np.isnan(looking.disparities([], [], POINTS, 9.0)).all()
+    with pytest.raises(ValueError, match="left, right: expected pictures of the same sizes"):
+        looking.disparities([GREY], [GREY[:, 1:].copy()], POINTS, 9.0)
+
+
+def test_the_colour_of_a_box_is_the_median_of_its_middle():
+    picture = np.random.default_rng(4).integers(0, 256, (40, 60, 3), np.uint8)
+    colours, fruitness, fruit_px, _ = _core.look_of(
+        picture, np.array([[10.0, 4.0, 30.0, 28.0], [-20.0, 36.0, 4.0, 50.0]])
+    )
+    expected = [np.median(picture[10:22, 15:25].reshape(-1, 3), axis=0), picture[39, 0]]
+    np.testing.assert_array_equal(colours, np.array(expected).astype(np.uint8))
+    assert fruitness.shape == fruit_px.shape == (2,)
 
 
 def test_parts_need_a_covariance_for_each_place():

@@ -27,7 +27,6 @@ __all__ = [
     "rejoin",
     "row_alignment",
     "row_reach_px",
-    "search_rows",
     "setting_meanings",
 ]
 
@@ -170,7 +169,7 @@ def believed(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], float]: ...
 def look_of(
     picture: NDArray[np.uint8], boxes_px: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def one_fruit_each(
     *,
     centres: NDArray[np.float64],
@@ -187,7 +186,16 @@ class Looking:
     def __new__(cls, config: str) -> Self: ...
     @property
     def settings(self) -> str: ...
-    def corners(self, picture: NDArray[np.uint8], taken: NDArray[np.float64], per_cell: int) -> NDArray[np.float64]: ...
+    def corners(
+        self, pictures: Sequence[NDArray[np.uint8]], taken: NDArray[np.float64], per_cell: int
+    ) -> NDArray[np.float64]: ...
+    def disparities(
+        self,
+        left: Sequence[NDArray[np.uint8]],
+        right: Sequence[NDArray[np.uint8]],
+        points: NDArray[np.float64],
+        farthest_px: float,
+    ) -> NDArray[np.float64]: ...
     def follow(
         self,
         first: Sequence[NDArray[np.uint8]],
@@ -253,9 +261,6 @@ def adjust(
     places: _Seen,
     relative_poses: _Between | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
-def search_rows(
-    left: NDArray[np.uint8], right: NDArray[np.uint8], points: NDArray[np.float64], farthest_px: int
-) -> NDArray[np.float64]: ...
 def default_config() -> str: ...
 def setting_meanings() -> dict[str, str]: ...
 def describe(positions: NDArray[np.float64], k: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...

@@ -1,15 +1,16 @@
 //! How much of boxes looks like fruit.
 
 use crate::lifting::boxes;
-use numpy::{PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pomona::look;
 use pomona::stereo::Picture;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-type Looked<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+type Looked<'py> =
+    (Bound<'py, PyArray2<u8>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
-/// Fruitness (D,) and pixels that look like fruit (D,) of boxes, fruitness of places without one.
+/// Median colours (D, 3), fruitness (D,) and pixels that look like fruit (D,) of boxes, fruitness of places without one.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn look_of<'py>(
@@ -27,5 +28,6 @@ pub fn look_of<'py>(
     let values = picture.as_slice()?;
     let found = py.detach(|| look::look_of(Picture::new(values, width), &boxes));
     let given = |values| PyArray1::from_vec(py, values);
-    Ok((given(found.fruitness), given(found.fruit_px), given(found.elsewhere)))
+    let colours = PyArray1::from_iter(py, found.colours.into_iter().flatten()).reshape([boxes.len(), channels])?;
+    Ok((colours, given(found.fruitness), given(found.fruit_px), given(found.elsewhere)))
 }

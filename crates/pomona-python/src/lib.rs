@@ -9,7 +9,6 @@ mod lifting;
 mod matching;
 mod odometry;
 mod pose;
-mod row_search;
 mod stereo;
 mod tracking;
 
@@ -33,7 +32,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;
     module.add_function(wrap_pyfunction!(odometry::rejoin, module)?)?;
-    module.add_function(wrap_pyfunction!(row_search::search_rows, module)?)?;
     module.add_function(wrap_pyfunction!(stereo::read_pair, module)?)?;
     module.add_function(wrap_pyfunction!(stereo::exposure_gains, module)?)?;
     module.add_function(wrap_pyfunction!(stereo::exposure_tables, module)?)?;

@@ -9,8 +9,8 @@ use numpy::{
 };
 use pomona::nalgebra::{Vector2, Vector3};
 use pomona::odometry::{
-    Eyes, FoundAgain, Lens, Motion, Odometry, OdometryConfig, Passage, PicturesConfig, Places, corners, follow,
-    rejoined,
+    Eyes, FoundAgain, Lens, Motion, Odometry, OdometryConfig, Passage, PicturesConfig, Places, corners, disparities,
+    follow, rejoined,
 };
 use pomona::row_search::Grey;
 use pomona::{Config, Pose};
@@ -121,17 +121,38 @@ impl PyLooking {
         serde_json::to_string(&self.0).map_err(wrong)
     }
 
-    /// Corners (N, 2), the strongest of each cell, none near those already taken; the latter count, too.
+    /// Corners (N, 2), the strongest of each cell, none near those already taken; the latter count, too. Pictures with
+    /// their halvings.
     fn corners<'py>(
         &self,
         py: Python<'py>,
-        picture: PyReadonlyArray2<'py, u8>,
+        pictures: Vec<PyReadonlyArray2<'py, u8>>,
         taken: PyReadonlyArray2<'py, f64>,
         per_cell: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let taken: Vec<_> = columns::<2>("taken", &taken)?.into_iter().map(Vector2::from).collect();
-        let grey = Grey { pixels: picture.as_slice()?, width: picture.shape()[1] };
-        pixels(py, &py.detach(|| corners(grey, &taken, per_cell, &self.0)))
+        let pictures = greys(&pictures)?;
+        pixels(py, &py.detach(|| corners(&pictures, &taken, per_cell, &self.0)))
+    }
+
+    /// Disparities (N,) of points (N, 2) of the left picture, to some pixels, NaN where there is none; pictures with
+    /// their halvings.
+    fn disparities<'py>(
+        &self,
+        py: Python<'py>,
+        left: Vec<PyReadonlyArray2<'py, u8>>,
+        right: Vec<PyReadonlyArray2<'py, u8>>,
+        points: PyReadonlyArray2<'py, f64>,
+        farthest_px: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points: Vec<_> = columns::<2>("points", &points)?.into_iter().map(Vector2::from).collect();
+        let (left, right) = (greys(&left)?, greys(&right)?);
+        let size = |one: &Grey<'_>| (one.width, one.pixels.len());
+        if left.iter().map(size).ne(right.iter().map(size)) {
+            return Err(wrong("left, right: expected pictures of the same sizes"));
+        }
+        let found = py.detach(|| disparities(&left, &right, &points, farthest_px, &self.0));
+        Ok(PyArray1::from_iter(py, found.into_iter().map(|found| found.unwrap_or(f64::NAN))))
     }
 
     /// Points (N, 2) of the first picture in the second one, expected at (N, 2); pictures with their halvings.

@@ -1,6 +1,7 @@
 //! A rectified pinhole camera, and what lies on its pictures.
 
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// Size, intrinsics and, where there is a camera to its right, the distance to it.
 ///
@@ -182,6 +183,15 @@ impl PixelBox {
     /// Whether a pixel is one of them.
     pub fn contains(&self, column: usize, row: usize) -> bool {
         (self.left..self.right).contains(&column) && (self.top..self.bottom).contains(&row)
+    }
+
+    /// Each row, with its columns in a shape that has no gap in any row.
+    pub fn rows_in(self, is_in: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = (usize, Range<usize>)> {
+        (self.top..self.bottom).filter_map(move |row| {
+            let first = (self.left..self.right).find(|&column| is_in(column, row))?;
+            let last = (first..self.right).rfind(|&column| is_in(column, row))?;
+            Some((row, first..last + 1))
+        })
     }
 
     /// Column and row of each pixel, row by row.

@@ -73,27 +73,24 @@ fn similarities(
     side: usize,
 ) -> Option<Vec<f64>> {
     let width = places + side - 1;
-    let (mut products, mut sums, mut squares) = (vec![0_f32; places], vec![0_f32; width], vec![0_f32; width]);
-    let mut strip = vec![0_f32; width];
-    let (mut sum, mut square) = (0.0, 0.0);
-    for row in corner.1..corner.1 + side {
-        let patch = &left.pixels[row * left.width + corner.0..][..side];
+    let (mut sums, mut squares) = (vec![0_f32; width], vec![0_f32; width]);
+    // What is beyond the last place is black, and its products are thrown away.
+    let room = places.next_multiple_of(LANES) + side - 1;
+    let (mut strips, mut patch) = (vec![0_f32; room * side], Vec::with_capacity(side * side));
+    for (row, strip) in (corner.1..).zip(strips.chunks_exact_mut(room)) {
+        patch.extend(left.pixels[row * left.width + corner.0..][..side].iter().map(|&pixel| f32::from(pixel)));
         for (value, &pixel) in strip.iter_mut().zip(&right.pixels[row * right.width + first..][..width]) {
             *value = f32::from(pixel);
         }
-        for ((sum, square), value) in sums.iter_mut().zip(&mut squares).zip(&strip) {
+        for ((sum, square), value) in sums.iter_mut().zip(&mut squares).zip(&*strip) {
             *sum += value;
             *square += value * value;
         }
-        for (offset, &value) in patch.iter().enumerate() {
-            let value = f32::from(value);
-            sum += f64::from(value);
-            square += f64::from(value * value);
-            for (product, other) in products.iter_mut().zip(&strip[offset..]) {
-                *product += value * other;
-            }
-        }
     }
+    let products: Vec<f32> =
+        (0..places).step_by(LANES).flat_map(|place| products(&patch, side, &strips, room, place)).collect();
+    let (sum, square) =
+        patch.iter().fold((0.0, 0.0), |(sum, square), &one| (sum + f64::from(one), square + f64::from(one * one)));
     let n = (side * side) as f64;
     let own = square - sum * sum / n;
     let (sums, squares) = (running(&sums), running(&squares));
@@ -105,6 +102,23 @@ fn similarities(
         if other < 1.0 { -1.0 } else { common / (own * other).sqrt() }
     };
     (own >= 1.0).then(|| (0..places).map(similarity).collect())
+}
+
+/// Places that are compared at once: their sums stay in registers.
+const LANES: usize = 16;
+
+/// Sums of the products of a patch with those that begin at `place` and after it, in rows of `room` values.
+fn products(patch: &[f32], side: usize, strips: &[f32], room: usize, place: usize) -> [f32; LANES] {
+    let mut sums = [0.0; LANES];
+    for (values, strip) in patch.chunks_exact(side).zip(strips.chunks_exact(room)) {
+        for (offset, &value) in values.iter().enumerate() {
+            let Some(others) = strip[place + offset..].first_chunk::<LANES>() else { break };
+            for (sum, other) in sums.iter_mut().zip(others) {
+                *sum += value * other;
+            }
+        }
+    }
+    sums
 }
 
 /// Sums of the values before each place; whole numbers, so that their differences are exact.

@@ -22,7 +22,8 @@ Picture = NDArray[np.uint8]
 
 def is_flat(picture: Picture, settings: PictureSettings) -> bool:
     """Whether a picture shows nothing."""
-    return float(picture[::4, ::4].std()) < settings.flat_contrast
+    _, contrast = cv2.meanStdDev(np.ascontiguousarray(picture[::4, ::4]))
+    return float(contrast[0, 0]) < settings.flat_contrast
 
 
 def halvings(picture: Picture, levels: int) -> tuple[Picture, ...]:
@@ -35,10 +36,10 @@ def halvings(picture: Picture, levels: int) -> tuple[Picture, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PairDisparities:
-    """Disparities in a rectified pair that was exposed alike, searched for up to `farthest_px`."""
+    """Disparities in a rectified pair that was exposed alike, both with halvings, searched for up to `farthest_px`."""
 
-    left: Picture
-    right: Picture
+    left: tuple[Picture, ...]
+    right: tuple[Picture, ...]
     farthest_px: float
     settings: PictureSettings
     looking: _core.Looking
@@ -52,11 +53,10 @@ class PairDisparities:
             Disparities that are known roughly; NaN where the whole row is to be searched.
         """
         guess, unknown = expected.copy(), np.isnan(expected)
-        rows = np.rint(points[unknown])
-        guess[unknown] = _core.search_rows(self.left, self.right, rows, int(self.farthest_px))
+        guess[unknown] = self.looking.disparities(self.left, self.right, points[unknown], self.farthest_px)
         known = np.flatnonzero(np.isfinite(guess))
         there = points[known] - np.stack([guess[known], np.zeros(len(known))], axis=1)
-        places, kept = self.looking.follow([self.left], [self.right], points[known], there)
+        places, kept = self.looking.follow(self.left[:1], self.right[:1], points[known], there)
         kept &= np.abs(places[:, 1] - points[known, 1]) < self.settings.max_row_error_px
         found = points[known, 0] - places[:, 0]
         kept &= found > self.settings.min_disparity_px

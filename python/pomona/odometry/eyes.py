@@ -60,16 +60,16 @@ class Eyes:
     def find_again(self) -> tuple[Array, Array]:
         """Match the keyframe's points, u, v, disparity (M, 3), with the picture's (M, 2), wherever they are."""
         none, dense = np.zeros((0, 2)), self.settings.dense_per_cell
-        keyframe, picture = self._keyframe, self._compared[0]
-        seen = keyframe.seen(none, np.zeros(0), self.looking.corners(keyframe.picture, none, dense))
+        keyframe, compared = self._keyframe, self._compared
+        seen = keyframe.seen(none, np.zeros(0), self.looking.corners(keyframe.pictures, none, dense))
         seen = seen[np.isfinite(seen[:, 2])]
-        candidates = self.looking.corners(picture, none, dense)
-        there, matched = rematch(keyframe.picture, picture, seen[:, :2], candidates, self.settings)
+        candidates = self.looking.corners(compared, none, dense)
+        there, matched = rematch(keyframe.picture, compared[0], seen[:, :2], candidates, self.settings)
         return seen[matched], there[matched]
 
     def measure(self, known_px: Array, disparities_px: Array, per_cell: int) -> Array:
         """Give u, v, disparity of known points (N, 2), then of new corners, as many as the cells have room for."""
-        new = self.looking.corners(self.view.picture, known_px, per_cell)
+        new = self.looking.corners(self.view.pictures, known_px, per_cell)
         return self.view.seen(known_px, disparities_px, new)
 
     @property

@@ -78,8 +78,8 @@ class StereoOdometry:
         if is_flat(right, self._settings):
             return self.skip(NOTHING)
         _, farthest_px = self._core.disparities_px
-        adapted = like(right, left)
-        return self._take(left, PairDisparities(left, adapted, farthest_px, self._settings, self._looking))
+        lefts, rights = (halvings(one, self._settings.levels) for one in (left, like(right, left)))
+        return self._take(lefts, PairDisparities(lefts, rights, farthest_px, self._settings, self._looking))
 
     def with_depth(self, left: Picture, depth_m: NDArray[np.float32]) -> Motion:
         """Take the next frame of a depth camera.
@@ -99,7 +99,8 @@ class StereoOdometry:
         self._check(left, "left")
         self._check(depth_m, "depth")
         reach_px_m, _ = self._core.disparities_px
-        return self._take(left, DepthDisparities(depth_m, reach_px_m, self._settings))
+        lefts = halvings(left, self._settings.levels)
+        return self._take(lefts, DepthDisparities(depth_m, reach_px_m, self._settings))
 
     def skip(self, reason: str) -> Motion:
         """Take a frame whose picture cannot be used."""
@@ -109,10 +110,10 @@ class StereoOdometry:
         """Give the refined poses so far and the motions between them."""
         return OdometryTrajectory(*self._core.trajectory())
 
-    def _take(self, left: Picture, measure: Measure) -> Motion:
-        if is_flat(left, self._settings):
+    def _take(self, lefts: tuple[Picture, ...], measure: Measure) -> Motion:
+        if is_flat(lefts[0], self._settings):
             return self.skip(NOTHING)
-        view = View(halvings(left, self._settings.levels), measure)
+        view = View(lefts, measure)
         motion = Motion(*self._core.take(Eyes(view, self._newest, self._settings, self._looking)))
         if motion.keyframe:
             self._newest = view

@@ -190,7 +190,8 @@ def _cut_off(encoded: bytes) -> str | None:
         return None if b"IEND" in encoded[-32:] else "PNG"
     if encoded.startswith(b"\xff\xd8"):
         # The end of the image must come after the last start of a scan; thumbnails have ends of their own before it.
-        return None if encoded.rfind(b"\xff\xd9") > encoded.rfind(b"\xff\xda") else "JPEG"
+        end = encoded.rfind(b"\xff\xd9")
+        return "JPEG" if end < 0 or encoded.find(b"\xff\xda", end) >= 0 else None
     return None
 
 

@@ -20,9 +20,6 @@ from pomona.survey.prefetch import Kind
 
 __all__ = ["Look", "Seeing"]
 
-COLOUR_PART = 0.5
-"""Middle part of a box, along each side, whose median is the fruit's colour: mostly fruit, whatever hides its rim."""
-
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -112,20 +109,8 @@ class Seeing:
         if not self._colour or frame.read_left is None:
             return look
         left, boxes_px = frame.read_left(), detections.boxes_px
-        colours = np.array([_colour(left, box_px) for box_px in boxes_px], np.uint8).reshape(-1, 3)
-        fruitness, fruit_px, elsewhere = _core.look_of(np.ascontiguousarray(left), boxes_px)
+        colours, fruitness, fruit_px, elsewhere = _core.look_of(np.ascontiguousarray(left), boxes_px)
         return replace(look, colours=colours, fruitness=fruitness, fruit_px=fruit_px, elsewhere=elsewhere)
-
-
-def _colour(picture: NDArray[np.uint8], box_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Median colour of the middle of a box; the box may reach out of the picture, its middle pixel is kept inside."""
-    height, width = picture.shape[:2]
-    centre, half = (box_px[:2] + box_px[2:]) / 2, COLOUR_PART * (box_px[2:] - box_px[:2]) / 2
-    limits = np.array([width - 1, height - 1])
-    low = np.clip(np.floor(centre - half).astype(int), 0, limits)
-    high = np.clip(np.ceil(centre + half).astype(int), low + 1, limits + 1)
-    middle = picture[low[1] : high[1], low[0] : high[0]].reshape(-1, 3)
-    return np.asarray(np.median(middle, axis=0))
 
 
 def _depth_of(recording: Recording, how: str) -> _Depth:

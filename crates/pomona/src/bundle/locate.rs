@@ -111,17 +111,15 @@ fn consensus(camera: &Camera, known: &KnownPoints, expected: &Pose, settings: &L
         return None;
     }
     let mut random = SplitMix(settings.seed);
-    let (mut best_cost, count) = cost(camera, known, expected, settings);
+    let (mut best_cost, count) = cost(camera, known, expected, settings, f64::INFINITY)?;
     let mut best = *expected;
     let (mut samples, mut needed) = (0, settings.max_samples.min(samples_needed(count as f64 / n as f64, settings)));
     while samples < needed {
         samples += 1;
         let Some(pose) = pose_of_three(camera, known, expected, random.three(n)) else { continue };
-        let (candidate, count) = cost(camera, known, &pose, settings);
-        if candidate < best_cost {
-            (best, best_cost) = (pose, candidate);
-            needed = needed.min(samples_needed(count as f64 / n as f64, settings));
-        }
+        let Some((candidate, count)) = cost(camera, known, &pose, settings, best_cost) else { continue };
+        (best, best_cost) = (pose, candidate);
+        needed = needed.min(samples_needed(count as f64 / n as f64, settings));
     }
     Some(best)
 }
@@ -172,15 +170,25 @@ fn squared_error(camera: &Camera, known: &KnownPoints, pose: &Pose, i: usize, si
     covariance.try_inverse().map_or(f64::INFINITY, |information| error.dot(&(information * error)))
 }
 
-/// Truncated squared distances (MSAC) and the number of agreeing matches.
-fn cost(camera: &Camera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> (f64, usize) {
+/// Truncated squared distances (MSAC) and the number of agreeing matches; none from the bound on, which most poses reach
+/// after a part of the matches.
+fn cost(
+    camera: &Camera,
+    known: &KnownPoints,
+    pose: &Pose,
+    settings: &LocateSettings,
+    bound: f64,
+) -> Option<(f64, usize)> {
     let (mut cost, mut count) = (0.0, 0);
     for i in 0..known.points.len() {
         let squared = squared_error(camera, known, pose, i, settings.sigma_px);
         cost += squared.min(settings.gate);
         count += usize::from(squared <= settings.gate);
+        if cost >= bound {
+            return None;
+        }
     }
-    (cost, count)
+    Some((cost, count))
 }
 
 fn agreeing(camera: &Camera, known: &KnownPoints, pose: &Pose, settings: &LocateSettings) -> Vec<bool> {

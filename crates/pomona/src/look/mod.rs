@@ -5,11 +5,12 @@
 //! without a box are what false boxes are drawn around.
 
 mod colour;
+mod middle;
 
 pub(crate) use colour::{FRUIT, FruitColour};
 
 use crate::camera::PixelBox;
-use crate::stereo::Picture;
+use crate::stereo::{CHANNELS, Picture};
 
 /// Places without a box that are looked at, along and down the picture: a hundred at most.
 const PLACES: [usize; 2] = [12, 8];
@@ -17,6 +18,8 @@ const PLACES: [usize; 2] = [12, 8];
 /// What the boxes of one picture look like.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Look {
+    /// Per box: median colour of its middle, BGR.
+    pub colours: Vec<[u8; CHANNELS]>,
     /// Per box: mean probability that the colour of a pixel in its ellipse is fruit. 0 of a box without a pixel.
     pub fruitness: Vec<f64>,
     /// Per box: pixels whose colour is rather fruit.
@@ -29,24 +32,27 @@ pub struct Look {
 pub fn look_of(picture: Picture, boxes_px: &[[f64; 4]]) -> Look {
     let (width, height) = (picture.width(), picture.height());
     let boxes: Vec<_> = boxes_px.iter().map(|&one| PixelBox::new(one, 0, width, height)).collect();
-    if boxes.is_empty() {
+    if boxes.is_empty() || picture.values().is_empty() {
         return Look::default();
     }
     let colours = FruitColour::new(picture, &boxes);
     let seen = |one: &PixelBox| fruitness(picture, one, &colours);
     let (means, pixels) = boxes.iter().map(seen).unzip();
     let elsewhere = places_without(&boxes, width, height).iter().map(|one| seen(one).0).collect();
-    Look { fruitness: means, fruit_px: pixels, elsewhere }
+    let medians = boxes_px.iter().map(|&one| middle::colour(picture, one)).collect();
+    Look { colours: medians, fruitness: means, fruit_px: pixels, elsewhere }
 }
 
 /// Mean probability of being fruit in the ellipse of a box, and the pixels that rather are.
 fn fruitness(picture: Picture, one: &PixelBox, colours: &FruitColour) -> (f64, f64) {
     let (mut sum, mut count, mut fruit) = (0.0, 0.0, 0.0);
-    for (column, row) in one.pixels().filter(|&(column, row)| in_ellipse(one, column, row)) {
-        let probability = colours.of(picture.at(column, row));
-        sum += f64::from(probability);
-        count += 1.0;
-        fruit += f64::from(u8::from(probability > FRUIT));
+    for (row, columns) in one.rows_in(|column, row| in_ellipse(one, column, row)) {
+        count += columns.len() as f64;
+        for &colour in &picture.row(row)[columns] {
+            let probability = colours.of(colour);
+            sum += f64::from(probability);
+            fruit += f64::from(u8::from(probability > FRUIT));
+        }
     }
     (if count > 0.0 { sum / count } else { 0.0 }, fruit)
 }

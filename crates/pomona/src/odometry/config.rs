@@ -70,6 +70,9 @@ settings! {
 pub struct PicturesConfig {
     /// Standard deviation in grey steps under which a picture shows nothing: black, covered or burnt out.
     pub flat_contrast: f64,
+    /// Corners and whole disparities are looked for in the first halving that is no taller than this, pixels: a taller
+    /// picture shows the same, in 15 x 15 pixels less of it.
+    pub tallest_px: usize,
     /// Cells over which corners are spread, along the picture: 144 of 16 : 9. As many in a larger picture: it shows the same.
     pub cells_across: usize,
     /// Between corners, pixels: nearer ones see the same window.
@@ -148,6 +151,7 @@ impl Default for PicturesConfig {
     fn default() -> Self {
         Self {
             flat_contrast: 3.0,
+            tallest_px: 540,
             cells_across: 16,
             min_distance_px: 4,
             min_corner: 2e-4,
@@ -243,6 +247,7 @@ impl PicturesConfig {
         let contrast = self.flat_contrast;
         require("odometry.pictures.flat_contrast", contrast, (0.0..=128.0).contains(&contrast), "0 to 128")?;
         let counts = [
+            ("odometry.pictures.tallest_px", self.tallest_px, 1, 1_000_000),
             ("odometry.pictures.cells_across", self.cells_across, 1, 1000),
             ("odometry.pictures.min_distance_px", self.min_distance_px, 1, 1000),
             ("odometry.pictures.edge_px", self.edge_px, 1, 1000),

@@ -16,8 +16,9 @@ const REACH: usize = WINDOW / 2 + 1;
 /// Of a sum of gradients: Sobel's weights are four times the mean, values go to 255, and the sum is divided by the side.
 const UNIT: f32 = 1.0 / (4.0 * 5.0 * 255.0);
 
-/// Corners that are not near those already `taken`, so many in each cell with these; by cells, the strongest first.
-pub fn corners(
+/// Corners of a picture that are not near those already `taken`, so many in each cell with these; by cells, the strongest
+/// first.
+pub(super) fn strongest(
     picture: Grey<'_>,
     taken: &[Vector2<f64>],
     per_cell: usize,
@@ -195,7 +196,7 @@ mod tests {
     }
 
     fn found(pixels: &[u8], taken: &[Vector2<f64>], per_cell: usize) -> Vec<Vector2<f64>> {
-        corners(Grey { pixels, width: WIDTH }, taken, per_cell, &PicturesConfig::default())
+        strongest(Grey { pixels, width: WIDTH }, taken, per_cell, &PicturesConfig::default())
     }
 
     #[test]
@@ -231,6 +232,6 @@ mod tests {
         let bar: Vec<u8> = (0..WIDTH * 90).map(|at| if at % WIDTH < 80 { 20 } else { 200 }).collect();
         assert!(found(&bar, &[], 5).is_empty());
         assert!(found(&squares(&[(0, 0)]), &[], 5).iter().all(|one| one.x >= 8.0 && one.y >= 8.0));
-        assert!(corners(Grey { pixels: &[9; 25], width: 5 }, &[], 1, &PicturesConfig::default()).is_empty());
+        assert!(strongest(Grey { pixels: &[9; 25], width: 5 }, &[], 1, &PicturesConfig::default()).is_empty());
     }
 }

@@ -44,7 +44,7 @@ pub fn follow(
     let one = |(point, expected): (&Vector2<f64>, &Vector2<f64>)| {
         let start = point.cast::<f32>();
         let there = descended(&first[..levels], &second[..levels], start, expected.cast(), config)?;
-        let back = descended(&second[..1], &first[..1], there, start, config)?;
+        let back = settled(second[0], first[0], there, start, config)?;
         let there: Vector2<f64> = there.cast();
         let (width, height) = (second[0].width as f64, second[0].height() as f64);
         let inside = there.x >= edge && there.x < width - edge && there.y >= edge && there.y < height - edge;
@@ -123,8 +123,12 @@ impl Template {
         if !is_near(picture, corner, side) {
             return None;
         }
-        let around = Block::new(picture, corner - Vector2::repeat(1.0), side + 2);
-        let wide: [[f32; LANES + 2]; LANES + 1] = std::array::from_fn(|row| around.wide_row(row));
+        let mut room = NO_ROOM;
+        let window = Window::new(picture, corner - Vector2::repeat(1.0), side + 2, &mut room);
+        let mut wide = [[0.0; AROUND]; LANES + 1];
+        for (row, values) in wide.iter_mut().enumerate().take(side + 2) {
+            window.fill(row, values);
+        }
         let mut all = Self {
             side,
             values: [[0.0; LANES]; LANES],
@@ -137,9 +141,8 @@ impl Template {
         for row in 0..side {
             let [above, here, below] = [&wide[row], &wide[row + 1], &wide[row + 2]];
             // Scharr's weights: the gradient of a plane, and nearly the same in all directions.
-            let slopes: [f32; LANES + 2] = std::array::from_fn(|k| (below[k] - above[k]) / 32.0);
-            let smooth: [f32; LANES + 2] =
-                std::array::from_fn(|k| (3.0 * (above[k] + below[k]) + 10.0 * here[k]) / 32.0);
+            let slopes: [f32; AROUND] = std::array::from_fn(|k| (below[k] - above[k]) / 32.0);
+            let smooth: [f32; AROUND] = std::array::from_fn(|k| (3.0 * (above[k] + below[k]) + 10.0 * here[k]) / 32.0);
             for lane in 0..LANES {
                 let x = counts[lane] * (smooth[lane + 2] - smooth[lane]);
                 let y = counts[lane] * (3.0 * (slopes[lane] + slopes[lane + 2]) + 10.0 * slopes[lane + 1]);
@@ -160,68 +163,93 @@ impl Template {
         if !is_near(picture, corner, self.side) {
             return None;
         }
-        let block = Block::new(picture, corner, self.side);
+        let mut room = NO_ROOM;
+        let window = Window::new(picture, corner, self.side, &mut room);
         let (mut across, mut down) = ([0.0; LANES], [0.0; LANES]);
-        for row in 0..self.side {
-            let seen = block.row(row);
-            let [values, by_x, by_y] = [&self.values[row], &self.across[row], &self.down[row]];
-            for lane in 0..LANES {
-                let off = values[lane] - seen[lane];
-                across[lane] += off * by_x[lane];
-                down[lane] += off * by_y[lane];
-            }
+        for first in (0..LANES).step_by(QUAD) {
+            let here = first..first + QUAD;
+            let [by_x, by_y] = self.sums(&window, first);
+            across[here.clone()].copy_from_slice(&by_x);
+            down[here].copy_from_slice(&by_y);
         }
         Some(self.inverse * Vector2::new(across.iter().sum(), down.iter().sum()))
     }
+
+    /// Sums over the rows, in a few columns: all that is needed stays in registers.
+    fn sums(&self, window: &Window<'_>, first: usize) -> [[f32; QUAD]; 2] {
+        let [a, b, c, d] = window.weights;
+        let (mut across, mut down) = ([0.0; QUAD], [0.0; QUAD]);
+        let [mut left, mut right] = window.pixels(0, first);
+        let templates = self.values.iter().zip(&self.across).zip(&self.down).take(self.side);
+        for (row, ((values, by_x), by_y)) in templates.enumerate() {
+            let [left_below, right_below] = window.pixels(row + 1, first);
+            let [values, by_x, by_y] = [values, by_x, by_y].map(|all| &all[first..first + QUAD]);
+            for k in 0..QUAD {
+                let off = values[k] - (a * left[k] + b * right[k] + c * left_below[k] + d * right_below[k]);
+                across[k] += off * by_x[k];
+                down[k] += off * by_y[k];
+            }
+            [left, right] = [left_below, right_below];
+        }
+        [across, down]
+    }
 }
 
-/// Whole pixels around a window, and how much each of four neighbours counts between them.
-struct Block {
-    pixels: [[f32; LANES + 2]; LANES + 2],
+/// Values of a register that every processor has.
+const QUAD: usize = 4;
+
+/// Pixels around a window: one more than it has values, and two more for its gradients.
+const AROUND: usize = LANES + 2;
+
+/// Room for the pixels around a window that the edge of the picture cuts.
+type Room = [u8; AROUND * AROUND];
+const NO_ROOM: Room = [0; AROUND * AROUND];
+
+/// A window between the pixels of a picture.
+struct Window<'a> {
+    /// From its first pixel on.
+    pixels: &'a [u8],
+    /// Pixels from one row to the next.
+    stride: usize,
+    /// How much each of four neighbours counts.
     weights: [f32; 4],
 }
 
-impl Block {
-    fn new(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> Self {
+impl<'a> Window<'a> {
+    fn new(picture: Grey<'a>, corner: Vector2<f32>, side: usize, room: &'a mut Room) -> Self {
         let whole = corner.map(f32::floor);
         let part = corner - whole;
         let (left, top) = (whole.x as isize, whole.y as isize);
         let weights =
             [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
-        let mut pixels = [[0.0; LANES + 2]; LANES + 2];
         let (width, height) = (picture.width as isize, picture.height() as isize);
-        let fits = left >= 0 && top >= 0 && left + LANES as isize + 2 <= width && top + (side as isize) < height;
-        for (row, values) in pixels.iter_mut().enumerate().take(side + 1) {
-            let y = reflected(top + row as isize, height) * picture.width;
-            if fits {
-                let seen = &picture.pixels[y + left as usize..][..LANES + 2];
-                for (value, &pixel) in values.iter_mut().zip(seen) {
-                    *value = f32::from(pixel);
-                }
-            } else {
-                for (column, value) in values.iter_mut().enumerate() {
-                    *value = f32::from(picture.pixels[y + reflected(left + column as isize, width)]);
-                }
+        if left >= 0 && top >= 0 && left + AROUND as isize <= width && top + (side as isize) < height {
+            let first = top as usize * picture.width + left as usize;
+            return Self { pixels: &picture.pixels[first..], stride: picture.width, weights };
+        }
+        for (row, pixels) in room.chunks_exact_mut(AROUND).enumerate().take(side + 1) {
+            let first = reflected(top + row as isize, height) * picture.width;
+            for (column, pixel) in pixels.iter_mut().enumerate() {
+                *pixel = picture.pixels[first + reflected(left + column as isize, width)];
             }
         }
-        Self { pixels, weights }
+        Self { pixels: room, stride: AROUND, weights }
     }
 
-    /// Values between the pixels, along one row of the window.
-    fn row(&self, row: usize) -> Row {
-        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
-        let [a, b, c, d] = self.weights;
-        std::array::from_fn(|k| a * here[k] + b * here[k + 1] + c * below[k] + d * below[k + 1])
+    /// Whole pixels of a row from a column on, and their neighbours to the right.
+    fn pixels(&self, row: usize, first: usize) -> [[f32; QUAD]; 2] {
+        let seen = &self.pixels[row * self.stride + first..][..=QUAD];
+        [0, 1].map(|shift| std::array::from_fn(|k| f32::from(seen[shift + k])))
     }
 
-    /// The same with one value more, and another one that does not count.
-    fn wide_row(&self, row: usize) -> [f32; LANES + 2] {
-        let [here, below] = [&self.pixels[row], &self.pixels[row + 1]];
+    /// Fills in the values of a row with two more; the last of them does not count.
+    fn fill(&self, row: usize, values: &mut [f32; AROUND]) {
         let [a, b, c, d] = self.weights;
-        std::array::from_fn(|k| {
-            let next = (k + 1).min(LANES + 1);
-            a * here[k] + b * here[next] + c * below[k] + d * below[next]
-        })
+        let [here, below] = [row, row + 1].map(|row| &self.pixels[row * self.stride..][..AROUND]);
+        for k in 0..AROUND - 1 {
+            let [left, right, left_below, right_below] = [here[k], here[k + 1], below[k], below[k + 1]].map(f32::from);
+            values[k] = a * left + b * right + c * left_below + d * right_below;
+        }
     }
 }
 

@@ -11,6 +11,7 @@ mod config;
 mod corners;
 mod eyes;
 mod following;
+mod looking;
 mod part;
 mod reference;
 mod rejoining;
@@ -23,9 +24,9 @@ use crate::pose::Pose;
 use nalgebra::{Matrix6, Vector2, Vector3};
 
 pub use config::{OdometryConfig, PicturesConfig};
-pub use corners::corners;
 pub use eyes::{Eyes, FoundAgain};
 pub use following::follow;
+pub use looking::{corners, disparities};
 pub use rejoining::{Passage, Places, rejoined};
 
 use part::Part;

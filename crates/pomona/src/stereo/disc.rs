@@ -22,6 +22,12 @@ const PART: f64 = 0.97;
 /// Weights are whole, so that costs sum without rounding: this is one.
 const UNIT_WEIGHT: f64 = 64.0;
 
+/// Bytes that are worked on at once.
+const LANES: usize = 16;
+
+/// So many weighted costs sum up in 16 bits.
+const FEW: usize = (u16::MAX / (UNIT_WEIGHT as u16 * TRUNCATION as u16)) as usize;
+
 /// Least weight of a pixel, over one: colour is a hint and no proof.
 const MIN_WEIGHT: f64 = 0.02;
 
@@ -44,7 +50,7 @@ struct Spot {
     colour: [u8; CHANNELS],
     /// t of equation (1).
     t: f64,
-    weight: i16,
+    weight: u16,
 }
 
 /// The pixels of a fruit's outline.
@@ -77,7 +83,7 @@ impl Disc {
                 let colour = left.at(column, row);
                 // Squared: half a chance of being fruit is a quarter of a vote.
                 let weight = (f64::from(colours.of(colour)).powi(2)).max(MIN_WEIGHT);
-                Some(Spot { column, row, colour, t, weight: (UNIT_WEIGHT * weight).round().max(1.0) as i16 })
+                Some(Spot { column, row, colour, t, weight: (UNIT_WEIGHT * weight).round().max(1.0) as u16 })
             })
             .collect();
         if spots.len() < MIN_SPOTS {
@@ -113,19 +119,27 @@ impl Disc {
     fn mean_costs(
         &self,
         other: &Bounds,
-        spots: impl Iterator<Item = (usize, usize, [u8; CHANNELS], i16)>,
+        spots: impl Iterator<Item = (usize, usize, [u8; CHANNELS], u16)>,
         count: usize,
     ) -> Vec<f64> {
-        let (mut sums, mut costs) = (vec![0_i32; count], vec![0_u8; count]);
+        // Whole registers: what is beyond the count is thrown away.
+        let filled = count.next_multiple_of(LANES);
+        let (mut sums, mut few, mut costs) = (vec![0_u32; filled], vec![0_u16; filled], vec![0_u8; filled]);
+        let mut begun = 0;
         for (column, row, colour, weight) in spots {
             other.costs(colour, column, row, 0, &mut costs);
-            for (sum, &cost) in sums.iter_mut().zip(&costs) {
-                // Products of 16 bits, which every processor has.
-                *sum += i32::from(weight) * i32::from(i16::from(cost));
+            for (sum, &cost) in few.iter_mut().zip(&costs) {
+                *sum += weight * u16::from(cost);
+            }
+            begun += 1;
+            if begun == FEW {
+                empty_into(&mut sums, &mut few);
+                begun = 0;
             }
         }
+        empty_into(&mut sums, &mut few);
         let scale = 1.0 / (self.weight * f64::from(TRUNCATION));
-        sums.into_iter().map(|sum| f64::from(sum) * scale).collect()
+        sums.into_iter().take(count).map(|sum| f64::from(sum) * scale).collect()
     }
 
     /// Disparity of the centre to a part of a pixel, from the least cost within `REACH_PX` of `start_px`.
@@ -144,6 +158,12 @@ impl Disc {
     pub(crate) fn support(&self, right: Picture, centre_px: f64) -> f64 {
         let agrees = |spot: &&Spot| spot.difference(right, centre_px) < f64::from(TRUNCATION) / 2.0;
         self.spots.iter().filter(agrees).map(|spot| f64::from(spot.weight)).sum::<f64>() / self.weight
+    }
+}
+
+fn empty_into(sums: &mut [u32], few: &mut [u16]) {
+    for (sum, few) in sums.iter_mut().zip(few) {
+        *sum += u32::from(std::mem::take(few));
     }
 }
 

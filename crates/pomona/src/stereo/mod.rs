@@ -13,7 +13,7 @@ mod picture;
 mod sizes;
 mod surroundings;
 
-pub use picture::Picture;
+pub use picture::{CHANNELS, Picture};
 
 use crate::camera::{Camera, PixelBox};
 use crate::lifting::outline::Outline;

@@ -37,6 +37,11 @@ impl<'a> Picture<'a> {
         self.values
     }
 
+    /// The colours of a row.
+    pub(crate) fn row(&self, row: usize) -> &'a [[u8; CHANNELS]] {
+        self.values[row * self.width * CHANNELS..][..self.width * CHANNELS].as_chunks().0
+    }
+
     /// The colour of a pixel.
     pub fn at(&self, column: usize, row: usize) -> [u8; CHANNELS] {
         let first = (row * self.width + column) * CHANNELS;
@@ -88,16 +93,16 @@ impl Bounds {
         for one in boxes {
             wanted[one.top..one.bottom].fill(true);
         }
-        let mut line = vec![0; width];
+        let mut lines: [Vec<u8>; CHANNELS] = std::array::from_fn(|_| vec![0; width]);
         for row in (0..height).filter(|&row| wanted[row]) {
-            let values = &picture.values()[row * width * CHANNELS..][..width * CHANNELS];
-            for channel in 0..CHANNELS {
-                let along = values.iter().skip(channel).step_by(CHANNELS);
-                match matches {
-                    Side::Left => line.iter_mut().rev().zip(along).for_each(|(one, &value)| *one = value),
-                    Side::Right => line.iter_mut().zip(along).for_each(|(one, &value)| *one = value),
+            for (column, colour) in picture.row(row).iter().enumerate() {
+                let along = bounds.along(column);
+                for (line, &value) in lines.iter_mut().zip(colour) {
+                    line[along] = value;
                 }
-                bounds.fill(&line, row, channel);
+            }
+            for (channel, line) in lines.iter().enumerate() {
+                bounds.fill(line, row, channel);
             }
         }
         bounds
@@ -120,29 +125,31 @@ impl Bounds {
         }
     }
 
-    fn place(&self, column: usize, row: usize) -> usize {
-        let along = match self.matches {
+    fn along(&self, column: usize) -> usize {
+        match self.matches {
             Side::Left => self.width - 1 - column,
             Side::Right => column,
-        };
-        row * self.width + along
+        }
     }
 
     /// Costs of a pixel of the other picture at the disparities `from`, `from + 1`, ...: differences of colour, summed
     /// over the channels and cut at `TRUNCATION`. Where this picture ends, a cost is `TRUNCATION`.
     pub(crate) fn costs(&self, colour: [u8; CHANNELS], column: usize, row: usize, from: usize, costs: &mut [u8]) {
         let end = (row + 1) * self.width;
-        let first = (self.place(column, row) + from).min(end);
+        let first = (row * self.width + self.along(column) + from).min(end);
         let seen = costs.len().min(end - first);
         let (inside, outside) = costs.split_at_mut(seen);
         outside.fill(TRUNCATION);
-        inside.fill(0);
-        for (value, [lower, upper]) in colour.into_iter().zip(&self.planes) {
-            for ((cost, &low), &high) in inside.iter_mut().zip(&lower[first..end]).zip(&upper[first..end]) {
-                // At most one of the two differences is not 0.
-                let difference = value.saturating_sub(high) + low.saturating_sub(value);
-                *cost = cost.saturating_add(difference).min(TRUNCATION);
-            }
+        let [blue, green, red] = self.planes.each_ref().map(|[lower, upper]| {
+            let (lower, upper) = (&lower[first..first + seen], &upper[first..first + seen]);
+            lower.iter().zip(upper)
+        });
+        // At most one of the two differences is not 0.
+        let difference = |value: u8, (&low, &high): (&u8, &u8)| value.saturating_sub(high) | low.saturating_sub(value);
+        for (((cost, blue), green), red) in inside.iter_mut().zip(blue).zip(green).zip(red) {
+            let [blue, green, red] =
+                [difference(colour[0], blue), difference(colour[1], green), difference(colour[2], red)];
+            *cost = blue.saturating_add(green).saturating_add(red).min(TRUNCATION);
         }
     }
 }

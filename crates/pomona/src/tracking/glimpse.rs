@@ -192,9 +192,11 @@ fn shown(
     let pixels = PixelBox::new([across.low, down.low, across.high, down.high], 0, picture.width(), picture.height());
     let off = |at: usize, of: Interval| (at as f64 + 0.5 - f64::midpoint(of.low, of.high)) / of.half();
     let (mut all, mut fruit) = (0_usize, 0_usize);
-    for (column, row) in pixels.pixels().filter(|&(column, row)| off(column, across).hypot(off(row, down)) <= 1.0) {
-        all += 1;
-        fruit += usize::from(colours.of(picture.at(column, row)) > FRUIT && !is_covered(column, row));
+    for (row, columns) in pixels.rows_in(|column, row| off(column, across).hypot(off(row, down)) <= 1.0) {
+        all += columns.len();
+        for (column, &colour) in columns.clone().zip(&picture.row(row)[columns]) {
+            fruit += usize::from(colours.of(colour) > FRUIT && !is_covered(column, row));
+        }
     }
     (all > 0).then(|| fruit as f64 / all as f64)
 }
