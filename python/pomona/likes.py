@@ -21,6 +21,7 @@ __all__ = [
     "PICTURE",
     "RENDERED",
     "SCANNED",
+    "SEASON",
     "VIDEO",
     "VISITS",
     "Database",
@@ -28,6 +29,7 @@ __all__ = [
     "database_of",
     "is_like",
     "is_of_demo",
+    "visits_of_season",
 ]
 
 HEAD_BYTES = 4096
@@ -46,6 +48,12 @@ DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 
 TRUTH_KEYS = {"cell", "seed", "map_from_query"}
 """In the truth of drawn visits."""
+
+DATED = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}\.csv")
+"""Names of the visits of a drawn season."""
+
+SEASON_KEYS = {"season", "seed", "visits"}
+"""In the truth of a drawn season."""
 
 DEMO_SEED = 1
 DEMO_DATES = ("2024-08-09", "2024-08-28")
@@ -166,6 +174,24 @@ def _has_drawn_visits(folder: Path) -> bool:
     return all(_is_truth(folder / f"truth{name['seed']}.json") for name in ours)
 
 
+def visits_of_season(folder: Path) -> set[str]:
+    """Names of the visits that the truth of a drawn season in a folder tells of; none where there is no such truth."""
+    try:
+        found = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+        if not found.keys() >= SEASON_KEYS:
+            return set()
+        return {name for visit in found["visits"] if DATED.fullmatch(name := visit["file"])}
+    except (OSError, ValueError, LookupError, AttributeError, TypeError):
+        return set()
+
+
+def _has_season(folder: Path) -> bool:
+    """Tell a folder in which every file with one of our names is told of by a truth of ours."""
+    names = {path.name for path in folder.iterdir()}
+    ours = visits_of_season(folder)
+    return {name for name in names if DATED.fullmatch(name)} <= ours and ("truth.json" not in names or bool(ours))
+
+
 def is_of_demo(path: Path) -> bool:
     """Tell a map or a session that holds visits drawn by the demo and no others."""
     from pomona.errors import PomonaError
@@ -199,6 +225,7 @@ VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
+SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),

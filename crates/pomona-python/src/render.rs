@@ -147,12 +147,7 @@ impl PyRowScene {
         seed: u32,
     ) -> PyResult<Self> {
         let camera = camera.to_stereo_camera()?;
-        if camera.width.saturating_mul(camera.height) > MOST_PIXELS {
-            let (width, height) = (camera.width, camera.height);
-            return Err(PyValueError::new_err(format!(
-                "camera: found {width}x{height}, expected at most 67 million pixels"
-            )));
-        }
+        require_size(&camera)?;
         let views = poses("session_from_camera", &session_from_camera, Pose::from_matrix)?;
         let places: Vec<_> = views.iter().map(|view| view.translation.map(|x| x as f32)).collect();
         let row = Row {
@@ -183,6 +178,14 @@ impl PyRowScene {
             PyArray1::from_vec(py, pair.ids).reshape([height, width])?,
         ))
     }
+}
+
+fn require_size(&Camera { width, height, .. }: &Camera) -> PyResult<()> {
+    if (1..=MOST_PIXELS).contains(&width.saturating_mul(height)) {
+        return Ok(());
+    }
+    let found = format!("camera: found {width}x{height}, expected 1 to {MOST_PIXELS} pixels");
+    Err(PyValueError::new_err(found))
 }
 
 /// Rows of an (N, 3) array, finite.

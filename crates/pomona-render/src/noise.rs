@@ -23,7 +23,7 @@ pub fn noise(place: Vec3, seed: u32) -> f32 {
     let floor = place.map(f32::floor);
     let [x, y, z] = [floor.x as i32, floor.y as i32, floor.z as i32];
     let t = (place - floor).map(|t| t * t * (3.0 - 2.0 * t));
-    let corner = |i: i32, j: i32, k: i32| unit(hash(x + i, y + j, z + k, seed));
+    let corner = |i: i32, j: i32, k: i32| unit(hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k), seed));
     let along_x = |j, k| mix(corner(0, j, k), corner(1, j, k), t.x);
     let along_y = |k| mix(along_x(0, k), along_x(1, k), t.y);
     mix(along_y(0), along_y(1), t.z)

@@ -3,6 +3,7 @@
 use crate::Vec3;
 use crate::eye::{Eye, Gust, SAMPLES};
 use crate::light::{Light, Weather};
+use crate::noise::hash;
 use crate::raster::{NOTHING, Samples, View, draw};
 use crate::row::Row;
 use crate::shapes::{Mesh, Thing};
@@ -76,6 +77,8 @@ impl Scene {
             focal_px / nearest.sqrt().max(0.2)
         };
         let mesh = Mesh::new(&row, px_per_m);
+        // Streams of chance are counted from it: there is room for them above.
+        let seed = hash(seed as i32, 0, 0, 0) >> 4;
         let light = Light::new(&row, &mesh, weather, seed);
         Self { ground: Ground::new(&row, seed), row, mesh, light, wind_m: weather.wind_m, seed }
     }

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pomona.cli.synth_video import synth_video
+from pomona.cli.terminal import say
 from pomona.cli.verbs import Verbs, Writes
-from pomona.likes import VISITS
+from pomona.likes import SEASON, VISITS
 
 if TYPE_CHECKING:
     from pomona.synth.clouds import ScenePair
+    from pomona.synth.seasons import SeasonPlan
 
 app = Verbs(help="Draw seeded orchards with known truth.", no_args_is_help=True)
 
@@ -50,6 +52,67 @@ def synth_clouds(
 
 
 app.command("video")(synth_video)
+
+
+@app.command("season")
+def synth_season(
+    season: str = typer.Argument("easy", help="Named season, easy or hard; the options change it."),
+    output: Annotated[Path, Writes(SEASON)] = typer.Option(
+        ..., "-o", "--output", help="Folder to write to; made where it does not exist."
+    ),
+    seed: int = typer.Option(0, help="Which row and which visits to draw."),
+    visits: int | None = typer.Option(None, help="Number of visits, evenly over the season."),
+    trees: int | None = typer.Option(None, help="Number of trees."),
+    fruits: str = typer.Option("", help="Fewest and most fruits that set on a tree, as 60:100.", metavar="LEAST:MOST"),
+    system: str = typer.Option("", help="Training system: spindle, cordon, wall."),
+    cultivar: str = typer.Option("", help="Cultivar: gala, fuji, jonagold, granny-smith, golden."),
+    hidden: float | None = typer.Option(None, help="Share of the fruits in view that a visit misses."),
+    noise_mm: float | None = typer.Option(None, help="Standard deviation of a place, mm, per axis."),
+    false_rate: float | None = typer.Option(None, "--false", help="False points as a fraction of the fruits seen."),
+    same_frame: bool = typer.Option(False, help="Leave all sessions in the frame of the row."),
+) -> None:
+    """Write what several visits to a living row would see, as YYYY-MM-DD.csv, and the truth as truth.json.
+
+    Fruits grow, sink with their branches, drop and are thinned; a visit misses what leaves, wood and other fruits
+    hide from its side.
+    """
+    from dataclasses import replace
+
+    from pomona.synth.seasons import draw_season
+    from pomona.synth.seasons.season_files import write_season
+
+    plan = _named_season(season)
+    design: dict[str, Any] = {"n_trees": trees, "system": system or None, "cultivar": cultivar or None}
+    design["fruits_per_tree"] = _least_and_most(fruits) if fruits else None
+    changes: dict[str, Any] = {"n_visits": visits, "hidden_share": hidden, "false_rate": false_rate}
+    changes |= {"noise_m": None if noise_mm is None else noise_mm / 1000.0, "own_frames": not same_frame}
+    plan = replace(plan, design=replace(plan.design, **_given(design)), **_given(changes))
+    drawn = draw_season(plan, seed)
+    write_season(drawn, output)
+    for visit in drawn.visits:
+        say(f"{visit.day}  {len(visit.cloud)} fruits, {visit.drive.side} side")
+
+
+def _given(options: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _named_season(name: str) -> SeasonPlan:
+    from pomona.errors import PomonaError
+    from pomona.synth.seasons import SEASONS
+
+    if name not in SEASONS:
+        raise PomonaError(f"no season is called {name!r}; expected one of {', '.join(SEASONS)}")
+    return SEASONS[name]
+
+
+def _least_and_most(text: str) -> tuple[int, int]:
+    from pomona.errors import PomonaError
+
+    least, colon, most = text.partition(":")
+    if not (colon and least.isdecimal() and most.isdecimal()):
+        raise PomonaError(f"--fruits: found {text!r}, expected LEAST:MOST, for example 60:100")
+    return int(least), int(most)
 
 
 def _seed_range(text: str) -> range:

@@ -30,8 +30,10 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.synth.false_points import false_points
 from pomona.synth.named_cells import CELLS, Cell
-from pomona.synth.planting import Row, unit_vectors
+from pomona.synth.planting import Row
+from pomona.synth.rotations import uniform_rotation
 from pomona.synth.scenes import draw_scene
 
 if TYPE_CHECKING:
@@ -150,7 +152,7 @@ def _visit(
     """See the fruits `in_view`: hide, add, disturb, move, shuffle."""
     seen = np.flatnonzero(in_view & (rng.random(len(positions)) >= cell.hidden))
     n_false = round(cell.false_rate * len(seen))
-    places = np.concatenate([positions[seen], _false_points(rng, positions[seen], n_false)])
+    places = np.concatenate([positions[seen], false_points(rng, positions[seen], n_false)])
     places = places + rng.normal(0.0, cell.noise_m / np.sqrt(2.0), places.shape)
     order = rng.permutation(len(places))
     session_from_row = _random_pose(rng, cell, units_per_metre, mirrored=cell.mirrored and side == "q")
@@ -162,36 +164,11 @@ def _visit(
     return SynthVisit(cloud, session_from_row)
 
 
-def _false_points(rng: np.random.Generator, fruits: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Half of them anywhere in the fruits' box, half beside a fruit."""
-    in_box = (count + 1) // 2
-    if count == 0:
-        return np.empty((0, 3))
-    anywhere = rng.uniform(fruits.min(axis=0), fruits.max(axis=0), (in_box, 3))
-    beside = fruits[rng.integers(len(fruits), size=count - in_box)]
-    offsets = unit_vectors(rng, (len(beside),)) * rng.uniform(0.08, 0.15, (len(beside), 1))
-    return np.concatenate([anywhere, beside + offsets])
-
-
 def _random_pose(
     rng: np.random.Generator, cell: Cell, units_per_metre: float, *, mirrored: bool
 ) -> NDArray[np.float64]:
-    """Draw a random `session_from_row`.
-
-    A unit quaternion with normal components is a uniform rotation (Marsaglia 1972; Shoemake 1992).
-    """
-    w, x, y, z = rng.normal(size=4)
-    if cell.upright:
-        x = y = 0.0
-    norm = np.sqrt(w * w + x * x + y * y + z * z)
-    w, x, y, z = w / norm, x / norm, y / norm, z / norm
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """Draw a random `session_from_row`."""
+    rotation = uniform_rotation(rng, upright=cell.upright)
     if mirrored:
         rotation = rotation @ np.diag([1.0, -1.0, 1.0])
     pose = np.eye(4)

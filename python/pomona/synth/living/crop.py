@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from pomona.synth.living.spurs import Spurs
     from pomona.synth.living.wood import WoodAxes
 
-__all__ = ["Crop", "set_fruits"]
+__all__ = ["FULL_GROWN_DAYS", "Crop", "set_fruits"]
+
+FULL_GROWN_DAYS = 175.0
+"""After bloom: fruits have room for the size of that day, in October, whenever their harvest is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +71,15 @@ def set_fruits(seed: int, design: RowDesign, wood: WoodAxes, spurs: Spurs) -> Cr
     counts = _counts(chance(seed, "counts"), design)
     sizes = _harvest_diameters(chance(seed, "sizes"), design, counts)
     trees = np.repeat(np.arange(design.n_trees), counts)
-    places = hang_fruits(chance(seed, "places"), design, wood, spurs, trees, sizes)
-    lives = draw_lives(chance(seed, "lives"), design, places.spurs, sizes)
     n = len(trees)
     onset = ONSET_DAYS + chance(seed, "onset").normal(0.0, design.onset_spread_days, n)
-    slowing = slowing_from(lives.ends_days, lives.causes == DROPPED)
-    curves = FruitCurves(sizes, np.full(n, apple.harvest_after_bloom_days), onset, slowing, apple.height_share)
+    curves = FruitCurves(
+        sizes, np.full(n, apple.harvest_after_bloom_days), onset, np.full(n, np.inf), apple.height_share
+    )
+    full_grown = curves.diameters_m(FULL_GROWN_DAYS)
+    places = hang_fruits(chance(seed, "places"), design, wood, spurs, trees, full_grown)
+    lives = draw_lives(chance(seed, "lives"), design, places.spurs, sizes)
+    curves = replace(curves, slowed_from_days=slowing_from(lives.ends_days, lives.causes == DROPPED))
     outward = np.sign(places.centres_m[:, 1]) * np.minimum(
         np.abs(places.centres_m[:, 1]) / design.training.depth_m, 1.0
     )

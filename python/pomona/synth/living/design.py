@@ -41,9 +41,10 @@ class RowDesign:
     pickings
         (days after bloom, share of what hangs): the ripest are picked.
     leaves_per_tree, spurs_per_tree
-        Five to ten thousand leaves are a full tree; half of them stand in rosettes on the spurs.
+        Leaves, half of them in rosettes on the spurs. A pruned tree in which half of the fruits can be seen has 3000 to
+        4000, a full one 5000 to 10,000.
     leaf_length_m
-        Mean length of a blade; the wood decides how many there are, this how much they hide.
+        Mean length of a blade.
     softness
         Of the wood: branches sink so many times as far under their fruits as usual.
     row_behind, row_spacing_m
@@ -67,9 +68,9 @@ class RowDesign:
     thinned_share: float = 0.0
     thinned_after_bloom_days: int = 60
     pickings: tuple[tuple[int, float], ...] = ()
-    leaves_per_tree: int = 6000
+    leaves_per_tree: int = 3600
     spurs_per_tree: int = 420
-    leaf_length_m: float = 0.072
+    leaf_length_m: float = 0.066
     softness: float = 1.0
     row_behind: bool = True
     row_spacing_m: float = 3.3

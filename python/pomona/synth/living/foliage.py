@@ -124,7 +124,7 @@ def _leaves(
     n = len(axes)
     depth = (along_axes(wood.nodes_m, axes, places) + offsets)[:, 1] / design.training.depth_m
     light = np.stack([np.zeros(n), 0.75 * np.clip(depth, -1.5, 1.5), np.ones(n)], axis=1) + rng.normal(0.0, 0.3, (n, 3))
-    tips = unit(outward + rng.uniform(-0.15, 0.95, n)[:, None] * [0.0, 0.0, -1.0] + rng.normal(0.0, 0.2, (n, 3)))
+    tips = unit(outward + rng.uniform(-0.2, 0.75, n)[:, None] * [0.0, 0.0, -1.0] + rng.normal(0.0, 0.2, (n, 3)))
     normals = unit(light - (light * tips).sum(axis=1, keepdims=True) * tips)
     lengths = design.leaf_length_m * np.exp(rng.normal(0.0, _LENGTH_SPREAD, n))
     turning = rng.normal(_TURNS_AFTER_BLOOM_DAYS, _TURN_SPREAD_DAYS, n)

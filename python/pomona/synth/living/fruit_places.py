@@ -1,4 +1,4 @@
-"""Where fruits hang: in clusters under the tips of spurs, as big as at the harvest beside one another and the wood."""
+"""Where fruits hang: in clusters under the tips of spurs, with room beside one another and the wood when full grown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from pomona.errors import PomonaError
 from pomona.synth.living.axis_growth import unit
-from pomona.synth.living.wood import NODES, along_axes
+from pomona.synth.living.contact import WoodPoints
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,16 +21,17 @@ if TYPE_CHECKING:
 
 __all__ = ["FruitPlaces", "hang_fruits"]
 
-_STALKS_M = (0.014, 0.032)
+_STALKS_M, _STALKS_IN_CLUSTER_M = (0.014, 0.032), (0.018, 0.045)
 _LOWEST_SPUR_M = 0.35
-_ROUNDS, _ROUNDS_ON_ITS_SPUR = 240, 10
-_WOOD_POINTS = 3 * NODES
-"""Of an axis, at which fruits keep clear of it."""
+_BEARING_IN_LIGHT = 2.5
+"""Log-odds of a spur at the tree's face to bear against one at its middle: flower buds form where there is light."""
+
+_ROUNDS, _ROUNDS_ON_ITS_SPUR = 200, 60
 
 
 @dataclass(frozen=True, eq=False)
 class FruitPlaces:
-    """Places of fruits at the harvest on unbent wood.
+    """Places of full-grown fruits on unbent wood.
 
     Attributes
     ----------
@@ -68,12 +69,12 @@ def hang_fruits(
     tips = spurs.roots(wood.nodes_m) + spurs.offsets_m
     high = np.flatnonzero(tips[:, 2] > _LOWEST_SPUR_M)
     of_tree = [high[spurs.trees[high] == tree] for tree in range(design.n_trees)]
-    on, slots = _clusters(rng, design, of_tree, trees)
+    bearing = _BEARING_IN_LIGHT * np.minimum(np.abs(tips[:, 1]) / design.training.depth_m, 1.0)
+    on, slots, alone = _clusters(rng, design, of_tree, bearing, trees)
     heights = design.apple.height_share * diameters_m
     n = len(trees)
     found = FruitPlaces(on, np.zeros((n, 3)), np.zeros(n), np.full((n, 3), np.nan))
-    points, radii = _wood_points(wood)
-    wood_tree = cKDTree(points)
+    rods = WoodPoints(wood.nodes_m, wood.radii_m)
     open_ = np.arange(n)
     for round_ in range(_ROUNDS):
         if len(open_) == 0:
@@ -81,9 +82,9 @@ def hang_fruits(
         if round_ >= _ROUNDS_ON_ITS_SPUR:
             on[open_] = [int(rng.choice(of_tree[tree])) for tree in trees[open_]]
             slots[open_] = rng.uniform(0.0, 2.0 * np.pi, len(open_))
-        hangs, stalks = _proposed(rng, slots[open_])
+        hangs, stalks = _proposed(rng, slots[open_], alone[open_])
         centres = tips[on[open_]] + hangs * (stalks + heights[open_] / 2.0)[:, None]
-        free = _clear_of_wood(wood_tree, points, radii, centres, diameters_m[open_] / 2.0)
+        free = rods.depths_m(centres, diameters_m[open_] / 2.0).max(axis=1) <= 0.0
         free &= _clear_of_fruits(centres, diameters_m[open_] / 2.0, found.centres_m, diameters_m / 2.0, free)
         placed = open_[free]
         found.hangs[placed], found.stalks_m[placed], found.centres_m[placed] = hangs[free], stalks[free], centres[free]
@@ -95,10 +96,17 @@ def hang_fruits(
 
 
 def _clusters(
-    rng: np.random.Generator, design: RowDesign, of_tree: list[NDArray[np.int64]], trees: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Spur of each fruit, and its azimuth in its cluster; spurs are taken once before any is taken twice."""
-    on, azimuths = np.empty(len(trees), np.int64), np.empty(len(trees))
+    rng: np.random.Generator,
+    design: RowDesign,
+    of_tree: list[NDArray[np.int64]],
+    bearing: NDArray[np.float64],
+    trees: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Spur of each fruit, its azimuth in its cluster, whether it is alone; no spur twice before all once.
+
+    `bearing`, (S,), are log-odds of a spur to bear: sorted with Gumbel's noise they are drawn without replacement.
+    """
+    on, azimuths, alone = np.empty(len(trees), np.int64), np.empty(len(trees)), np.empty(len(trees), bool)
     for tree, spurs in enumerate(of_tree):
         fruits = np.flatnonzero(trees == tree)
         if len(fruits) and len(spurs) == 0:
@@ -106,41 +114,24 @@ def _clusters(
         sizes = 1 + rng.choice(len(design.cluster_sizes), len(fruits), p=design.cluster_sizes)
         cluster = np.repeat(np.arange(len(fruits)), sizes)[: len(fruits)]
         number = np.arange(len(fruits)) - np.searchsorted(cluster, cluster)
-        order = rng.permutation(spurs)
+        order = spurs[np.argsort(-bearing[spurs] - rng.gumbel(size=len(spurs)))]
         on[fruits] = order[cluster % max(len(order), 1)] if len(fruits) else 0
+        alone[fruits] = sizes[cluster] == 1 if len(fruits) else True
         start = rng.uniform(0.0, 2.0 * np.pi, len(fruits) + 1)
         azimuths[fruits] = start[cluster] + 2.0 * np.pi * number / sizes[cluster] if len(fruits) else 0.0
-    return on, azimuths
+    return on, azimuths, alone
 
 
 def _proposed(
-    rng: np.random.Generator, azimuths: NDArray[np.float64]
+    rng: np.random.Generator, azimuths: NDArray[np.float64], alone: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Directions in which fruits hang, mostly down, and lengths of stalks."""
+    """Directions in which fruits hang, and lengths of stalks: those of a cluster push one another up."""
     n = len(azimuths)
-    tilt = np.abs(rng.normal(0.35, 0.35, n)).clip(0.0, 1.4)
+    tilt = np.where(alone, np.abs(rng.normal(0.0, 0.4, n)), rng.uniform(0.2, 1.5, n))
     azimuth = azimuths + rng.normal(0.0, 0.5, n)
     level = np.sin(tilt)
     hangs = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(tilt)], axis=1)
-    return unit(hangs), rng.uniform(*_STALKS_M, n)
-
-
-def _wood_points(wood: WoodAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    axes = np.repeat(np.arange(len(wood)), _WOOD_POINTS)
-    places = np.tile(np.linspace(0.0, 1.0, _WOOD_POINTS), len(wood))
-    return along_axes(wood.nodes_m, axes, places), along_axes(wood.radii_m, axes, places)
-
-
-def _clear_of_wood(
-    wood_tree: cKDTree,
-    points: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    fruit_radii: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    near = min(8, len(points))
-    gaps, which = wood_tree.query(centres, k=near)
-    return np.asarray((gaps >= fruit_radii[:, None] + radii[which]).all(axis=1))
+    return unit(hangs), np.where(alone, rng.uniform(*_STALKS_M, n), rng.uniform(*_STALKS_IN_CLUSTER_M, n))
 
 
 def _clear_of_fruits(

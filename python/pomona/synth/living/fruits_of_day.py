@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from pomona.synth.living.contact import WoodPoints, pushed_apart
 from pomona.synth.living.fruit_lives import ALIVE, PICKED
 from pomona.synth.row_geometry import FruitSolids
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fallen_fruits", "hanging_fruits"]
 
-_PUSHES = 60
 _LYING_DAYS = 30.0
 """Until a fruit on the ground has rotted, or the mower came."""
 
@@ -25,11 +24,13 @@ _ROTTEN = np.array([0.10, 0.055, 0.025])
 _ROTTING_DAYS = 12.0
 
 
-def hanging_fruits(crop: Crop, spur_tips_m: NDArray[np.float64], days: float, *, labelled: bool) -> FruitSolids:
-    """Fruits under the tips of the spurs, (S, 3), so many days after bloom; without labels all ids are 0."""
+def hanging_fruits(
+    crop: Crop, spur_tips_m: NDArray[np.float64], wood: WoodPoints, days: float, *, labelled: bool
+) -> FruitSolids:
+    """Fruits under the tips of the spurs, (S, 3), beside the wood; without labels all ids are 0."""
     on = np.flatnonzero(crop.lives.states(days) == ALIVE)
     diameters = crop.curves.diameters_m(days)[on]
-    centres = pushed_apart(crop.centres_m(spur_tips_m, days)[on], diameters / 2.0)
+    centres = pushed_apart(crop.centres_m(spur_tips_m, days)[on], diameters / 2.0, wood)
     ids = on + 1 if labelled else np.zeros(len(on), np.int64)
     trees = crop.trees[on] if labelled else np.full(len(on), -1, np.int64)
     return _solids(crop, on, ids, trees, centres, -crop.hangs[on], days, days)
@@ -59,26 +60,6 @@ def fallen_fruits(crop: Crop, spur_tips_m: NDArray[np.float64], days: float) -> 
         solids.blush_shares,
         solids.blush_directions,
     )
-
-
-def pushed_apart(centres_m: NDArray[np.float64], radii_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Push balls that run into each other apart, half each, over and over: fruits of branches that sank together."""
-    centres = centres_m.copy()
-    for _ in range(_PUSHES):
-        if len(centres) < 2:
-            return centres
-        pairs = cKDTree(centres).query_pairs(2.0 * float(radii_m.max()), output_type="ndarray")
-        between = centres[pairs[:, 1]] - centres[pairs[:, 0]]
-        gaps = np.linalg.norm(between, axis=1)
-        deep = radii_m[pairs].sum(axis=1) - gaps
-        touching = np.flatnonzero(deep > 1e-5)
-        if len(touching) == 0:
-            return centres
-        touching = touching[np.lexsort(pairs[touching].T)]
-        steps = (between / np.maximum(gaps, 1e-9)[:, None] * deep[:, None] * 0.5)[touching]
-        np.add.at(centres, pairs[touching, 1], steps)
-        np.add.at(centres, pairs[touching, 0], -steps)
-    return centres
 
 
 def _solids(

@@ -9,7 +9,8 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.synth.living.bending import Bent, bend
-from pomona.synth.living.crop import Crop, set_fruits
+from pomona.synth.living.contact import WoodPoints
+from pomona.synth.living.crop import FULL_GROWN_DAYS, Crop, set_fruits
 from pomona.synth.living.foliage import Foliage, grow_leaves
 from pomona.synth.living.fruit_lives import ALIVE
 from pomona.synth.living.fruits_of_day import fallen_fruits, hanging_fruits
@@ -80,7 +81,7 @@ class LivingRow:
     def fruits_on(self, day: date, wind: Wind | None = None) -> FruitSolids:
         """Give the labelled fruits that hang on a day, and nothing else."""
         days = self.days_after_bloom(day)
-        return hanging_fruits(self.crop, self._spur_tips(self._bent(days, wind)), days, labelled=True)
+        return self._hanging(self._bent(days, wind), days, labelled=True)
 
     def states_on(self, day: date) -> NDArray[np.int64]:
         """State of each fruit on a day, (F,): a number of `STATES`; row i is of the fruit with the id i + 1."""
@@ -94,7 +95,7 @@ class LivingRow:
         days = self.days_after_bloom(day)
         bent = self._bent(days, wind)
         tips = self._spur_tips(bent)
-        hanging = hanging_fruits(self.crop, tips, days, labelled=labelled)
+        hanging = self._hanging(bent, days, labelled=labelled)
         alive = np.flatnonzero(self.crop.lives.states(days) == ALIVE)
         limbs = [
             self.supports,
@@ -118,6 +119,10 @@ class LivingRow:
             loads.append((leaves.axes, leaves.places, wind_forces(wind, leaves.axes, areas)))
         axes, places, forces = (np.concatenate(part) for part in zip(*loads, strict=True))
         return bend(self.wood, self.design.softness, axes, places, forces)
+
+    def _hanging(self, bent: Bent, days: float, *, labelled: bool) -> FruitSolids:
+        wood = WoodPoints(bent.nodes_m, self.wood.radii_m)
+        return hanging_fruits(self.crop, self._spur_tips(bent), wood, days, labelled=labelled)
 
     def _spur_tips(self, bent: Bent) -> NDArray[np.float64]:
         spurs = self.spurs
@@ -144,15 +149,14 @@ def grow(design: RowDesign, seed: int) -> LivingRow:
     wood = grow_wood(chance(seed, "wood"), feet, system)
     spurs = grow_spurs(chance(seed, "spurs"), wood, design.spurs_per_tree)
     crop = set_fruits(seed, design, wood, spurs)
-    harvest = design.apple.harvest_after_bloom_days
-    centres = crop.centres_m(spurs.roots(wood.nodes_m) + spurs.offsets_m, harvest)
+    centres = crop.centres_m(spurs.roots(wood.nodes_m) + spurs.offsets_m, FULL_GROWN_DAYS)
     foliage = grow_leaves(chance(seed, "leaves"), design, wood, spurs)
     return LivingRow(
         design,
         wood,
         spurs,
         crop,
-        beside_fruits(foliage, wood, centres, crop.curves.harvest_diameters_m / 2.0),
+        beside_fruits(foliage, wood, centres, crop.curves.diameters_m(FULL_GROWN_DAYS) / 2.0),
         posts_and_wires(design.n_trees, system),
         grow_grass(chance(seed, "grass"), design),
         grow(_behind(design), seed + 1_000_003) if design.row_behind else None,
