@@ -171,7 +171,37 @@ def _read_pair(draw: Drawn) -> None:
     )
 
 
+def _render(draw: Drawn) -> None:
+    fruits, limbs, leaves = (draw.choice(0, 1, 3, 8) for _ in range(3))
+    geometry = SimpleNamespace(
+        fruits=_arrays(
+            draw,
+            fruits,
+            vectors=("centres_m", "axes", "ground_colours", "blush_colours", "blush_directions"),
+            numbers=("diameters_m", "heights_m", "blush_shares"),
+        ),
+        limbs=_arrays(draw, limbs, vectors=("starts_m", "ends_m", "colours"), numbers=("start_radii_m", "end_radii_m")),
+        leaves=_arrays(
+            draw,
+            leaves,
+            vectors=("bases_m", "tips", "normals", "colours"),
+            numbers=("lengths_m", "widths_m", "folds_rad", "bends_rad"),
+        ),
+    )
+    geometry.fruits.ids = draw.rows(fruits, 100)
+    colours = {name: (1.0, draw.number(), 0.5) for name in ("sun_colour", "sky_colour", "horizon_colour")}
+    angles = {"sun_elevation_rad": draw.number(), "sun_azimuth_rad": draw.number()}
+    weather = SimpleNamespace(sun_strength=draw.positive(), wind_m=draw.choice(0.0, draw.number()), **colours, **angles)
+    scene = _core.RowScene(geometry, _camera(draw, 32, 24), draw.poses(2), weather, seed=draw.choice(0, 2**32 - 1, -1))
+    scene.pair(np.array(draw.pose()), draw.choice(0, 2**32 - 1))
+
+
+def _arrays(draw: Drawn, n: int, *, vectors: tuple[str, ...], numbers: tuple[str, ...]) -> Any:
+    arrays = {name: draw.numbers(n, 3) for name in vectors} | {name: draw.numbers(n) for name in numbers}
+    return SimpleNamespace(**arrays)
+
+
 _CALLS: tuple[Callable[[Drawn], None], ...] = (
     *(_adjust, _follow, _disparities, _describe, _fuse_fruits, _lift, _read_pair, _default_config),
-    *(_rejoin, _exposure_tables, _row_alignment),
+    *(_rejoin, _exposure_tables, _row_alignment, _render),
 )
