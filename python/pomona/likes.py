@@ -19,6 +19,7 @@ __all__ = [
     "KEPT",
     "PAIRS",
     "PICTURE",
+    "RENDERED",
     "SCANNED",
     "VIDEO",
     "VISITS",
@@ -155,7 +156,7 @@ def _is_video(path: Path) -> bool:
     return _head(path)[4:8] == b"ftyp" and VIDEO_MARK.encode() in _tail(path)
 
 
-def _is_kept(folder: Path) -> bool:
+def _has_note(folder: Path) -> bool:
     return (folder / "made_from.json").is_file() or not any(folder.iterdir())
 
 
@@ -195,7 +196,8 @@ SCANNED = Like("what a scan writes", _is_scanned)
 PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "distance_m"))
 PICTURE = Like("a plot", _is_picture)
 VIDEO = Like("a preview", _is_video)
-KEPT = Like("a folder that a scan keeps", _is_kept, is_folder=True)
+KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
+RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {

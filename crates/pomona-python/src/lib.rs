@@ -9,6 +9,7 @@ mod lifting;
 mod matching;
 mod odometry;
 mod pose;
+mod render;
 mod row_search;
 mod stereo;
 mod tracking;
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<matching::PyMapIndex>()?;
     module.add_class::<odometry::PyLooking>()?;
     module.add_class::<odometry::PyOdometry>()?;
+    module.add_class::<render::PyRowScene>()?;
     module.add_class::<tracking::PyTracker>()?;
     module.add_class::<tracking::PyTracks>()?;
     module.add_function(wrap_pyfunction!(tracking::one_fruit_each, module)?)?;

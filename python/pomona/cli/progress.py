@@ -21,7 +21,7 @@ def working(what: str) -> Iterator[None]:
 
 
 @contextmanager
-def counting(what: str, total: int) -> Iterator[Callable[[int, int], None]]:
+def counting(what: str, total: int | None = None) -> Iterator[Callable[[int, int], None]]:
     """Show how much of a count is done while the block runs; nothing where the standard error is no terminal."""
     from rich.console import Console
     from rich.progress import Progress
@@ -29,7 +29,7 @@ def counting(what: str, total: int) -> Iterator[Callable[[int, int], None]]:
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda done, _total: bar.update(task, completed=done)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 @contextmanager

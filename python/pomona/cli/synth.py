@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.cli.synth_video import synth_video
 from pomona.cli.verbs import Verbs, Writes
 from pomona.likes import VISITS
 
@@ -46,6 +47,9 @@ def synth_clouds(
     for number in track(wanted, "drawing", console=console, disable=not (seeds and console.is_terminal)):
         pair = first if number == wanted.start else scene_pair(cell, number)
         _write(pair, output, f"_{number}" if seeds else "")
+
+
+app.command("video")(synth_video)
 
 
 def _seed_range(text: str) -> range:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text
+from pomona.trajectory import Trajectory
 
-__all__ = ["is_kitti", "read_kitti", "read_tum", "transforms"]
+__all__ = ["is_kitti", "read_kitti", "read_tum", "transforms", "write_tum"]
 
 UNIT_TOLERANCE = 1e-2
 """Quaternions are written with few digits; one that is 1 % off unit length is something else."""
@@ -53,6 +54,18 @@ def read_kitti(path: Path) -> NDArray[np.float64]:
     if len(matrices) and np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max() > UNIT_TOLERANCE:
         raise PomonaError(f"{path}: found a pose that does not turn but stretch, expected 3x4 rotation and position")
     return matrices
+
+
+def write_tum(path: Path, trajectory: Trajectory) -> None:
+    """Write poses as `read_tum` reads them."""
+    from scipy.spatial.transform import Rotation
+
+    poses = trajectory.session_from_camera
+    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True)
+    lines = ["# time tx ty tz qx qy qz qw: session_from_camera"]
+    for time_s, pose, quaternion in zip(trajectory.times_s, poses, quaternions, strict=True):
+        lines.append(f"{time_s:.6f} " + " ".join(f"{number:.9f}" for number in (*pose[:3, 3], *quaternion)))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def is_kitti(path: Path) -> bool:

@@ -72,6 +72,11 @@ class Renderer(Protocol):
         session_from_camera: NDArray[np.float64],
         weather: Weather,
         seed: int,
+        *,
+        first: int = 0,
     ) -> Iterator[RenderedPair]:
-        """Give the pair of each pose, (N, 4, 4), in turn; OpenCV axes, the left camera."""
+        """Give the pair of each pose, (N, 4, 4), in turn; OpenCV axes, the left camera.
+
+        What an interrupted run has done already is left out with `first`: the pairs from this number on are the same.
+        """
         ...

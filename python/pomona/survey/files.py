@@ -13,6 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.export import export_cloud
 from pomona.orchard import write_session
 from pomona.recording import Recording
+from pomona.recording.poses import write_tum
 from pomona.survey.part import Part
 from pomona.survey.part_files import part_files, tell_others
 from pomona.survey.story import Survey
@@ -83,7 +84,7 @@ def _write_cloud(path: Path, cloud: FruitCloud) -> None:
 
 def write_stages(folder: Path, survey: Survey) -> None:
     """Write poses and tracks of the parts in formats that `pomona scan` reads: poses_tum.txt, tracks.csv."""
-    for name, write in {"poses_tum.txt": _write_tum, "tracks.csv": _write_tracks}.items():
+    for name, write in {"poses_tum.txt": _write_poses, "tracks.csv": _write_tracks}.items():
         files = part_files(folder / name, survey)
         tell_others(folder / name, files.values())
         for number, path in files.items():
@@ -91,8 +92,8 @@ def write_stages(folder: Path, survey: Survey) -> None:
                 write(partial, survey.parts[number])
 
 
-def _write_tum(path: Path, part: Part) -> None:
-    path.write_text(_tum(part), encoding="utf-8")
+def _write_poses(path: Path, part: Part) -> None:
+    write_tum(path, part.trajectory)
 
 
 def _write_tracks(path: Path, part: Part) -> None:
@@ -100,17 +101,6 @@ def _write_tracks(path: Path, part: Part) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
         writer.writerows(_tracks(part))
-
-
-def _tum(part: Part) -> str:
-    from scipy.spatial.transform import Rotation
-
-    poses = part.trajectory.session_from_camera
-    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True)
-    lines = ["# time tx ty tz qx qy qz qw: session_from_camera"]
-    for time_s, pose, quaternion in zip(part.trajectory.times_s, poses, quaternions, strict=True):
-        lines.append(f"{time_s:.6f} " + " ".join(f"{number:.9f}" for number in (*pose[:3, 3], *quaternion)))
-    return "\n".join(lines) + "\n"
 
 
 def _tracks(part: Part) -> Iterable[tuple[object, ...]]:

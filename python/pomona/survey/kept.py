@@ -18,7 +18,8 @@ import numpy as np
 from pomona.atomic import whole_file
 from pomona.detect import Detections
 from pomona.errors import PomonaError
-from pomona.reading import parsed_json, read_text, require_file, shown
+from pomona.made_from import note_made_from
+from pomona.reading import require_file
 from pomona.recording import Frame
 from pomona.survey.depth import Lifted, Refusal
 from pomona.survey.seeing import Look
@@ -61,15 +62,9 @@ class Kept:
 
     def __init__(self, folder: Path, made_from: Mapping[str, Any]) -> None:
         self._looks = folder / "looks"
-        note = folder / "made_from.json"
-        ours = json.dumps({"format": FORMAT, **made_from}, sort_keys=True, indent=1)
+        note_made_from(folder, {"format": FORMAT, **made_from})
         try:
-            self._looks.mkdir(parents=True, exist_ok=True)
-            if note.is_file():
-                _require_same(note, ours)
-            else:
-                with whole_file(note) as partial:
-                    partial.write_text(ours, encoding="utf-8")
+            self._looks.mkdir(exist_ok=True)
         except OSError as error:
             raise PomonaError(f"{folder}: cannot be written: {error.strerror}") from None
 
@@ -85,19 +80,6 @@ class Kept:
             return seen
 
         return look
-
-
-def _require_same(note: Path, ours: str) -> None:
-    theirs = read_text(note, "what we keep")
-    if theirs == ours:
-        return
-    found, expected = parsed_json(str(note), theirs, "what we keep"), json.loads(ours)
-    if not isinstance(found, dict):
-        raise PomonaError(f"{note}: found {shown(found)}, expected what we keep: remove the folder or take another")
-    odd = next((name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name)), None)
-    if odd is not None:
-        there, wanted = shown(found.get(odd)), shown(expected.get(odd))
-        raise PomonaError(f"{note}: {odd}: found {there}, expected {wanted}: remove the folder or take another")
 
 
 def _write(file: Path, look: Look) -> None:

@@ -1,0 +1,169 @@
+"""Where the camera goes along the row, and how it shakes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pomona.errors import PomonaError
+from pomona.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+__all__ = ["PATHS", "PathShape", "camera_path", "pairs_along"]
+
+RATE_HZ = 10.0
+"""Pairs a second, where nothing else is asked for."""
+
+SHAKES = 5
+"""Sine waves of which each shake is made."""
+
+
+@dataclass(frozen=True)
+class PathShape:
+    """A way along the row: how far from it, how fast, how steady.
+
+    Attributes
+    ----------
+    speed_m_s
+        Along the row; below 0 it is driven the other way.
+    distance_m, height_m
+        From the trunks and over the ground.
+    from_behind
+        Whether the camera stands on the row's other side.
+    yaw_rad, pitch_rad, roll_rad
+        Turned to the right, up and clockwise against looking straight at the row.
+    shake_m, shake_rad
+        Standard deviation of the shake of place and direction.
+    shake_hz
+        Slowest and fastest wave of the shake.
+    haste
+        By what share of the speed it varies; above 1 the camera at times goes back.
+    """
+
+    speed_m_s: float = 1.8
+    distance_m: float = 1.5
+    height_m: float = 1.4
+    from_behind: bool = False
+    yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
+    roll_rad: float = 0.0
+    shake_m: float = 0.004
+    shake_rad: float = 0.004
+    shake_hz: tuple[float, float] = (0.3, 2.5)
+    haste: float = 0.05
+
+
+_TRACTOR = PathShape()
+_BY_HAND = replace(
+    _TRACTOR,
+    speed_m_s=0.9,
+    distance_m=1.35,
+    height_m=1.5,
+    shake_m=0.03,
+    shake_rad=0.035,
+    shake_hz=(0.2, 1.2),
+    haste=0.6,
+)
+
+PATHS: Mapping[str, PathShape] = {
+    "tractor": _TRACTOR,
+    "tractor-back": replace(_TRACTOR, speed_m_s=-1.8, height_m=1.55),
+    "fast": replace(_TRACTOR, speed_m_s=3.0, shake_m=0.006, shake_rad=0.006),
+    "hand-held": _BY_HAND,
+    "far": replace(_TRACTOR, distance_m=2.3, height_m=1.6, speed_m_s=-1.8),
+    "other-side": replace(_TRACTOR, from_behind=True),
+    "angle": replace(_TRACTOR, yaw_rad=0.3, pitch_rad=0.12, height_m=1.2),
+    "upside-down": replace(_TRACTOR, roll_rad=np.pi),
+}
+"""By name."""
+
+
+def pairs_along(path: str, reach_m: tuple[float, float]) -> int:
+    """Give the number of pairs that a path takes from one x to another."""
+    return max(2, round((reach_m[1] - reach_m[0]) / abs(_shape(path).speed_m_s) * RATE_HZ))
+
+
+def camera_path(path: str, reach_m: tuple[float, float], pairs: int, seed: int, *, jitter: float = 0.0) -> Trajectory:
+    """Give the poses of the left camera along a path.
+
+    Parameters
+    ----------
+    path
+        One of `PATHS`.
+    reach_m
+        First and last x of the row.
+    pairs
+        Poses, spread over the whole way.
+    seed
+        Of the shake.
+    jitter
+        How much distance, height and direction may differ from the path's own, 0 to 1: 1 is 30 cm and 10 degrees.
+
+    Raises
+    ------
+    PomonaError
+        If no path has this name.
+    """
+    shape, rng = _shape(path), np.random.default_rng([seed, 0xCA3])
+    shape = _jittered(shape, rng, jitter)
+    times_s = np.linspace(0.0, (reach_m[1] - reach_m[0]) / abs(shape.speed_m_s), pairs)
+    share = _share_of_way(shape, rng, pairs)
+    along_m = reach_m[0] + (reach_m[1] - reach_m[0]) * (share if shape.speed_m_s > 0 else 1.0 - share)
+    side = 1.0 if shape.from_behind else -1.0
+    places = np.stack([along_m, np.full(pairs, side * shape.distance_m), np.full(pairs, shape.height_m)], axis=1)
+    poses = np.tile(np.eye(4), (pairs, 1, 1))
+    poses[:, :3, 3] = places + shape.shake_m * _shake(rng, times_s, shape)
+    angles = np.array([shape.yaw_rad, shape.pitch_rad, shape.roll_rad]) + shape.shake_rad * _shake(rng, times_s, shape)
+    poses[:, :3, :3] = _looking(side, angles)
+    return Trajectory(np.arange(pairs), times_s, poses)
+
+
+def _shape(path: str) -> PathShape:
+    if path not in PATHS:
+        raise PomonaError(f"no path is called {path!r}; expected one of {', '.join(PATHS)}")
+    return PATHS[path]
+
+
+def _jittered(shape: PathShape, rng: np.random.Generator, jitter: float) -> PathShape:
+    nearer, higher, *turned = jitter * rng.uniform(-1.0, 1.0, 5)
+    yaw, pitch, roll = (0.17 * turn for turn in turned)
+    return replace(
+        shape,
+        distance_m=shape.distance_m + 0.3 * nearer,
+        height_m=shape.height_m + 0.3 * higher,
+        yaw_rad=shape.yaw_rad + yaw,
+        pitch_rad=shape.pitch_rad + pitch,
+        roll_rad=shape.roll_rad + 0.5 * roll,
+    )
+
+
+def _share_of_way(shape: PathShape, rng: np.random.Generator, pairs: int) -> NDArray[np.float64]:
+    """Give the share of the way at each pair, from 0 to 1, at a speed that varies smoothly."""
+    even = np.linspace(0.0, 1.0, pairs)
+    waves = rng.integers(2, 7)
+    # The derivative of the sine is the share by which the speed varies.
+    return np.asarray(even + shape.haste / (2.0 * np.pi * waves) * np.sin(2.0 * np.pi * waves * even))
+
+
+def _shake(rng: np.random.Generator, times_s: NDArray[np.float64], shape: PathShape) -> NDArray[np.float64]:
+    """Three smooth motions of standard deviation 1, (N, 3)."""
+    rates_hz = rng.uniform(*shape.shake_hz, (SHAKES, 3))
+    phases = rng.uniform(0.0, 2.0 * np.pi, (SHAKES, 3))
+    waves = np.sin(2.0 * np.pi * rates_hz * times_s[:, None, None] + phases)
+    return np.asarray(waves.sum(axis=1) * np.sqrt(2.0 / SHAKES))
+
+
+def _looking(side: float, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations `session_from_camera` of cameras that look at the row, turned by (N, 3) yaw, pitch and roll."""
+    from scipy.spatial.transform import Rotation
+
+    # Camera axes in the row: x right, y down, z at the row, from its side of negative or positive y.
+    straight = np.array([[-side, 0.0, 0.0], [0.0, 0.0, -side], [0.0, -1.0, 0.0]])
+    turned = Rotation.from_euler("YXZ", angles).as_matrix()
+    return np.asarray(straight @ turned)
