@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -57,6 +57,8 @@ class PathTracer:
         A Python in which `bpy` is installed.
     """
 
+    name: ClassVar[str] = "photo"
+
     samples: int = 8
     threads: int = 1
     folder: Path | None = None
@@ -69,8 +71,10 @@ class PathTracer:
         session_from_camera: NDArray[np.float64],
         weather: Weather,
         seed: int,
+        *,
+        first: int = 0,
     ) -> Iterator[RenderedPair]:
-        """Give the pair of each pose, (N, 4, 4), in turn; OpenCV axes, the left camera.
+        """Give the pair of each pose, (N, 4, 4), in turn, from number `first` on; OpenCV axes, the left camera.
 
         Raises
         ------
@@ -81,7 +85,7 @@ class PathTracer:
         job = self._job(camera, session_from_camera, weather, seed) | {"places": places}
         with self._kept() as folder:
             _write_job(folder, job, surfaces)
-            yield from self._pairs(folder, len(session_from_camera))
+            yield from self._pairs(folder, range(first, len(session_from_camera)))
 
     def _job(self, camera: Calibration, poses: NDArray[np.float64], weather: Weather, seed: int) -> dict[str, Any]:
         if camera.baseline_m is None:
@@ -106,17 +110,18 @@ class PathTracer:
         with tempfile.TemporaryDirectory(prefix="pomona.") as folder:
             yield Path(folder)
 
-    def _pairs(self, folder: Path, count: int) -> Iterator[RenderedPair]:
+    def _pairs(self, folder: Path, numbers: range) -> Iterator[RenderedPair]:
         """Read pairs as they come to the folder."""
-        if all(_pair_file(folder, number).exists() for number in range(count)):
-            yield from (_read(_pair_file(folder, number)) for number in range(count))
+        there = [_pair_file(folder, number) for number in numbers]
+        if all(path.exists() for path in there):
+            yield from map(_read, there)
             return
-        with _blender(self.interpreter, folder) as told:
-            for number in range(count):
-                while not _pair_file(folder, number).exists():
+        with _blender(self.interpreter, folder, numbers.start) as told:
+            for path in there:
+                while not path.exists():
                     if next(told, None) is None:
-                        raise PomonaError(f"{folder}: Blender ended before pair {number}")
-                yield _read(_pair_file(folder, number))
+                        raise PomonaError(f"{path}: Blender ended before it was rendered")
+                yield _read(path)
 
 
 def _write_job(folder: Path, job: dict[str, Any], surfaces: dict[str, Surface]) -> None:
@@ -133,7 +138,8 @@ def _write_job(folder: Path, job: dict[str, Any], surfaces: dict[str, Surface]) 
     path = folder / "job.json"
     if path.exists() and _without_threads(path.read_text()) != _without_threads(told):
         raise PomonaError(f"{folder}: holds the pictures of another job, expected this one or an empty folder")
-    (folder / "pairs").mkdir(exist_ok=True)
+    for kind in ("truth", "pairs"):
+        (folder / kind).mkdir(exist_ok=True)
     with whole_file(folder / "surfaces.npz") as partial, partial.open("wb") as file:
         np.savez(file, **arrays)
     with whole_file(path) as partial:
@@ -145,10 +151,10 @@ def _without_threads(told: str) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _blender(interpreter: str, folder: Path) -> Iterator[Iterator[str]]:
+def _blender(interpreter: str, folder: Path, first: int) -> Iterator[Iterator[str]]:
     """Run the script; give its lines about pairs, and say in one line what went wrong."""
     with (folder / "blender.log").open("w") as log:
-        command = [interpreter, str(SCRIPT), str(folder)]
+        command = [interpreter, str(SCRIPT), str(folder), str(first)]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
         try:
             yield _lines(process, folder)

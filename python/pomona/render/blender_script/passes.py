@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
+from linear_file import read_linear
 from materials import material
+
+Arrange = Callable[[int], None]
+"""Arranges the stage for the frame of a number."""
+
+Take = Callable[[int, Any], None]
+"""Takes the picture of a frame, (H, W, 3)."""
 
 INDIRECT_LIMIT = 4.0
 """Brightest indirect light of a sample, against white: what is above are fireflies at few samples."""
@@ -17,6 +24,7 @@ def light_pass(scene: Any, job: dict[str, Any]) -> None:
     """Trace paths, few of them, and remove the noise."""
     _common(scene, job, job["samples"])
     cycles = scene.cycles
+    cycles.seed, cycles.use_animated_seed = job["seed"] % 2**31, True
     cycles.use_denoising, cycles.denoiser = True, "OPENIMAGEDENOISE"
     cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", "ACCURATE"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.transmission_bounces = 5, 4, 4
@@ -41,18 +49,24 @@ def truth_pass(job: dict[str, Any], shown: Any) -> Any:
     return scene
 
 
-def render(scene: Any, path: Path) -> Any:
-    """Render the scene to linear values, (H, W, 3) float32, by way of a file at `path`."""
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True, scene=scene.name)
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    values = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(values)
-    bpy.data.images.remove(image)
-    path.unlink()
-    return values.reshape(height, width, 4)[::-1, :, :3].copy()
+def animate(scene: Any, frames: range, path: Path, arrange: Arrange, take: Take) -> None:
+    """Render frames in one go, which keeps the stage between them: arrange each, hand on each picture."""
+    width, height = scene.render.resolution_x, scene.render.resolution_y
+
+    def begin(scene_now: Any, _graph: Any = None) -> None:
+        if scene_now.frame_current in frames:  # at the end Blender goes back to where it was
+            arrange(scene_now.frame_current)
+
+    def written(scene_now: Any, _graph: Any = None) -> None:
+        file = Path(scene_now.render.frame_path(frame=scene_now.frame_current))
+        take(scene_now.frame_current, read_linear(file, width, height))
+        file.unlink()
+
+    scene.render.filepath = f"{path}.######.exr"
+    scene.frame_start, scene.frame_end = frames.start, frames.stop - 1
+    bpy.app.handlers.frame_change_pre[:] = [begin]
+    bpy.app.handlers.render_write[:] = [written]
+    bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 def _common(scene: Any, job: dict[str, Any], samples: int) -> None:
@@ -64,3 +78,7 @@ def _common(scene: Any, job: dict[str, Any], samples: int) -> None:
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     scene.render.image_settings.exr_codec = "NONE"
+    taller = job["fx"] / job["fy"]
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = max(1.0, 1 / taller), max(1.0, taller)
+    scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
+    scene.render.resolution_percentage = 100

@@ -1,7 +1,7 @@
-"""Render the pairs of a job that are not there yet: `python render_job.py FOLDER`.
+"""Render the pairs of a job that are not there yet: `python render_job.py FOLDER [FIRST]`.
 
 The folder has `job.json` and `surfaces.npz`, written by pomona.render.photo; pairs come to `pairs/NNNN.npz`, each whole
-or not at all. A line on the standard output tells of each.
+or not at all, and what is there before them to `truth/NNNN.npz`. A line on the standard output tells of each pair.
 """
 
 from __future__ import annotations
@@ -23,49 +23,66 @@ except ImportError as error:
 
 import numpy as np
 from light import light
-from passes import light_pass, render, truth_pass
-from stage import camera, look, set_up, sway
+from passes import animate, light_pass, truth_pass
+from stage import Stage
 
 
-def main(folder: Path) -> None:
-    """Set the stage once, then take the missing pairs in turn."""
+def main(folder: Path, first: int = 0) -> None:
+    """Set the stage once; look what is there, then render what is missing, in runs of pairs."""
     job = json.loads((folder / "job.json").read_text())
-    missing = [pair for pair in range(len(job["poses"])) if not _pair_file(folder, pair).exists()]
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     shown = bpy.data.collections.new("shown")
     scene.collection.children.link(shown)
-    leaves = set_up(shown, job, _surfaces(folder))["leaves"]
-    eye = camera(scene, job)
-    shown.objects.link(eye)
+    stage = Stage(shown, job, _surfaces(folder))
     light(scene, job["weather"])
     light_pass(scene, job)
     truth = truth_pass(job, shown)
-    scene.camera = truth.camera = eye
-    still = np.empty(len(leaves.vertices) * 3, dtype=np.float32)
-    leaves.vertices.foreach_get("co", still)
-    for pair in missing:
-        if job["weather"]["wind_m"] > 0:
-            sway(leaves, still.reshape(-1, 3), job, pair)
-        _write(_pair_file(folder, pair), _pair(scene, truth, eye, job, pair, folder / f"pass.{os.getpid()}.exr"))
-        print(f"pomona pair {pair}", flush=True)
+    scene.camera = truth.camera = stage.eye
+    wanted = range(first, len(job["poses"]))
+    for pairs in _missing(folder, "truth", wanted):
+        _look_what_is_there(stage, truth, folder, pairs)
+    for pairs in _missing(folder, "pairs", wanted):
+        _render_pairs(stage, scene, folder, pairs)
 
 
-def _pair(scene: Any, truth: Any, eye: Any, job: dict[str, Any], pair: int, path: Path) -> dict[str, Any]:
-    pose = job["poses"][pair]
-    pictures = []
-    for side, aside_m in enumerate((0.0, job["baseline_m"])):
-        look(eye, pose, aside_m)
-        scene.cycles.seed = (job["seed"] * 1_000_003 + 2 * pair + side) % 2**31
-        pictures.append(render(scene, path))
-    look(eye, pose, 0.0)
-    ids, depth_m, hit = np.moveaxis(render(truth, path), -1, 0)
-    return {
-        "left": pictures[0].astype(np.float16),
-        "right": pictures[1].astype(np.float16),
-        "depth_m": np.where(hit > 0.5, depth_m, np.inf).astype(np.float32),
-        "ids": np.round(ids).astype(np.uint16),
-    }
+def _look_what_is_there(stage: Stage, truth: Any, folder: Path, pairs: range) -> None:
+    def take(pair: int, picture: Any) -> None:
+        ids, depth_m, hit = np.moveaxis(picture, -1, 0)
+        there = {
+            "depth_m": np.where(hit > 0.5, depth_m, np.inf).astype(np.float32),
+            "ids": np.round(ids).astype(np.uint16),
+        }
+        _write(_file(folder, "truth", pair), there)
+
+    animate(truth, pairs, folder / f"truth.{os.getpid()}", lambda pair: stage.arrange(pair, right=False), take)
+
+
+def _render_pairs(stage: Stage, scene: Any, folder: Path, pairs: range) -> None:
+    """Left pictures have even numbers, so that the noise of a frame is its own whatever was rendered before."""
+    eyes: dict[str, Any] = {}
+
+    def take(frame: int, picture: Any) -> None:
+        eyes["right" if frame % 2 else "left"] = picture.astype(np.float16)
+        if frame % 2:
+            with np.load(_file(folder, "truth", frame // 2)) as there:
+                _write(_file(folder, "pairs", frame // 2), {**eyes, **there})
+            print(f"pomona pair {frame // 2}", flush=True)
+
+    frames = range(2 * pairs.start, 2 * pairs.stop)
+    path = folder / f"light.{os.getpid()}"
+    animate(scene, frames, path, lambda frame: stage.arrange(frame // 2, right=frame % 2 == 1), take)
+
+
+def _missing(folder: Path, kind: str, wanted: range) -> list[range]:
+    """Give the numbers of the files that are not there, those that follow each other as one range."""
+    runs: list[range] = []
+    for number in (number for number in wanted if not _file(folder, kind, number).exists()):
+        if runs and runs[-1].stop == number:
+            runs[-1] = range(runs[-1].start, number + 1)
+        else:
+            runs.append(range(number, number + 1))
+    return runs
 
 
 def _surfaces(folder: Path) -> dict[str, dict[str, Any]]:
@@ -77,8 +94,8 @@ def _surfaces(folder: Path) -> dict[str, dict[str, Any]]:
     return surfaces
 
 
-def _pair_file(folder: Path, pair: int) -> Path:
-    return folder / "pairs" / f"{pair:04d}.npz"
+def _file(folder: Path, kind: str, pair: int) -> Path:
+    return folder / kind / f"{pair:04d}.npz"
 
 
 def _write(path: Path, arrays: dict[str, Any]) -> None:
@@ -92,4 +109,4 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *map(int, sys.argv[2:]))

@@ -12,15 +12,42 @@ from mathutils import Matrix
 GROUND_HALF_M = 150.0
 
 
-def set_up(shown: Any, job: dict[str, Any], surfaces: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Put everything on the stage; give the meshes by name."""
-    meshes = {name: mesh(name, surface) for name, surface in surfaces.items()}
-    for name, made in meshes.items():
-        for x, y, turn_rad, height in job["places"][name]:
-            place = Matrix.Translation((x, y, 0.0)) @ Matrix.Rotation(turn_rad, 4, "Z")
-            _put(shown, made, place @ Matrix.Diagonal((1.0, 1.0, height, 1.0)))
-    _put(shown, _plane(), Matrix.Identity(4))
-    return meshes
+class Stage:
+    """All that is shown, and the eye that looks at it."""
+
+    def __init__(self, shown: Any, job: dict[str, Any], surfaces: dict[str, dict[str, Any]]) -> None:
+        self._job = job
+        meshes = {name: mesh(name, surface) for name, surface in surfaces.items()}
+        for name, made in meshes.items():
+            for x, y, turn_rad, height in job["places"][name]:
+                place = Matrix.Translation((x, y, 0.0)) @ Matrix.Rotation(turn_rad, 4, "Z")
+                _put(shown, made, place @ Matrix.Diagonal((1.0, 1.0, height, 1.0)))
+        _put(shown, _plane(), Matrix.Identity(4))
+        self.eye = _eye(job)
+        shown.objects.link(self.eye)
+        self._leaves = meshes["leaves"]
+        self._still_m = np.empty((len(self._leaves.vertices), 3), dtype=np.float32)
+        self._leaves.vertices.foreach_get("co", self._still_m.ravel())
+        self._along = np.empty(len(self._still_m), dtype=np.float32)
+        self._leaves.attributes["along"].data.foreach_get("value", self._along)
+
+    def arrange(self, pair: int, *, right: bool) -> None:
+        """Put the eye where it is in a pair, which Blender has look along -z, y up; move the leaves, alike for both."""
+        pose = np.array(self._job["poses"][pair])
+        pose[:3, 3] += pose[:3, 0] * (self._job["baseline_m"] if right else 0.0)
+        self.eye.matrix_world = Matrix((pose @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist())
+        if self._job["weather"]["wind_m"] > 0 and not right:
+            self._sway(pair)
+
+    def _sway(self, pair: int) -> None:
+        """Let the wind push each leaf, and its tip most."""
+        first = np.flatnonzero(np.diff(self._along, prepend=1.0) < 0)
+        leaf = np.repeat(np.arange(len(first)), np.diff(first, append=len(self._along)))
+        rng = np.random.default_rng([self._job["seed"], pair])
+        pushed_m = rng.normal(scale=self._job["weather"]["wind_m"], size=(len(first), 3))
+        moved_m = self._still_m + pushed_m[leaf] * self._along[:, None]
+        self._leaves.vertices.foreach_set("co", moved_m.astype(np.float32).ravel())
+        self._leaves.update()
 
 
 def mesh(name: str, surface: dict[str, Any]) -> Any:
@@ -43,39 +70,16 @@ def mesh(name: str, surface: dict[str, Any]) -> Any:
     return made
 
 
-def camera(scene: Any, job: dict[str, Any]) -> Any:
+def _eye(job: dict[str, Any]) -> Any:
     """Make the pinhole of the calibration; picture coordinates begin at the top left corner."""
     width, height = job["width"], job["height"]
-    made = bpy.data.cameras.new("camera")
+    made = bpy.data.cameras.new("eye")
     made.sensor_fit, made.sensor_width = "HORIZONTAL", 36.0
     made.lens = job["fx"] / width * 36.0
     made.shift_x = (width / 2 - job["cx"]) / width
     made.shift_y = (job["cy"] - height / 2) / width * job["fx"] / job["fy"]
     made.clip_start, made.clip_end = 0.01, 10 * GROUND_HALF_M
-    taller = job["fx"] / job["fy"]
-    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = max(1.0, 1 / taller), max(1.0, taller)
-    scene.render.resolution_x, scene.render.resolution_y = width, height
-    scene.render.resolution_percentage = 100
-    return bpy.data.objects.new("camera", made)
-
-
-def look(camera_object: Any, session_from_camera: Any, aside_m: float) -> None:
-    """Put the camera at a pose in OpenCV's axes, `aside_m` along its x: Blender's looks along -z, y up."""
-    pose = np.array(session_from_camera)
-    pose[:3, 3] += aside_m * pose[:3, 0]
-    camera_object.matrix_world = Matrix((pose @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist())
-
-
-def sway(leaves: Any, still: Any, job: dict[str, Any], pair: int) -> None:
-    """Let the wind move each leaf, more at its tip; both eyes see it so."""
-    rng = np.random.default_rng([job["seed"], pair])
-    along = np.empty(len(still), dtype=np.float32)
-    leaves.attributes["along"].data.foreach_get("value", along)
-    corners = job["leaf_vertices"]
-    pushed = rng.normal(scale=job["weather"]["wind_m"], size=(len(still) // corners, 3))
-    moved = still + np.repeat(pushed, corners, axis=0) * along[:, None]
-    leaves.vertices.foreach_set("co", moved.astype(np.float32).ravel())
-    leaves.update()
+    return bpy.data.objects.new("eye", made)
 
 
 def _put(shown: Any, held: Any, place: Any) -> None:
