@@ -1,4 +1,4 @@
-"""What a photo-real renderer adds to a row, and where: grass between the rows, soil and weeds under the trees, rows beyond."""
+"""What a photo-real renderer adds to a row, and where: grass, soil and weeds, rows beyond."""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -29,9 +30,12 @@ if TYPE_CHECKING:
     from pomona.render.surfaces import Surface
     from pomona.synth.row_geometry import RowGeometry
 
-__all__ = ["PathTracer"]
+__all__ = ["BLENDER_PYTHON", "PathTracer"]
 
 SCRIPT = Path(__file__).with_name("blender_script") / "render_job.py"
+
+BLENDER_PYTHON = "POMONA_BLENDER_PYTHON"
+"""Environment variable: a Python with `bpy`, where that of Pomona has none."""
 
 NO_BLENDER = 3
 """Exit code of the script when Blender's module cannot be loaded."""
@@ -53,8 +57,8 @@ class PathTracer:
     threads : int
     folder : Path or None
         Where the job and its pairs are kept; None for a folder that is gone afterwards.
-    interpreter : str
-        A Python in which `bpy` is installed.
+    interpreter : str or None
+        A Python in which `bpy` is installed; None for that of the environment variable `BLENDER_PYTHON`, else this one.
     """
 
     name: ClassVar[str] = "photo"
@@ -62,7 +66,7 @@ class PathTracer:
     samples: int = 8
     threads: int = 1
     folder: Path | None = None
-    interpreter: str = sys.executable
+    interpreter: str | None = None
 
     def render(
         self,
@@ -151,11 +155,15 @@ def _without_threads(told: str) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _blender(interpreter: str, folder: Path, first: int) -> Iterator[Iterator[str]]:
+def _blender(interpreter: str | None, folder: Path, first: int) -> Iterator[Iterator[str]]:
     """Run the script; give its lines about pairs, and say in one line what went wrong."""
+    python = interpreter or os.environ.get(BLENDER_PYTHON, sys.executable)
     with (folder / "blender.log").open("w") as log:
-        command = [interpreter, str(SCRIPT), str(folder), str(first)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+        try:
+            command = [python, str(SCRIPT), str(folder), str(first)]
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+        except OSError as error:
+            raise PomonaError(f"{python}: cannot be run: {error.strerror}") from None
         try:
             yield _lines(process, folder)
         finally:

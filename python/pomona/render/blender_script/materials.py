@@ -27,7 +27,7 @@ def _skin(tree: Shader) -> None:
     ground = tree.mix(0.3, tree.attribute("ground").outputs["Color"], ground)
     blush = tree.attribute("blush").outputs["Color"]
     deep = tree.mix(0.55, blush, (0.16, 0.008, 0.012), "MULTIPLY")
-    blush = tree.mix(tree.step(streaks, 0.42, 0.62), blush, tree.mix(0.35, blush, deep))
+    blush = tree.mix(tree.step(streaks, 0.42, 0.62), blush, tree.mix(0.7, blush, deep))
     skin = tree.mix(red, ground, blush)
     skin = tree.mix(_lenticels(tree, here), skin, (0.55, 0.45, 0.22))
     skin = _hollows(tree, place, skin)
@@ -39,7 +39,7 @@ def _skin(tree: Shader) -> None:
             "Specular IOR Level": 0.45,
             "Coat Weight": 0.25,
             "Coat Roughness": 0.18,
-            "Subsurface Weight": 0.12,
+            "Subsurface Weight": 0.08,
             "Subsurface Radius": (0.006, 0.003, 0.0015),
             "Subsurface Scale": 1.0,
             "Normal": tree.bump(tree.noise(here, 9.0, 1.0), 0.12, 0.004),
@@ -52,12 +52,12 @@ def _blush_share(tree: Shader, streaks: Any, cloudy: Any) -> Any:
     """How red the skin is: from the side that had the sun as far round as the share says, frayed by streaks."""
     sunny = tree.attribute("sunny").outputs["Fac"]
     share = tree.attribute("share").outputs["Fac"]
-    frayed = tree.math("MULTIPLY_ADD", tree.math("SUBTRACT", streaks, 0.5), 1.5, sunny)
+    frayed = tree.math("MULTIPLY_ADD", tree.math("SUBTRACT", streaks, 0.5), 2.4, sunny)
     frayed = tree.math("MULTIPLY_ADD", tree.math("SUBTRACT", cloudy, 0.5), 1.1, frayed)
     # A cap of a sphere with the cosine c at its edge covers (1 - c) / 2 of it.
     edge = tree.math("MULTIPLY_ADD", share, -2.0, 1.0)
     beyond = tree.math("SUBTRACT", frayed, edge)
-    red = tree.step(beyond, -0.35, 0.35)
+    red = tree.step(beyond, -0.45, 0.35)
     return tree.math("MULTIPLY", red, tree.step(share, 0.0, 0.12))
 
 
@@ -67,7 +67,7 @@ def _lenticels(tree: Shader, here: Any) -> Any:
 
 
 def _hollows(tree: Shader, place: Any, skin: Any) -> Any:
-    """The hollow at the stalk is greener and russeted, the calyx dry and brown."""
+    """Russet the hollow at the stalk; dry the calyx to brown."""
     parts = tree.node("ShaderNodeSeparateXYZ", {0: place}).outputs
     across = tree.math("SQRT", tree.math("ADD", tree.math("POWER", parts[0], 2.0), tree.math("POWER", parts[1], 2.0)))
     above = tree.step(parts[2], 0.0, 0.1)
@@ -89,7 +89,7 @@ def _leaf(tree: Shader) -> None:
     lower = tree.mix(0.55, upper, (0.20, 0.25, 0.15))
     lower = tree.mix(tree.math("MULTIPLY", veins, 0.4), lower, (0.30, 0.34, 0.20))
     blade = tree.mix(where["Backfacing"], upper, lower)
-    through = tree.node("ShaderNodeHueSaturation", {"Hue": 0.475, "Saturation": 1.15, "Value": 1.7, "Color": upper})
+    through = tree.node("ShaderNodeHueSaturation", {"Hue": 0.475, "Saturation": 1.05, "Value": 1.25, "Color": upper})
     relief = tree.bump(tree.math("SUBTRACT", 1.0, veins), 0.35, 0.002)
     dull = tree.math("MULTIPLY_ADD", where["Backfacing"], 0.30, 0.40)
     face = tree.node(
@@ -97,11 +97,11 @@ def _leaf(tree: Shader) -> None:
         {"Base Color": blade, "Roughness": dull, "Specular IOR Level": 0.32, "Normal": relief},
     )
     glow = tree.node("ShaderNodeBsdfTranslucent", {"Color": through.outputs[0]})
-    tree.surface(tree.node("ShaderNodeMixShader", {0: 0.30, 1: face.outputs[0], 2: glow.outputs[0]}).outputs[0])
+    tree.surface(tree.node("ShaderNodeMixShader", {0: 0.24, 1: face.outputs[0], 2: glow.outputs[0]}).outputs[0])
 
 
 def _veins(tree: Shader) -> Any:
-    """The middle rib and seven side veins that leave it towards the tip."""
+    """Draw the middle rib and side veins that leave it towards the tip."""
     along, across = (tree.attribute(name).outputs["Fac"] for name in ("along", "across"))
     aside = tree.math("ABSOLUTE", across)
     rib = tree.step(aside, 0.10, 0.03)
@@ -116,8 +116,8 @@ def _bark(tree: Shader) -> None:
     place = tree.node("ShaderNodeNewGeometry").outputs["Position"]
     rough = tree.noise(tree.scaled(place, (1.0, 1.0, 0.35)), 90.0, 4.0)
     patches = tree.noise(place, 14.0, 3.0)
-    bark = tree.mix(tree.step(rough, 0.62, 0.36), colour, (0.25, 0.22, 0.20), "MULTIPLY")
-    bark = tree.mix(tree.math("MULTIPLY", tree.step(patches, 0.55, 0.72), 0.45), bark, (0.20, 0.20, 0.16))
+    bark = tree.mix(tree.step(rough, 0.62, 0.36), colour, (0.45, 0.42, 0.40), "MULTIPLY")
+    bark = tree.mix(tree.math("MULTIPLY", tree.step(patches, 0.55, 0.72), 0.45), bark, (0.60, 0.62, 0.52), "MULTIPLY")
     inputs = {
         "Base Color": bark,
         "Roughness": 0.8,
@@ -132,16 +132,14 @@ def _grass(tree: Shader) -> None:
     patches = tree.noise(tree.node("ShaderNodeNewGeometry").outputs["Position"], 1.7, 2.0)
     colour = tree.mix(tree.math("MULTIPLY", tree.step(patches, 0.45, 0.7), 0.55), colour, (0.17, 0.16, 0.045))
     colour = tree.mix(tree.math("MULTIPLY", along, 0.35), colour, (0.16, 0.20, 0.05))
-    face = tree.node(
-        "ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": 0.55, "Specular IOR Level": 0.25}
-    )
+    face = tree.node("ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": 0.55, "Specular IOR Level": 0.25})
     glow = tree.node("ShaderNodeBsdfTranslucent", {"Color": colour})
     tree.surface(tree.node("ShaderNodeMixShader", {0: 0.25, 1: face.outputs[0], 2: glow.outputs[0]}).outputs[0])
 
 
 def _ground(tree: Shader) -> None:
     place = tree.node("ShaderNodeNewGeometry").outputs["Position"]
-    soil = tree.mix(tree.noise(place, 38.0, 5.0), (0.055, 0.036, 0.022), (0.16, 0.115, 0.075))
+    soil = tree.mix(tree.noise(place, 38.0, 5.0), (0.040, 0.027, 0.017), (0.105, 0.076, 0.050))
     damp = tree.step(tree.noise(place, 1.3, 3.0), 0.40, 0.62)
     soil = tree.mix(tree.math("MULTIPLY", damp, 0.5), soil, (0.05, 0.075, 0.02))
     inputs = {

@@ -65,7 +65,7 @@ class Shader:
         return self.node("ShaderNodeVectorMath", {0: vector, 1: other}, operation="ADD").outputs[0]
 
     def bump(self, height: Value, strength: float, distance_m: float) -> Socket:
-        """Normals of a surface with a relief."""
+        """Tilt normals as a relief does."""
         inputs = {"Height": height, "Strength": strength, "Distance": distance_m}
         return self.node("ShaderNodeBump", inputs).outputs[0]
 

@@ -1,4 +1,4 @@
-"""Apples as solids of revolution: round shoulders, a hollow at the stalk, a shallow one with five bumps at the calyx."""
+"""Apples as solids of revolution: round shoulders, a hollow at the stalk, five bumps about the calyx."""
 
 from __future__ import annotations
 

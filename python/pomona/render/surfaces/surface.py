@@ -44,6 +44,7 @@ def grid_faces(bodies: int, rows: int, columns: int, *, closed: bool) -> NDArray
     first = np.arange(bodies) * rows * columns
     return np.asarray((first[:, None, None] + one).reshape(-1, 4), dtype=np.int32)
 
+
 def frames_along(axes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotations, (F, 3, 3), that take z to each axis."""
     aside = np.where(np.abs(axes[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
