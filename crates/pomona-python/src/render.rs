@@ -12,6 +12,9 @@ use pomona_render::{Fruit, Leaf, Limb, Row, Scene, Vec3, Weather};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+/// As many as pictures of recordings may have; each has nine samples of eight bytes while it is drawn.
+const MOST_PIXELS: usize = 1 << 26;
+
 type Numbers<'py> = PyReadonlyArray1<'py, f64>;
 type Vectors<'py> = PyReadonlyArray2<'py, f64>;
 
@@ -144,6 +147,12 @@ impl PyRowScene {
         seed: u32,
     ) -> PyResult<Self> {
         let camera = camera.to_stereo_camera()?;
+        if camera.width.saturating_mul(camera.height) > MOST_PIXELS {
+            let (width, height) = (camera.width, camera.height);
+            return Err(PyValueError::new_err(format!(
+                "camera: found {width}x{height}, expected at most 67 million pixels"
+            )));
+        }
         let views = poses("session_from_camera", &session_from_camera, Pose::from_matrix)?;
         let places: Vec<_> = views.iter().map(|view| view.translation.map(|x| x as f32)).collect();
         let row = Row {

@@ -38,7 +38,7 @@ WEATHERS: Mapping[str, _Kind] = {
         strength=(2.8, 4.6),
         brightness=(0.9, 1.1),
         sun=(1.0, 0.94, 0.84),
-        sky=(0.38, 0.62, 1.15),
+        sky=(0.40, 0.62, 1.05),
         horizon=(0.95, 1.1, 1.3),
         wind_m=(0.0, 0.003),
     ),

@@ -10,6 +10,7 @@ use std::f32::consts::PI;
 /// Least side of a cell, and the most cells.
 const CELL_M: f32 = 0.18;
 const MOST_CELLS: f32 = 150e3;
+const MOST_ALONG: f32 = 1000.0;
 
 /// Free air kept around the leaves.
 const MARGIN_M: f32 = 1.2;
@@ -73,7 +74,7 @@ impl Canopy {
         let (low, high) = bounds.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1))).unwrap_or(none);
         let low = Vec3::new(low.x - MARGIN_M, low.y - MARGIN_M, 0.0);
         let reach = high + Vec3::new(MARGIN_M, MARGIN_M, MARGIN_M) - low;
-        let cell_m = CELL_M.max((reach.product() / MOST_CELLS).cbrt());
+        let cell_m = CELL_M.max((reach.product() / MOST_CELLS).cbrt()).max(reach.max() / MOST_ALONG);
         let size = [0, 1, 2].map(|axis| (reach[axis] / cell_m).ceil().max(2.0) as usize);
         Self { low, cells_per_m: 1.0 / cell_m, size, walls: Vec::new() }
     }

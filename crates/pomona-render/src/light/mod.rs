@@ -91,7 +91,7 @@ impl Light {
         }
         if surface.gloss > 0.0 {
             let mirrored = normal * (2.0 * normal.dot(to_viewer)) - to_viewer;
-            let share = fresnel(surface.gloss, normal.dot(to_viewer)) * (1.0 - 0.6 * surface.roughness);
+            let share = mirrored_share(surface, normal.dot(to_viewer));
             radiance += ambient.falling_on(&mirrored) * share;
         }
         if self.weather.has_sun() {
@@ -124,6 +124,12 @@ impl Light {
         let towards = half.dot(to_viewer).max(0.1);
         spread * fresnel(surface.gloss, towards) / (4.0 * towards * towards)
     }
+}
+
+/// Share of the light from all around that is mirrored: what is rough mirrors less at low angles (Lagarde 2011).
+fn mirrored_share(surface: &Surface, cosine: f32) -> f32 {
+    let at_edge = (1.0 - surface.roughness).max(surface.gloss);
+    surface.gloss + (at_edge - surface.gloss) * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
 }
 
 /// Share that is mirrored under an angle (Schlick 1994).

@@ -8,6 +8,7 @@ use pomona::nalgebra::Matrix3;
 /// Width of a texel, unless the map would grow too large.
 const TEXEL_M: f32 = 0.004;
 const MOST_TEXELS: f32 = 24e6;
+const MOST_ACROSS: f32 = 16_384.0;
 
 /// What lies no deeper behind the first surface is that surface itself: shapes are flat between their corners.
 const SELF_M: f32 = 0.007;
@@ -70,7 +71,8 @@ impl FromSun {
         let first = places.next()?;
         let (low, high) = places.fold((first, first), |(low, high), place| (low.inf(&place), high.sup(&place)));
         let reach = high - low;
-        let texel_m = TEXEL_M.max((reach.x * reach.y / MOST_TEXELS).sqrt());
+        let longest_m = reach.x.max(reach.y);
+        let texel_m = TEXEL_M.max((reach.x * reach.y / MOST_TEXELS).sqrt()).max(longest_m / MOST_ACROSS);
         let size = [0, 1].map(|axis| (reach[axis] / texel_m).ceil() as usize + 1);
         Some(Self { size, sun_from_row, texels_per_m: 1.0 / texel_m, low, far: high.z + 1.0 })
     }

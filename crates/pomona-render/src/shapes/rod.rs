@@ -7,6 +7,7 @@ use std::f32::consts::TAU;
 
 /// A rod is cut into pieces no longer, so that one that reaches behind the camera is seen in front of it.
 const LONGEST_PIECE_M: f32 = 0.4;
+const MOST_PIECES: f32 = 2000.0;
 
 /// Ends of thinner rods are not seen.
 const THINNEST_CAPPED_PX: f32 = 0.7;
@@ -18,7 +19,7 @@ pub fn shape(limb: &Limb, px_per_m: f32) -> Shape {
     let axis = if length_m > 0.0 { way / length_m } else { Vec3::z() };
     let radius_px = limb.start_radius_m.max(limb.end_radius_m) * px_per_m;
     let sides = (3.0 + 1.5 * radius_px).clamp(3.0, 10.0) as u32;
-    let pieces = (length_m / LONGEST_PIECE_M).ceil().max(1.0) as u32;
+    let pieces = (length_m / LONGEST_PIECE_M).ceil().clamp(1.0, MOST_PIECES) as u32;
     let (side, other) = across(&axis);
     let has_caps = radius_px > THINNEST_CAPPED_PX;
     let mut corners = vec![corner(limb.start - axis * limb.start_radius_m, -axis, 0.0, 0.0)];

@@ -3,12 +3,16 @@
 use super::Spot;
 use crate::Vec3;
 use crate::light::Surface;
-use crate::noise::{blend, noise};
+use crate::noise::{blend, hash, noise, unit};
 use crate::row::Leaf;
 
 /// Light that comes through a leaf lacks the blue and is yellower than what its upper side scatters.
 const THROUGH: Vec3 = Vec3::new(1.0, 1.0, 0.35);
 const PALE: Vec3 = Vec3::new(0.19, 0.24, 0.15);
+
+/// Factors of the colour of the darkest and the lightest leaves of a tree.
+const OLD: Vec3 = Vec3::new(0.72, 0.76, 0.80);
+const YOUNG: Vec3 = Vec3::new(1.32, 1.18, 0.95);
 
 /// Side veins from base to tip.
 const VEINS: f32 = 9.0;
@@ -22,7 +26,8 @@ pub fn surface(leaf: &Leaf, number: u32, spot: &Spot) -> Surface {
     let tilt = leaf.tip * (relief * 0.35);
     let normal = (spot.normal * faces.signum() + tilt).normalize();
     let mottled = 0.85 + 0.3 * noise(Vec3::new(along * 4.0, aside * 2.0, 0.0), number);
-    let upper = leaf.colour * mottled;
+    let tint = unit(hash(number as i32, 0, 0, 5));
+    let upper = leaf.colour.component_mul(&blend(OLD, YOUNG, tint)) * mottled;
     let albedo = if is_upper { blend(upper, PALE, 0.35 * vein) } else { blend(upper, PALE, 0.4 + 0.25 * vein) };
     let transmitted = leaf.colour.component_mul(&THROUGH) * (0.72 - 0.3 * vein);
     let (gloss, roughness) = if is_upper { (0.045, 0.42) } else { (0.02, 0.7) };

@@ -11,7 +11,7 @@ const RUSSET: Vec3 = Vec3::new(0.20, 0.13, 0.05);
 const CALYX: Vec3 = Vec3::new(0.035, 0.025, 0.015);
 const LENTICEL: Vec3 = Vec3::new(0.55, 0.45, 0.28);
 
-/// Of wax on skin (Frequently used for fruits: an index of refraction of 1.45).
+/// Of wax, whose index of refraction is 1.45.
 const GLOSS: f32 = 0.034;
 const ROUGHNESS: f32 = 0.38;
 
