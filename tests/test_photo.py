@@ -91,7 +91,11 @@ def test_ids_and_depths_are_those_of_the_pinhole(camera):
         assert (pair.ids[level & (away_m < 0.46 * diameter_m)] == number).all()
         assert not (pair.ids[away_m > 0.60 * diameter_m] == number).any()
         column, row = place_px.astype(int)
-        assert pair.depth_m[row, column] == pytest.approx(depth_m - diameter_m / 2, abs=0.004)
+        # The ray to the middle meets the skin half a diameter before it.
+        away = depth_m * np.linalg.norm([*((place_px - [camera.cx, camera.cy]) / [camera.fx, camera.fy]), 1.0])
+        assert pair.depth_m[row, column] == pytest.approx(depth_m * (1 - diameter_m / 2 / away), abs=0.003)
+        middle_px = columns[pair.ids == number].mean(), rows[pair.ids == number].mean()
+        assert middle_px == pytest.approx(place_px, abs=0.2)
     assert set(np.unique(pair.ids)) == {0, 7, 300}
 
 

@@ -20,7 +20,7 @@ def main(folder: Path, first: int = 0) -> int:
     except ImportError as error:
         print(error, file=sys.stderr)
         return NO_BLENDER
-    from story import render_missing
+    from traced_pairs import render_missing
 
     render_missing(folder, first)
     return 0
