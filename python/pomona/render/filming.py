@@ -135,6 +135,10 @@ def renderer_called(name: str) -> Renderer:
         from pomona.render.raster import RasterRenderer
 
         return RasterRenderer()
+    if name == "photo":
+        from pomona.render.photo import PathTracer
+
+        return PathTracer()
     raise PomonaError(f"no renderer is called {name!r}; expected one of {', '.join(RENDERERS)}")
 
 
