@@ -95,7 +95,7 @@ def test_ids_and_depths_are_those_of_the_pinhole(camera):
         away = depth_m * np.linalg.norm([*((place_px - [camera.cx, camera.cy]) / [camera.fx, camera.fy]), 1.0])
         assert pair.depth_m[row, column] == pytest.approx(depth_m * (1 - diameter_m / 2 / away), abs=0.003)
         middle_px = columns[pair.ids == number].mean(), rows[pair.ids == number].mean()
-        assert middle_px == pytest.approx(place_px, abs=0.2)
+        assert middle_px == pytest.approx(place_px, abs=0.35)  # a pixel is an eighth of a fruit
     assert set(np.unique(pair.ids)) == {0, 7, 300}
 
 

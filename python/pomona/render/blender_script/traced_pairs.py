@@ -13,6 +13,9 @@ from light import light
 from passes import animate, light_pass, truth_pass
 from stage import Stage
 
+AT_ONCE = 10
+"""Pairs between two changes of the pass, each of which costs a few seconds."""
+
 
 def render_missing(folder: Path, first: int) -> None:
     """Set the stage once; look what is there, then render what is missing, in runs of pairs."""
@@ -26,11 +29,13 @@ def render_missing(folder: Path, first: int) -> None:
     light_pass(scene, job)
     truth = truth_pass(job, shown)
     scene.camera = truth.camera = stage.eye
-    wanted = range(first, len(job["poses"]))
-    for pairs in _missing(folder, "truth", wanted):
-        _look_what_is_there(stage, truth, folder, pairs)
-    for pairs in _missing(folder, "pairs", wanted):
-        _render_pairs(stage, scene, folder, pairs)
+    count = len(job["poses"])
+    for start in range(first, count, AT_ONCE):
+        wanted = range(start, min(start + AT_ONCE, count))
+        for pairs in _missing(folder, "truth", wanted):
+            _look_what_is_there(stage, truth, folder, pairs)
+        for pairs in _missing(folder, "pairs", wanted):
+            _render_pairs(stage, scene, folder, pairs)
 
 
 def _look_what_is_there(stage: Stage, truth: Any, folder: Path, pairs: range) -> None:
