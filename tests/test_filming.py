@@ -225,3 +225,15 @@ def test_depth_is_carried_to_the_right_eye():
     carried = right_depth_m(depth_m, CAMERA)
     assert (carried[:, 48:68] == 1.0).all()
     assert (carried[:, 90:150] == 4.0).all()
+
+
+def test_what_the_left_eye_does_not_see_is_as_far_as_beside():
+    """A near post before a wall: the wall comes out behind it, and at the right edge of the right picture."""
+    depth_m = np.full((CAMERA.height, CAMERA.width), 4.0, np.float32)
+    depth_m[:, 100:140] = 1.0
+    depth_m[0] = np.inf
+    carried = right_depth_m(depth_m, CAMERA)
+    near = carried[1:] == 1.0
+    assert (near.sum(axis=1) == 40).all()
+    assert (carried[1:][~near] == 4.0).all()
+    assert (carried[0] >= 1e4).all()

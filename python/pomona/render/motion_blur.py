@@ -85,4 +85,15 @@ def right_depth_m(depth_m: NDArray[np.float32], camera: Calibration) -> NDArray[
     carried = np.zeros_like(depth_m)
     chosen = rows.ravel()[inside][farthest_first], target.ravel()[inside][farthest_first]
     carried[chosen] = depth_m.ravel()[inside][farthest_first]
-    return np.where(carried > 0.0, carried, cv2.dilate(np.minimum(carried, FAR_M), np.ones((1, 15), np.uint8)))
+    return _filled(carried)
+
+
+def _filled(depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give pixels without depth (0) the farther of the next to the left and right: it comes out from behind."""
+    height, width = depth_m.shape
+    known, columns = depth_m > 0.0, np.arange(width)
+    before = np.maximum.accumulate(np.where(known, columns, -1), axis=1)
+    after = np.minimum.accumulate(np.where(known, columns, width)[:, ::-1], axis=1)[:, ::-1]
+    edged, rows = np.pad(depth_m, ((0, 0), (1, 1))), np.arange(height)[:, None]
+    beside = np.maximum(edged[rows, before + 1], edged[rows, after + 1])
+    return np.where(known, depth_m, np.where(beside > 0.0, beside, np.float32(FAR_M)))
