@@ -58,7 +58,7 @@ def test_the_hidden_are_those_that_show_least(season: Season) -> None:
     for visit in season.visits:
         seen = np.isin(visit.truth.ids, visit.fruits)
         missed = ~seen & np.isfinite(visit.shown)
-        assert visit.shown[missed].mean() < 0.15 < 0.4 < visit.shown[seen].mean()
+        assert visit.shown[missed].mean() < 0.25 < 0.4 < visit.shown[seen].mean()
 
 
 def test_one_side_sees_what_the_other_does_not() -> None:
@@ -129,7 +129,7 @@ def test_the_sizes_of_a_visit_share_an_error() -> None:
     for visit in season.visits:
         true = visit.truth.diameters_m[np.searchsorted(visit.truth.ids, visit.fruits)]
         ratio = visit.cloud.diameters_m / true
-        assert np.median(ratio) == pytest.approx(visit.size_scale, abs=0.004)
+        assert np.median(ratio) == pytest.approx(visit.size_scale, abs=0.012)
         assert (visit.cloud.diameters_m - visit.size_scale * true).std() == pytest.approx(0.001, rel=0.25)
     assert len({visit.size_scale for visit in season.visits}) == len(season.visits)
 
