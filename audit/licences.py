@@ -42,8 +42,12 @@ ALLOWED = frozenset(
 )
 """Permissive: what they ask for is their notice."""
 
+APART = {"bpy": "GPL-3.0-or-later: installed on request only, a process of its own that exchanges files with pomona"}
+"""Programs that extras bring beside pomona: it never imports them, and ships nothing of them."""
+
 EXCEPTIONS = {
     "apsw": "any licence that the Open Source Initiative approves, at the user's choice: so MIT",
+    "certifi": "MPL-2.0: certificates and the path to them, unchanged, brought by bpy alone",
     "matplotlib": "its own licence, made after the PSF's: permissive",
 }
 """Packages whose metadata names no licence of the list, and why they are taken all the same."""
@@ -83,7 +87,7 @@ def crate_licences() -> dict[str, str]:
 def package_licences() -> dict[str, str]:
     """Licence of each package that pomona and its extras bring, as far as it is installed here."""
     found = {}
-    for name in brought():
+    for name in sorted(set(brought()) - APART.keys()):
         try:
             found[name] = _licence_of(importlib.metadata.metadata(name))
         except importlib.metadata.PackageNotFoundError:

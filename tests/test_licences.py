@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 from audit.licences import (
+    APART,
     BUNDLED,
     EXCEPTIONS,
     brought,
@@ -27,6 +28,7 @@ def test_packages_are_under_permissive_licences():
     assert {"numpy", "scipy", "av", "rosbags", "onnxruntime", "typer"} <= found.keys()
     assert not {"pytest", "hypothesis"} & set(brought())
     assert wrong_licences(found) == []
+    assert set(APART) <= set(brought())
     assert set(EXCEPTIONS) <= found.keys()
 
 
