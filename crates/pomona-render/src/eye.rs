@@ -37,7 +37,7 @@ pub struct Gust {
 
 impl Gust {
     /// How far a part is moved: leaves only.
-    pub fn on(&self, thing: Thing) -> Vec3 {
+    pub fn on(self, thing: Thing) -> Vec3 {
         let Thing::Leaf(number) = thing else { return Vec3::zeros() };
         if self.sigma_m <= 0.0 {
             return Vec3::zeros();

@@ -161,7 +161,7 @@ pub struct Ambient(Walls);
 
 impl Ambient {
     /// Light that falls on a surface, against a white sky's: between the walls by the squares of its normal
-    /// (McTaggart, 2004).
+    /// (`McTaggart`, 2004).
     pub fn falling_on(&self, normal: &Vec3) -> Vec3 {
         let from = |axis: usize| self.0[2 * axis + usize::from(normal[axis] < 0.0)] * (normal[axis] * normal[axis]);
         from(0) + from(1) + from(2)

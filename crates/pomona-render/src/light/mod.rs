@@ -95,12 +95,12 @@ impl Light {
             radiance += ambient.falling_on(&mirrored) * share;
         }
         if self.weather.has_sun() {
-            radiance += self.from_sun(surface, rest, to_viewer).component_mul(&self.weather.sun());
+            radiance += self.of_sun(surface, rest, to_viewer).component_mul(&self.weather.sun());
         }
         radiance
     }
 
-    fn from_sun(&self, surface: &Surface, rest: &Vec3, to_viewer: &Vec3) -> Vec3 {
+    fn of_sun(&self, surface: &Surface, rest: &Vec3, to_viewer: &Vec3) -> Vec3 {
         let facing = surface.normal.dot(&self.weather.to_sun);
         let share = if facing > 0.0 { surface.albedo } else { surface.transmitted } * facing.abs();
         let glint = if facing > 0.0 { self.glint(surface, to_viewer) * facing } else { 0.0 };
