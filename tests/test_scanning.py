@@ -47,6 +47,15 @@ def test_takes_recordings_that_are_open_and_parts_of_them(row: Path) -> None:
     assert survey.trajectory.frames.tolist() == [0, 2]
 
 
+def test_boxes_of_the_whole_serve_its_parts(row: Path) -> None:
+    part = pomona.selected(open_recording(row), first=1)
+    survey = pomona.scan(part, detections=row / "detections.csv")
+    assert survey.trajectory.frames.tolist() == [1, 2]
+    (row / "detections.csv").write_text("frame,xmin,ymin,xmax,ymax\n3,10,10,40,40\n")
+    with pytest.raises(PomonaError, match=r"line 2: frame: found 3, expected a frame there is \(0 to 2\)"):
+        pomona.scan(part)
+
+
 def test_destroys_nothing(row: Path, tmp_path: Path) -> None:
     boxes = tmp_path / "boxes.csv"
     boxes.write_text("frame,xmin,ymin,xmax,ymax,x,y,z,diameter_sigma_m\n0,10,10,40,40,0,0,0,0\n")  # also alike

@@ -81,7 +81,7 @@ def open_detector(
     if model is None:
         if given:
             raise PomonaError(f"{', '.join(given)}: found without a model, expected --model FILE with it")
-        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.numbers)
+        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.recorded_numbers)
     if detections is not None:
         raise PomonaError(f"found --detections {detections} and --model {model}, expected one of them")
     pictures = recording.description()["pictures"]

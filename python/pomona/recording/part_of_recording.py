@@ -39,6 +39,11 @@ class PartOfRecording:
         return self.whole.date
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """All frames that were recorded."""
+        return self.whole.recorded_numbers
+
+    @property
     def calibration(self) -> Calibration:
         """The rectified left camera."""
         return self.whole.calibration

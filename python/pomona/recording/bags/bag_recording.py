@@ -75,6 +75,11 @@ class BagRecording:
         return tuple(next(iter(self.rows.values())).tolist())
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Rows of all left pictures."""
+        return tuple(range(len(self._first.stamps_ns)))
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of each frame's left picture."""
         return self._first.stamps_ns[next(iter(self.rows.values()))] / 1e9

@@ -103,6 +103,11 @@ class FolderRecording:
         """The rectified left camera."""
         return self.optics.calibration
 
+    @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Numbers of all frames that have a picture."""
+        return _all_numbers(self.pictures)
+
     def __len__(self) -> int:
         return len(self.numbers)
 
@@ -158,7 +163,11 @@ def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, .
     if not set.intersection(*(set(files) for files in kinds.values())):
         ranges = ", ".join(f"{kind}/ {min(files)} to {max(files)}" for kind, files in kinds.items())
         raise PomonaError(f"{folder}: found frames {ranges}, expected the same numbers in each folder")
-    return tuple(sorted(set.union(*(set(files) for files in kinds.values()))))
+    return _all_numbers(pictures)
+
+
+def _all_numbers(pictures: dict[str, dict[int, Path]]) -> tuple[int, ...]:
+    return tuple(sorted(set().union(*pictures.values())))
 
 
 def _optics(folder: Path, pictures: dict[str, dict[int, Path]], calibration: Path | None) -> Optics:

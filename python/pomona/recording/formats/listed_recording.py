@@ -34,6 +34,8 @@ class ListedRecording:
         Camera and rectification.
     numbers : tuple of int
         Frame numbers.
+    recorded_numbers : tuple of int
+        Numbers of all left pictures, also of those that are no frame.
     times_s : (F,) float64 or None
         Time of each frame.
     pictures : mapping
@@ -46,6 +48,7 @@ class ListedRecording:
     kind: str
     optics: Optics
     numbers: tuple[int, ...]
+    recorded_numbers: tuple[int, ...]
     times_s: NDArray[np.float64] | None
     pictures: Mapping[str, tuple[Path, ...]]
     trajectory: Trajectory | None

@@ -94,6 +94,11 @@ class VideoRecording:
         return tuple(self.pairs[:, 0].tolist())
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Rows of all left pictures."""
+        return tuple(range(len(self.left.times_s)))
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of each frame's left picture."""
         return self.left.times_s[self.pairs[:, 0]]
