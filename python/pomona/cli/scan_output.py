@@ -109,7 +109,9 @@ def _fruits(found: dict[str, Any]) -> str:
     counts = [part["n_fruits"] for part in found["parts"] if part["output"] == found["output"][0]]
     fruits = f"{counts[0]} fruits"
     if n_parts > 1:
-        fruits += f" in the longest of {n_parts} parts, {found['n_fruits']} in all parts, which may share some"
+        fruits += f" in the longest of {n_parts} parts"
+    if found["n_fruits"] > counts[0]:
+        fruits += f" ({found['n_fruits']} in all, some maybe twice)"
     size = found["median_diameter_mm"]
     return fruits if size is None else f"{fruits}, median diameter {size:.1f} mm"
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, TypeGuard, Unpack
 
 from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MaskDetector
+from pomona.detect.own import OwnDetector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
 
@@ -57,14 +58,14 @@ def open_detections(path: str | Path, calibration: Calibration, numbers: Sequenc
 
 
 def open_detector(
-    detections: Path | None, model: Path | None, recording: Recording, **settings: Unpack[ModelSettings]
+    detections: Path | Detector | None, model: Path | None, recording: Recording, **settings: Unpack[ModelSettings]
 ) -> FoundBoxes:
     """Open what finds the fruits of a recording: a file of boxes, a folder of instance masks, or a model.
 
     Parameters
     ----------
-    detections : Path or None
-        File of boxes, or folder of masks.
+    detections : Path, Detector or None
+        File of boxes, folder of masks, or whatever gives boxes when it is called with a frame.
     model : Path or None
         ONNX file.
     recording : Recording
@@ -81,6 +82,8 @@ def open_detector(
     if model is None:
         if given:
             raise PomonaError(f"{', '.join(given)}: found without a model, expected --model FILE with it")
+        if detections is not None and not isinstance(detections, Path):
+            return detections if _says_what_it_is(detections) else OwnDetector(detections)
         return open_detections(_boxes_of(detections, recording), recording.calibration, recording.recorded_numbers)
     if detections is not None:
         raise PomonaError(f"found --detections {detections} and --model {model}, expected one of them")
@@ -91,6 +94,10 @@ def open_detector(
     from pomona.detect.onnx import OnnxDetector
 
     return OnnxDetector.open(model, **given)  # type: ignore[arg-type] # the same names and types, None left out
+
+
+def _says_what_it_is(detector: Detector) -> TypeGuard[FoundBoxes]:
+    return all(hasattr(detector, name) for name in ("inputs", "configuration", "description"))
 
 
 def _boxes_of(detections: Path | None, recording: Recording) -> Path:

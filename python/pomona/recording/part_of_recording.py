@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pomona.recording.calibration import Calibration
+from pomona.recording.card import RecordingCard
 from pomona.recording.frame import Recording
 
 __all__ = ["PartOfRecording"]
 
 
-@dataclass(frozen=True, eq=False)
-class PartOfRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class PartOfRecording(RecordingCard):
     """Some frames of a recording; who derives from it says which.
 
     Attributes

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
 from pomona.detect import Detector
@@ -44,7 +45,7 @@ FEW_FRAMES = 5
 """Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Survey:
     """What a scan found.
 
@@ -70,6 +71,15 @@ class Survey:
     skipped: dict[int, str] = field(default_factory=dict)
     skipped_boxes: int = 0
     stopped: int | None = None
+
+    def __repr__(self) -> str:
+        where = f" in the longest of {len(self.parts)} parts" if len(self.parts) > 1 else ""
+        skipped = f", {len(self.skipped)} frames skipped" if self.skipped else ""
+        return f"Survey({len(self.cloud)} fruits{where}, from {self.detections} boxes{skipped})"
+
+    def _repr_html_(self) -> str:
+        rows = [(number, *part.facts.values()) for number, part in enumerate(self.parts, start=1)]
+        return as_table(repr(self), ("part", *self.parts[0].facts), rows)
 
     @property
     def longest(self) -> int:

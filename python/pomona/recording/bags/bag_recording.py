@@ -19,6 +19,7 @@ from pomona.recording.bags.picture_messages import colour_of, depth_of
 from pomona.recording.bags.topics import Roles
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name, date_of_ns
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
@@ -31,8 +32,8 @@ JUMP_MESSAGES = 50
 """Fewer pictures than these are passed over rather than looked up: a jump opens the file anew."""
 
 
-@dataclass(frozen=True, eq=False)
-class BagRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class BagRecording(RecordingCard):
     """Frames by row; see `Recording` for what it gives.
 
     Attributes

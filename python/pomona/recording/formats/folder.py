@@ -17,6 +17,7 @@ from pomona.reading import parsed_json, read_text, shown
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
 from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.formats.frame_times import times_beside_poses, times_in
@@ -32,8 +33,8 @@ __all__ = ["FolderRecording"]
 ABOUT = "an object with name and date"
 
 
-@dataclass(frozen=True, eq=False)
-class FolderRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class FolderRecording(RecordingCard):
     """A recording folder; see `Recording` for what it gives.
 
     Attributes

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
@@ -22,8 +23,8 @@ from pomona.trajectory import Trajectory
 __all__ = ["ListedRecording"]
 
 
-@dataclass(frozen=True, eq=False)
-class ListedRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class ListedRecording(RecordingCard):
     """Frames by row; see `Recording` for what it gives.
 
     Attributes
