@@ -24,6 +24,13 @@ def row(tmp_path: Path) -> Path:
     return make_recording(tmp_path / "2024-08-09", STEPS_M)
 
 
+def test_masks_that_a_scan_takes_are_told(row: Path) -> None:
+    (row / "detections.csv").unlink()
+    assert open_recording(row).description()["detections"] is False
+    draw_masks(row)
+    assert open_recording(row).description()["detections"] is True
+
+
 def draw_masks(folder: Path) -> None:
     """Give each pixel of a fruit its number, from 301: more than 8 bits hold."""
     (folder / "ids").mkdir()

@@ -12,11 +12,9 @@ from pomona.detect.masks import MaskDetector
 from pomona.detect.own import OwnDetector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
+from pomona.recording.boxes_beside import BESIDE, boxes_beside
 
 __all__ = ["FoundBoxes", "ModelSettings", "open_detections", "open_detector"]
-
-IN_FOLDER = ("detections.csv", "ids")
-"""Boxes, or else instance masks, that lie in the folder of a recording."""
 
 
 class FoundBoxes(Detector, Protocol):
@@ -103,9 +101,8 @@ def _says_what_it_is(detector: Detector) -> TypeGuard[FoundBoxes]:
 def _boxes_of(detections: Path | None, recording: Recording) -> Path:
     if detections is not None:
         return detections
-    places = [recording.path / name for name in IN_FOLDER]
-    for place in places:
-        if place.exists():
-            return place
+    beside = boxes_beside(recording.path)
+    if beside is not None:
+        return beside
     expected = "boxes there, masks in ids/, or --detections FILE or --model FILE"
-    raise PomonaError(f"{places[0]}: not found, expected {expected}")
+    raise PomonaError(f"{recording.path / BESIDE[0]}: not found, expected {expected}")

@@ -116,7 +116,7 @@ class BagRecording(RecordingCard):
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {kind: len(self) for kind in self.pictures}
-        found = describe(self, self.file.kind, self.times_s.tolist(), counts, detections=False)
+        found = describe(self, self.file.kind, self.times_s.tolist(), counts)
         return {**found, "topics": str(self.roles)}
 
     def _messages(self, kind: str, wanted: Sequence[int]) -> Iterator[Message | None]:

@@ -139,8 +139,7 @@ class FolderRecording(RecordingCard):
         """Say what was found."""
         times_s = None if self.times_s is None else self.times_s.tolist()
         counts = {kind: len(files) for kind, files in self.pictures.items()}
-        boxes = (self.path / "detections.csv").is_file()
-        return describe(self, "recording folder", times_s, counts, detections=boxes)
+        return describe(self, "recording folder", times_s, counts)
 
     def _reader(self, kind: str, number: int) -> Any:
         files = self.pictures.get(kind)

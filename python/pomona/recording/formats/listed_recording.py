@@ -97,7 +97,7 @@ class ListedRecording(RecordingCard):
         """Say what was found."""
         counts = {kind: len(files) for kind, files in self.pictures.items()}
         times_s = None if self.times_s is None else self.times_s.tolist()
-        return describe(self, self.kind, times_s, counts, detections=(self.path / "detections.csv").is_file())
+        return describe(self, self.kind, times_s, counts)
 
     def _reader(self, kind: str, row: int) -> Any:
         if kind not in self.pictures:

@@ -133,7 +133,7 @@ class VideoRecording(RecordingCard):
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {"left": len(self), "right": len(self)}
-        return describe(self, self.kind, self.times_s.tolist(), counts, detections=False)
+        return describe(self, self.kind, self.times_s.tolist(), counts)
 
 
 def _columns(
