@@ -39,7 +39,7 @@ def scanned(folder: Path) -> Survey:
 
 
 def detector(folder: Path, recording: Recording) -> FileDetector:
-    return FileDetector.read(folder / "detections.csv", recording.calibration, recording.numbers)
+    return FileDetector.read(folder / "detections.csv", recording.calibration, recording.recorded_numbers)
 
 
 def scanned_captures(data: Path, scratch: Path) -> dict[str, FruitCloud]:

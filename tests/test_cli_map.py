@@ -170,8 +170,11 @@ def test_remove_undoes_add(orchard: Path, tmp_path: Path) -> None:
     path = Path(shutil.copy(orchard, tmp_path))
     before = path.read_bytes()
     told = run("remove", path, "september")
-    assert (told.returncode, told.stdout) == (2, "")
-    assert told.stderr.endswith("1 sessions stay; nothing is removed without --yes\n")
+    assert (told.returncode, told.stderr) == (1, f"pomona: {path}: nothing is removed without --yes\n")
+    assert told.stdout.startswith("september: ")
+    assert told.stdout.endswith("; 1 session stays\n")
+    told = run("remove", path, "september", "--json")
+    assert (told.returncode, json.loads(told.stdout)["removed"], json.loads(told.stdout)["n_left"]) == (1, False, 1)
     assert path.read_bytes() == before
     done = run("remove", path, "october", "--yes", "--json")
     assert (done.returncode, json.loads(done.stdout)) == (1, {"session": "october", "removed": False})

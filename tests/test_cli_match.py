@@ -390,3 +390,19 @@ def test_config_says_what_each_setting_means(run_here: Run) -> None:
     # From the comments of the core, and from the docstring of `pomona.match`.
     assert "# Standard deviation of one edge of a box, pixels.\nedge_sigma_px = 1.0" in "\n".join(lines)
     assert '# "verified", or "paper" for the published method.\nmethod = "verified"' in "\n".join(lines)
+
+
+@pytest.mark.parametrize("name", ["-", "/dev/fd/0"])
+def test_config_comes_from_what_is_open_already(name: str) -> None:
+    done = run("config", "--config", name, stdin="[match]\nnoise_m = 0.03\n")
+    assert done.returncode == 0, done.stderr
+    assert tomllib.loads(done.stdout)["match"]["noise_m"] == 0.03
+    done = run("config", "--config", name, stdin="[match]\nnoise = 0.03\n")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"pomona: {name}: unknown setting match.noise, expected one of ")
+
+
+def test_no_match_under_a_vertical_that_is_not_theirs_says_so(run_here: Run, visits: Path) -> None:
+    done = run_here("match", visits / "query.csv", visits / "map.csv", "--up", "0,0,1")
+    assert (done.returncode, done.stdout.split(":")[0]) == (1, "NoMatch")
+    assert "only poses that stand upright by --up were taken" in done.stderr

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,6 +76,32 @@ def test_short_answers(match: Match, visits: tuple[Path, Path], tmp_path: Path) 
         html = answer._repr_html_()
         assert html.startswith("<table>")
         assert html.count("<tr>") == html.count("</tr>") >= 2
+
+
+def test_whatever_holds_a_cloud_is_matched(visits: tuple[Path, Path], tmp_path: Path) -> None:
+    session = pomona.load_session(visits[1], date="2024-08-09")
+    pomona.add_session(tmp_path / "orchard.gpkg", session)
+    found = pomona.match(visits[0], OrchardMap(tmp_path / "orchard.gpkg"))
+    assert (found.status, found.n_map) == ("Found", len(session.cloud))
+    assert pomona.match(visits[0], session).pairs.tolist() == found.pairs.tolist()
+    with pytest.raises(PomonaError, match=r"a bare cloud has no date, .*--date YYYY-MM-DD, in Python date="):
+        pomona.load_session(visits[1])
+
+
+@pytest.mark.parametrize("config", ["pomona.toml", 5, {"verified": {"rate": object()}}])
+def test_a_config_that_is_no_table_is_refused(visits: tuple[Path, Path], config: Any) -> None:
+    with pytest.raises(PomonaError, match=r"^config: (found|Object)"):
+        pomona.match(*visits, config=config)
+
+
+@pytest.mark.parametrize(
+    ("diagonal", "found"), [((1, 1, -1, 1), "a mirror"), ((1, 2, 1, 1), "a stretch or shear"), ((0, 0, 0, 1), "a st")]
+)
+def test_a_cloud_is_not_mirrored_or_stretched(diagonal: tuple[int, ...], found: str) -> None:
+    cloud = FruitCloud(np.eye(3))
+    with pytest.raises(PomonaError, match=f"map_from_query: found {found}"):
+        cloud.transformed(np.diag(diagonal))
+    assert cloud.transformed(np.diag((2, 2, 2, 1))).positions.tolist() == (2 * np.eye(3)).tolist()
 
 
 def test_names_of_strangers_do_nothing_in_a_notebook() -> None:

@@ -17,7 +17,7 @@ def test_every_capture_becomes_a_recording(shared_data, tmp_path):
     frame = next(recording.frames())
     assert frame.read_depth().shape == (1080, 1920)
     assert frame.read_left().shape == (1080, 1920, 3)
-    boxes = FileDetector.read(captures[2].folder / "detections.csv", recording.calibration, recording.numbers)
+    boxes = FileDetector.read(captures[2].folder / "detections.csv", recording.calibration, recording.recorded_numbers)
     assert len(boxes(frame)) == 28
     assert "BALL_060" in boxes(frame).ids
     assert next(open_recording(captures[0].folder).frames()).read_left is None

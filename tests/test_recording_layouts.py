@@ -175,7 +175,7 @@ def test_tum_depth_is_in_its_own_unit_unless_told(tum):
 
 def test_a_tum_recording_is_scanned(tum):
     recording = open_recording(tum)
-    detector = FileDetector.read(tum / "detections.csv", recording.calibration, recording.numbers)
+    detector = FileDetector.read(tum / "detections.csv", recording.calibration, recording.recorded_numbers)
     cloud = scan(recording, detector).cloud
     assert cloud.ids == tuple(FRUITS)
     np.testing.assert_allclose(cloud.positions, [fruit.centre for fruit in FRUITS.values()], atol=0.001)

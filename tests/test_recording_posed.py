@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from bag_maker import START_NS, stereo, write_bag
 from pomona import PomonaError, PomonaWarning
+from pomona.detect.opening import open_detector
 from pomona.recording import open_recording, selected
 from recording_maker import make_recording
 from test_recording_video import write_calibration, write_video
@@ -128,6 +129,27 @@ def test_times_in_whole_milliseconds_are_those_of_the_pictures(tmp_path):
     poses.write_text("".join(f"{at_s} {at_s} 0 0 0 0 0 1\n" for at_s in (0.0, 0.4, 0.8)))  # no two of them 0.1 s apart
     with pytest.warns(PomonaWarning, match="9 of 12 frames have no pose within 0.1 s"):
         assert open_recording(video, poses=poses).numbers == (0, 4, 8)
+
+
+def test_poses_of_ten_a_second_reach_pictures_of_ten_a_second(video, tmp_path):
+    poses = write_tum(tmp_path / "poses.txt", 0.05 + np.arange(-1, 13) / 10)  # 0.1 s apart, or a bit more in floats
+    assert_poses(open_recording(video, poses=poses), range(12))
+
+
+def test_boxes_are_those_of_all_frames_whether_they_have_poses_or_not(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", (0.0, 0.1, 0.2, 0.3, 0.4))
+    (folder / "times.txt").write_text("0.0\n0.1\n0.2\n0.3\n0.4\n")
+    (folder / "poses_tum.txt").write_text("".join(f"{at_s} {at_s} 0 0 0 0 0 1\n" for at_s in (0.1, 0.2, 0.3)))
+    code, printed, told = pomona("scan", folder, "-o", tmp_path / "row.csv")
+    assert (code, told.count("\n")) == (0, 1), told
+    assert "2 of 5 frames have no pose within 0.1 s and are left out" in told
+    assert "3 fruits" in printed
+    with pytest.warns(PomonaWarning, match="2 of 5 frames have no pose"):
+        recording = open_recording(folder)
+    assert (recording.numbers, recording.recorded_numbers) == ((1, 2, 3), (0, 1, 2, 3, 4))
+    (tmp_path / "boxes.txt").write_text("2,1,10,20,20,25\n")  # the second frame, in order of time
+    boxes = open_detector(tmp_path / "boxes.txt", None, recording)
+    assert [len(boxes(frame)) for frame in recording.frames()] == [1, 0, 0]
 
 
 def test_a_folder_with_times_takes_its_own_poses_by_time(tmp_path):

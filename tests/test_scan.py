@@ -14,7 +14,13 @@ from benchmarks.recordings import rendered_truth, scanned, scanned_captures, wit
 
 from pomona.cli import main
 from pomona.cloud import FruitCloud
+from pomona.detect.opening import open_detector
 from pomona.orchard import load_session
+from pomona.recording import open_recording
+from pomona.survey.believing import Believing
+from pomona.survey.part import OpenPart
+from pomona.survey.seeing import Seeing
+from pomona.survey.tracking import Tracker
 from recording_maker import FIELDS, FRUITS, HEADER, make_recording
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -235,11 +241,42 @@ def test_a_corrupt_picture_in_the_middle_is_skipped_counted_and_named(pomona, ro
     picture.write_bytes(picture.read_bytes()[:500])
     done = pomona("scan", row, "-o", tmp_path / "fruits.csv", "--json")
     assert done.returncode == 0
-    assert json.loads(done.stdout)["n_skipped_frames"] == 1
+    found = json.loads(done.stdout)
+    assert (found["n_skipped_frames"], found["n_boxes"]) == (1, 9)
+    assert found["boxes"] == {"fruit": 6, "skipped": 3}
     assert done.stderr.count("\n") == 1
     assert "skipped 1 of 3 frames" in done.stderr
     assert "0001.png" in done.stderr
     assert FruitCloud.read(tmp_path / "fruits.csv").n_views.tolist() == [2, 2, 2]
+
+
+def test_fruits_are_what_was_seen_again(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", tuple(0.03 * np.arange(6)), ids=False)
+    poses = folder / "poses_tum.txt"
+    poses.write_text("".join(f"{0.1 * frame:.1f} {30 * frame} 0 0 0 0 0 1\n" for frame in range(6)))  # in millimetres
+    done = pomona("scan", folder, "-o", tmp_path / "far.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["n_fruits"], found["n_boxes"], found["tracks"]) == (0, 18, {"few_views": 18})
+    single = make_recording(tmp_path / "2024-08-10")  # nothing can be seen twice in one frame
+    assert pomona("scan", single, "-o", tmp_path / "one.csv", "--retrack").returncode == 0
+    assert len(FruitCloud.read(tmp_path / "one.csv")) == 3
+
+
+@pytest.mark.parametrize(("n_frames", "n_fruits"), [(1, 0), (2, 3)])
+def test_a_part_that_saw_nothing_twice_has_no_fruits(row, n_frames, n_fruits):
+    recording = open_recording(row)
+    (row / "detections.csv").write_text(
+        "\n".join(line.rpartition(",")[0] for line in (row / "detections.csv").read_text().splitlines()) + "\n"
+    )
+    seeing = Seeing(recording, open_detector(None, None, recording))
+    part = OpenPart(0, None, lambda: Tracker(recording.calibration), Believing(recording.calibration, {}))
+    frames = list(recording.frames())[:n_frames]
+    for frame in frames:
+        part.add(seeing(frame), frame.time_s, frame.session_from_camera)
+    closed = part.closed(np.stack([frame.session_from_camera for frame in frames]))
+    assert len(closed.cloud) == n_fruits
+    assert closed.tally.boxes.total() == 3 * n_frames
 
 
 def test_a_recording_that_cannot_be_read_leaves_the_old_session_as_it_was(pomona, row, tmp_path):

@@ -9,9 +9,11 @@ import pytest
 import pomona
 from depth_scene import picture
 from pomona import FruitCloud, PomonaError
+from pomona.detect import Detections
+from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MIN_SIDE_PX, boxes_of
 from pomona.orchard import read_session
-from pomona.recording import open_recording
+from pomona.recording import Frame, open_recording
 from recording_maker import FRUITS, make_recording, moved
 
 STEPS_M = (0.0, 0.1, 0.2)
@@ -20,6 +22,13 @@ STEPS_M = (0.0, 0.1, 0.2)
 @pytest.fixture
 def row(tmp_path: Path) -> Path:
     return make_recording(tmp_path / "2024-08-09", STEPS_M)
+
+
+def test_masks_that_a_scan_takes_are_told(row: Path) -> None:
+    (row / "detections.csv").unlink()
+    assert open_recording(row).description()["detections"] is False
+    draw_masks(row)
+    assert open_recording(row).description()["detections"] is True
 
 
 def draw_masks(folder: Path) -> None:
@@ -45,6 +54,58 @@ def test_gives_what_the_verb_writes(row: Path, tmp_path: Path) -> None:
 def test_takes_recordings_that_are_open_and_parts_of_them(row: Path) -> None:
     survey = pomona.scan(open_recording(row), detections=row / "detections.csv", every=2)
     assert survey.trajectory.frames.tolist() == [0, 2]
+
+
+def test_boxes_of_the_whole_serve_its_parts(row: Path) -> None:
+    part = pomona.selected(open_recording(row), first=1)
+    survey = pomona.scan(part, detections=row / "detections.csv")
+    assert survey.trajectory.frames.tolist() == [1, 2]
+    (row / "detections.csv").write_text("frame,xmin,ymin,xmax,ymax\n3,10,10,40,40\n")
+    with pytest.raises(PomonaError, match=r"line 2: frame: found 3, expected a frame there is \(0 to 2\)"):
+        pomona.scan(part)
+
+
+def test_takes_a_detector_of_ones_own(row: Path, tmp_path: Path) -> None:
+    recording = open_recording(row)
+    known = FileDetector.read(row / "detections.csv", recording.calibration, recording.recorded_numbers)
+
+    def nameless(frame: Frame) -> Detections:
+        found = known(frame)
+        return Detections(found.boxes_px, found.scores)
+
+    def lists(_frame: Frame) -> list[list[int]]:
+        return [[1, 2, 30, 40]]
+
+    survey = pomona.scan(row, detections=nameless, output=tmp_path / "own.gpkg")
+    assert len(survey.cloud) == 3
+    name = "test_takes_a_detector_of_ones_own.<locals>.nameless"
+    assert read_session(tmp_path / "own.gpkg").configuration["scan"]["detector"] == {"detector": name}
+    named = pomona.scan(recording, detections=known)
+    assert named.cloud.ids == tuple(FRUITS)
+    with pytest.raises(PomonaError, match=r"lists: frame 0: found list, expected pomona\.detect\.Detections"):
+        pomona.scan(row, detections=lists)  # type: ignore[arg-type]
+    with pytest.raises(ZeroDivisionError):
+        pomona.scan(row, detections=lambda frame: 1 // frame.number)  # type: ignore[arg-type, return-value]
+    with pytest.raises(PomonaError, match="detections: found int, expected a file, a folder of masks or a detector"):
+        pomona.scan(row, detections=5)  # type: ignore[arg-type]
+    with pytest.raises(PomonaError, match="keep: found a detector of your own"):
+        pomona.scan(row, detections=nameless, keep=tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()
+
+
+def test_shows_itself_and_is_matched(row: Path) -> None:
+    recording = open_recording(row)
+    survey = pomona.scan(recording)
+    assert repr(recording) == f"FolderRecording({str(row)!r}: 3 frames of 640x480, depth, with poses)"
+    part = pomona.selected(recording, last=1)
+    assert repr(part) == f"SelectedRecording({str(row)!r}: 2 frames of 640x480, depth, with poses)"
+    assert repr(survey) == "Survey(3 fruits, from 9 boxes)"
+    assert repr(survey.parts[0]).startswith("Part(frames: 0 to 2, fruits: 3, median diameter: 7")
+    for answer in (recording, part, survey):
+        html = answer._repr_html_()
+        assert html.startswith("<table>")
+        assert html.count("<tr>") == html.count("</tr>") >= 2
+    assert pomona.match(survey, survey).n_map == 3
 
 
 def test_destroys_nothing(row: Path, tmp_path: Path) -> None:

@@ -44,6 +44,7 @@ def test_every_box_and_every_track_has_one_fate():
         ({}, {}, 40, "found no boxes in 40 frames, so no fruits: check the file of the boxes"),
         ({BoxFate.NO_TRACK: 2}, {}, 40, "found 2 boxes in 40 frames, too few for fruits: check the file of the boxes"),
         ({BoxFate.FRUIT: 2}, {TrackFate.FRUIT: 2}, 1, None),
+        ({BoxFate.SKIPPED: 900, BoxFate.NO_TRACK: 2}, {}, 40, "found 2 boxes in 40 frames, too few for fruits"),
         (
             {Refusal.UNMATCHED: 190, Refusal.CUT: 5, BoxFate.NO_TRACK: 5},
             {},

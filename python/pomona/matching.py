@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pomona import _core
 from pomona.cards import as_card
 from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
+from pomona.core_settings import core_settings
 from pomona.errors import PomonaError
 from pomona.threads import capped_threads
 
@@ -135,7 +136,7 @@ class Index:
         self._map = as_cloud(map, self._unit)
         self._kind = f"{method}, {scale}"
         threads = capped_threads(threads)
-        overrides = json.dumps(dict(config or {}))
+        overrides = core_settings(config)
         try:
             self._core = _core.MapIndex(
                 _arrays(self._map), method=method, scale=scale, config=overrides, threads=threads

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
-from pomona.reading import decoded_text, parsed_json, read_text, shown
+from pomona.reading import parsed_json, read_given_text, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,7 +46,7 @@ def read_pairs(path: Path, query: FruitCloud, map: FruitCloud) -> list[tuple[int
     PomonaError
         The file is not one of the two, or names a fruit that a cloud does not have.
     """
-    text = _read_text(path)
+    text = read_given_text(path, "pairs as CSV or JSON")
     in_query, in_map = _row_of_label(query), _row_of_label(map)
     pairs: list[tuple[int, int]] = []
     for place, query_label, map_label in _labels_of(path, text):
@@ -58,11 +57,6 @@ def read_pairs(path: Path, query: FruitCloud, map: FruitCloud) -> list[tuple[int
                 )
         pairs.append((in_query[query_label], in_map[map_label]))
     return pairs
-
-
-def _read_text(path: Path) -> str:
-    expected = "pairs as CSV or JSON"
-    return decoded_text(path, sys.stdin.buffer.read(), expected) if str(path) == "-" else read_text(path, expected)
 
 
 def _row_of_label(cloud: FruitCloud) -> dict[str, int]:

@@ -22,6 +22,7 @@ __all__ = [
     "number_in",
     "parsed_json",
     "path_inside",
+    "read_given_text",
     "read_text",
     "require_file",
     "shown",
@@ -89,6 +90,37 @@ def read_text(path: Path, expected: str) -> str:
     except OSError as error:
         raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
     return decoded_text(path, content, expected)
+
+
+def read_given_text(path: Path, expected: str) -> str:
+    """Read a text that the user names: a file, or what is open already.
+
+    That is the standard input, ``-``, and ``/dev/fd/63``, which a shell makes of ``<(...)``. Other pipes are refused as
+    `read_text` does: who opens them may wait for ever.
+
+    Raises
+    ------
+    PomonaError
+        As in `read_text`.
+    """
+    descriptor = _descriptor(path)
+    if descriptor is None:
+        return read_text(path, expected)
+    try:
+        with open(descriptor, "rb", closefd=False) as stream:
+            content = stream.read(MOST_TEXT_BYTES + 1)
+    except OSError as error:
+        raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(content) > MOST_TEXT_BYTES:
+        raise PomonaError(f"{path}: found more than {MOST_TEXT_BYTES >> 20} MiB, expected {expected}")
+    return decoded_text(path, content, expected)
+
+
+def _descriptor(path: Path) -> int | None:
+    if str(path) == "-":
+        return 0
+    named = re.fullmatch(r"/(?:dev|proc/self)/fd/(\d{1,9})", str(path))
+    return None if named is None else int(named[1])
 
 
 def decoded_text(path: Path, content: bytes, expected: str) -> str:

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from pomona import __version__
+from pomona.detect import Detector
 from pomona.detect.opening import FoundBoxes, ModelSettings, open_detector
+from pomona.detect.own import OwnDetector
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.likes import SCANNED
 from pomona.orchard.session import GUESSED
@@ -93,7 +95,7 @@ class Scan:
 def scan(
     recording: str | Path | Recording,
     *,
-    detections: str | Path | None = None,
+    detections: str | Path | Detector | None = None,
     model: str | Path | None = None,
     output: str | Path | None = None,
     name: str | None = None,
@@ -116,8 +118,9 @@ def scan(
     ----------
     recording : str, Path or Recording
         Whatever `pomona info` reads; with calibration or poses of its own: `pomona.recording.open_recording`.
-    detections : str or Path, optional
-        File of boxes: our CSV, MOTChallenge text or COCO json; or a folder of instance masks, 0000.png ... Without it
+    detections : str, Path or Detector, optional
+        File of boxes: our CSV, MOTChallenge text or COCO json; or a folder of instance masks, 0000.png ...; or what
+        gives `pomona.detect.Detections` when it is called with a frame: a function of yours. Without it
         and without a model: `detections.csv`, else `ids/`, in the recording's folder.
     model : str or Path, optional
         ONNX detector that finds the boxes.
@@ -157,7 +160,7 @@ def scan(
     require_date(date)
     ready = prepared(
         open_recording(recording, own_poses=not odometry) if isinstance(recording, str | Path) else recording,
-        detections=None if detections is None else Path(detections),
+        detections=_boxes_given(detections),
         model=None if model is None else Path(model),
         outputs=[] if target is None else [target],
         depth=depth,
@@ -179,7 +182,7 @@ def scan(
 def prepared(
     recording: Recording,
     *,
-    detections: Path | None,
+    detections: Path | Detector | None,
     model: Path | None,
     outputs: Iterable[Path],
     depth: str,
@@ -202,10 +205,21 @@ def prepared(
     boxes = open_detector(detections, model, recording, **of_model)
     refuse_inputs([*outputs, *([keep] if keep else [])], [*recording.inputs(), *boxes.inputs])
     taken = selected(recording, every=every, first=first, last=last)
+    if keep is not None and isinstance(boxes, OwnDetector):
+        raise PomonaError("keep: found a detector of your own, which is not known again; expected boxes or a model")
     looks = {"detector": boxes.configuration, "depth": depth}
     kept = None if keep is None else Kept(keep, {**_made_from(taken, boxes), **looks})
     check_sides(taken)
     return Scan(taken, boxes, looks, {"odometry": odometry, "retrack": retrack}, config, every, kept)
+
+
+def _boxes_given(detections: object) -> Path | Detector | None:
+    if isinstance(detections, str):
+        return Path(detections)
+    if detections is None or isinstance(detections, Path) or callable(detections):
+        return detections
+    found = type(detections).__name__
+    raise PomonaError(f"detections: found {found}, expected a file, a folder of masks or a detector: f(frame)")
 
 
 def require_session_name(output: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pomona.errors import PomonaError
-from pomona.reading import read_text, shown
+from pomona.reading import read_given_text, shown
 from pomona.threads import require_threads
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _defaults_of_match() -> dict[str, Any]:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        text = read_text(path, "settings in TOML")
+        text = read_given_text(path, "settings in TOML")
         for number, line in enumerate(text.splitlines(), start=1):
             if len(line) > MOST_LINE:
                 raise PomonaError(f"{path}: line {number}: found {len(line)} characters, expected at most {MOST_LINE}")

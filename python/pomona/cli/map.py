@@ -95,19 +95,19 @@ def map_remove(
     """Undo `map add`: take SESSION and what only it saw out of ORCHARD.
 
     The other fruits fall back to where the last of the remaining sessions saw them. Exit code 0: removed. 1: ORCHARD
-    has no such session. 2: wrong input, or no --yes; the map stays as it was.
+    has no such session, or no --yes was given, and the map stays as it was. 2: wrong input.
     """
-    from pomona.errors import PomonaError
     from pomona.orchard import remove_session
 
     removed = remove_session(orchard, session, waiting=_waiting(orchard), dry=not yes)
-    if removed is not None and not yes:
-        raise PomonaError(f"{orchard}: {_removed_as_text(session, removed)}; nothing is removed without --yes")
+    done = removed is not None and yes
     if json:
-        say_json(_removed_as_json(session, removed))
+        say_json({**_removed_as_json(session, removed), "removed": done})
     else:
         say(_removed_as_text(session, removed))
-    if removed is None:
+    if removed is not None and not yes:
+        tell(f"pomona: {orchard}: nothing is removed without --yes")
+    if not done:
         raise typer.Exit(1)
 
 
@@ -149,7 +149,7 @@ def _waiting(orchard: Path) -> Callable[[], None]:
 def _removed_as_json(session: str, removed: Removed | None) -> dict[str, Any]:
     from dataclasses import asdict
 
-    return {"session": session, "removed": removed is not None, **({} if removed is None else asdict(removed))}
+    return {"session": session, **({} if removed is None else asdict(removed))}
 
 
 def _removed_as_text(session: str, removed: Removed | None) -> str:
@@ -157,7 +157,7 @@ def _removed_as_text(session: str, removed: Removed | None) -> str:
         return f"{session}: no session of that name in the map, which stays as it was"
     return (
         f"{session}: {removed.n_observations} observations go, {removed.n_gone} fruits that nobody else saw with them, "
-        f"{removed.n_changed} fall back; {removed.n_left} sessions stay"
+        f"{removed.n_changed} fall back; {removed.n_left} {'session stays' if removed.n_left == 1 else 'sessions stay'}"
     )
 
 

@@ -78,6 +78,8 @@ def match(
     if plot is not None:
         _draw(plot, in_query, in_map, answer, settings.call["up"], plot_view)
     _print(answer, in_query, in_map, json=json, explain=explain)
+    if answer.status == "NoMatch" and settings.call["up"] is not None:
+        tell("pomona: only poses that stand upright by --up were taken; given once, it holds for both clouds")
     if answer.status != "Found":
         raise typer.Exit(1)
 

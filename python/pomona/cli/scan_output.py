@@ -83,7 +83,7 @@ def _of_part(part: Part, path: Path | None) -> dict[str, Any]:
 
 def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
     """Say the same in words, with a table of what became of boxes and tracks."""
-    lines = [f"{found['output'][0]}: {_fruits(found)}, from {found['n_boxes']} boxes in {found['n_frames']} frames"]
+    lines = [f"{found['output'][0]}: {_fruits(found)}, from {_boxes(found)}"]
     if found["stopped_after_frame"] is not None:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
@@ -99,12 +99,19 @@ def _table(what: str, fates: Counter[Any]) -> list[str]:
     return [f"  {fates.total():>8} {what}", *(f"  {count:>8}   {fate}" for fate, count in ranked)]
 
 
+def _boxes(found: dict[str, Any]) -> str:
+    boxes = f"{found['n_boxes']} boxes in {found['n_frames']} frames"
+    return f"{boxes}, {found['n_skipped_frames']} of them skipped" if found["n_skipped_frames"] else boxes
+
+
 def _fruits(found: dict[str, Any]) -> str:
     n_parts = len(found["parts"])
     counts = [part["n_fruits"] for part in found["parts"] if part["output"] == found["output"][0]]
     fruits = f"{counts[0]} fruits"
     if n_parts > 1:
-        fruits += f" in the longest of {n_parts} parts, {found['n_fruits']} in all"
+        fruits += f" in the longest of {n_parts} parts"
+    if found["n_fruits"] > counts[0]:
+        fruits += f" ({found['n_fruits']} in all, some maybe twice)"
     size = found["median_diameter_mm"]
     return fruits if size is None else f"{fruits}, median diameter {size:.1f} mm"
 

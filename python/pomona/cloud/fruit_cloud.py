@@ -19,6 +19,9 @@ from pomona.views import Views
 
 __all__ = ["FruitCloud"]
 
+UNEVEN = 1e-3
+"""Part by which lengths may differ by direction: a matrix that was printed with four digits still goes."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FruitCloud:
@@ -140,8 +143,14 @@ class FruitCloud:
         ----------
         map_from_query : (4, 4) array_like
             Rigid or similarity transform, homogeneous, scale folded in. A scale also scales diameters.
+
+        Raises
+        ------
+        PomonaError
+            When it mirrors, stretches or shears.
         """
         transform = checked_array("map_from_query", map_from_query, np.float64, (4, 4))
+        _require_similarity(transform)
         linear, translation_m = transform[:3, :3], transform[:3, 3]
         scale = float(np.cbrt(np.linalg.det(linear)))
         return replace(
@@ -227,6 +236,17 @@ def _require_unique(ids: tuple[str, ...]) -> None:
         if name in first_row:
             raise PomonaError(f"ids: rows {first_row[name]} and {row} are both {name!r}, expected each id once")
         first_row[name] = row
+
+
+def _require_similarity(transform: NDArray[np.float64]) -> None:
+    linear = transform[:3, :3]
+    volume = float(np.linalg.det(linear))
+    square = np.cbrt(abs(volume)) ** 2 * np.eye(3)
+    is_even = np.isfinite(transform).all() and np.allclose(linear.T @ linear, square, atol=UNEVEN * square[0, 0])
+    if volume == 0 or not is_even or not np.allclose(transform[3], (0, 0, 0, 1)):
+        raise PomonaError("map_from_query: found a stretch or shear, expected a rigid or similarity transform")
+    if volume < 0:
+        raise PomonaError("map_from_query: found a mirror, expected a rigid or similarity transform")
 
 
 def _within(rows: NDArray[np.int64], n: int) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -13,8 +13,17 @@ from pomona.cloud.units import Unit
 
 __all__ = ["Cloud", "as_cloud"]
 
-Cloud: TypeAlias = FruitCloud | ArrayLike | PathLike[str]
-"""Fruits, (N, 3) metres, or the name of a file with them: .csv, .ply or .gpkg."""
+
+class WithCloud(Protocol):
+    """What holds a cloud: a survey, a session, an orchard map."""
+
+    @property
+    def cloud(self) -> FruitCloud:
+        """Its fruits."""
+
+
+Cloud: TypeAlias = FruitCloud | WithCloud | ArrayLike | PathLike[str]
+"""Fruits, (N, 3) metres, what holds a cloud, or the name of a file with one: .csv, .ply or .gpkg."""
 
 
 def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
@@ -22,7 +31,7 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
 
     Parameters
     ----------
-    cloud : FruitCloud, array_like, str or Path
+    cloud : FruitCloud, Survey, Session, OrchardMap, array_like, str or Path
         The fruits.
     unit : {"m", "cm", "mm", "free"}
         Of the coordinates, where it is a file; arrays are taken as they are.
@@ -36,4 +45,7 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
         return cloud
     if isinstance(cloud, str | PathLike):
         return FruitCloud.read(Path(cloud), unit=unit)
+    held = getattr(cloud, "cloud", None)
+    if isinstance(held, FruitCloud):
+        return held
     return FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there

@@ -49,7 +49,7 @@ class FileDetector:
             For the size of the pictures. A box partly outside is cut at the picture's edge, one wholly outside is an
             error.
         numbers : sequence of int
-            The recording's frame numbers in order of time.
+            All frames of the recording in order of time, `Recording.recorded_numbers`: who made the file saw them all.
 
         Raises
         ------

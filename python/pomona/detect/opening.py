@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, TypeGuard, Unpack
 
 from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MaskDetector
+from pomona.detect.own import OwnDetector
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
+from pomona.recording.boxes_beside import BESIDE, boxes_beside
 
 __all__ = ["FoundBoxes", "ModelSettings", "open_detections", "open_detector"]
-
-IN_FOLDER = ("detections.csv", "ids")
-"""Boxes, or else instance masks, that lie in the folder of a recording."""
 
 
 class FoundBoxes(Detector, Protocol):
@@ -57,14 +56,14 @@ def open_detections(path: str | Path, calibration: Calibration, numbers: Sequenc
 
 
 def open_detector(
-    detections: Path | None, model: Path | None, recording: Recording, **settings: Unpack[ModelSettings]
+    detections: Path | Detector | None, model: Path | None, recording: Recording, **settings: Unpack[ModelSettings]
 ) -> FoundBoxes:
     """Open what finds the fruits of a recording: a file of boxes, a folder of instance masks, or a model.
 
     Parameters
     ----------
-    detections : Path or None
-        File of boxes, or folder of masks.
+    detections : Path, Detector or None
+        File of boxes, folder of masks, or whatever gives boxes when it is called with a frame.
     model : Path or None
         ONNX file.
     recording : Recording
@@ -81,7 +80,9 @@ def open_detector(
     if model is None:
         if given:
             raise PomonaError(f"{', '.join(given)}: found without a model, expected --model FILE with it")
-        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.numbers)
+        if detections is not None and not isinstance(detections, Path):
+            return detections if _says_what_it_is(detections) else OwnDetector(detections)
+        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.recorded_numbers)
     if detections is not None:
         raise PomonaError(f"found --detections {detections} and --model {model}, expected one of them")
     pictures = recording.description()["pictures"]
@@ -93,12 +94,15 @@ def open_detector(
     return OnnxDetector.open(model, **given)  # type: ignore[arg-type] # the same names and types, None left out
 
 
+def _says_what_it_is(detector: Detector) -> TypeGuard[FoundBoxes]:
+    return all(hasattr(detector, name) for name in ("inputs", "configuration", "description"))
+
+
 def _boxes_of(detections: Path | None, recording: Recording) -> Path:
     if detections is not None:
         return detections
-    places = [recording.path / name for name in IN_FOLDER]
-    for place in places:
-        if place.exists():
-            return place
+    beside = boxes_beside(recording.path)
+    if beside is not None:
+        return beside
     expected = "boxes there, masks in ids/, or --detections FILE or --model FILE"
-    raise PomonaError(f"{places[0]}: not found, expected {expected}")
+    raise PomonaError(f"{recording.path / BESIDE[0]}: not found, expected {expected}")

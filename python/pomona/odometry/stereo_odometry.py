@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import _core
+from pomona.core_settings import core_settings
 from pomona.errors import PomonaError
 from pomona.odometry.disparity import DepthDisparities, PairDisparities, halvings, is_flat
 from pomona.odometry.eyes import Eyes, Measure, View
@@ -49,7 +49,7 @@ class StereoOdometry:
 
     def __init__(self, calibration: Calibration, config: Mapping[str, Any] | None = None) -> None:
         self._calibration = calibration
-        settings = json.dumps(dict(config or {}))
+        settings = core_settings(config)
         try:
             self._core = _core.Odometry(calibration, config=settings)
             self._looking = _core.Looking(settings)

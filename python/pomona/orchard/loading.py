@@ -52,14 +52,14 @@ def load_session(path: str | Path, *, date: str | None = None, unit: Unit | None
 
 def _session(path: Path, date: str | None, unit: Unit | None) -> Session:
     if unit not in (None, "m"):
-        raise PomonaError(f"{path}: found --unit {unit}, but a session is in metres; scan again with the right unit")
+        raise PomonaError(f"{path}: found the unit {unit}, but a session is in metres; scan again with the right unit")
     session = read_session(path)
     if date is not None:
         return replace(session, date=date)
     if session.is_date_guessed:
         raise PomonaError(
             f"{path}: its date {session.date} was guessed from the age of files, say the day of the visit: "
-            "--date YYYY-MM-DD"
+            "--date YYYY-MM-DD, in Python date="
         )
     return session
 
@@ -67,7 +67,9 @@ def _session(path: Path, date: str | None, unit: Unit | None) -> Session:
 def _cloud(path: Path, date: str | None, unit: Unit | None) -> Session:
     cloud = FruitCloud.read(path, unit=unit or "m")
     if date is None:
-        raise PomonaError(f"{path}: a bare cloud has no date, give the day of the visit: --date YYYY-MM-DD")
+        raise PomonaError(
+            f"{path}: a bare cloud has no date, give the day of the visit: --date YYYY-MM-DD, in Python date="
+        )
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     return Session(path.stem, date, path.name, cloud, input_hashes={path.name: digest})
 
@@ -89,4 +91,4 @@ def _doubts_refused(is_said: bool) -> Iterator[None]:
         try:
             yield
         except PomonaWarning as doubt:
-            raise PomonaError(f"{doubt}; a map takes it as it is with --unit m") from None
+            raise PomonaError(f"{doubt}; a map takes it as it is with --unit m, in Python unit='m'") from None

@@ -159,6 +159,11 @@ class OrchardMap:
         with snapshot(self.path) as (connection, _):
             return fruits_in_map(connection, FruitCloud)
 
+    @property
+    def cloud(self) -> FruitCloud:
+        """Every fruit, as `fruits` gives them now: a map is matched like a cloud."""
+        return self.fruits()
+
     def visits(self) -> tuple[Visit, ...]:
         """Return the sessions in order of date."""
         names = ("id", "name", "date", "recording", "map_from_session", "method", "log_odds", "noise_m")

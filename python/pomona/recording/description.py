@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pomona.recording.boxes_beside import boxes_beside
 from pomona.recording.frame import Recording
 
 __all__ = ["DEPTH_M", "DISPARITY_ERROR_PX", "describe"]
@@ -19,7 +20,7 @@ DISPARITY_ERROR_PX = 0.5
 
 
 def describe(
-    recording: Recording, kind: str, times_s: Sequence[float] | None, pictures: dict[str, int], *, detections: bool
+    recording: Recording, kind: str, times_s: Sequence[float] | None, pictures: dict[str, int]
 ) -> dict[str, Any]:
     """Say what was found.
 
@@ -33,8 +34,6 @@ def describe(
         Time of each frame.
     pictures : mapping
         Count of left, right and depth pictures.
-    detections : bool
-        Whether boxes came with it.
     """
     camera = recording.calibration
     return {
@@ -53,7 +52,7 @@ def describe(
         "depth_unit_m": camera.depth_unit_m if "depth" in pictures else None,
         "pictures": pictures,
         "poses": recording.trajectory is not None,
-        "detections": detections,
+        "detections": boxes_beside(recording.path) is not None,
     }
 
 

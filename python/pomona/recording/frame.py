@@ -75,6 +75,13 @@ class Recording(Protocol):
         """Frame numbers in order of time."""
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Numbers of all frames that were recorded, in order of time: also of those left out of `numbers`.
+
+        Frames are left out that have no pose or no partner, or that were not chosen. Files of boxes count these ones.
+        """
+
+    @property
     def times_s(self) -> NDArray[np.float64] | None:
         """Time of each frame, ascending, None where nobody noted it."""
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pomona.recording.calibration import Calibration
+from pomona.recording.card import RecordingCard
 from pomona.recording.frame import Recording
 
 __all__ = ["PartOfRecording"]
 
 
-@dataclass(frozen=True, eq=False)
-class PartOfRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class PartOfRecording(RecordingCard):
     """Some frames of a recording; who derives from it says which.
 
     Attributes
@@ -37,6 +38,11 @@ class PartOfRecording:
     def date(self) -> str | None:
         """Date of the whole."""
         return self.whole.date
+
+    @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """All frames that were recorded."""
+        return self.whole.recorded_numbers
 
     @property
     def calibration(self) -> Calibration:

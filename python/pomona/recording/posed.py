@@ -30,7 +30,7 @@ class RectifiedRecording(Recording, Protocol):
         """Camera and rectification."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class PosedRecording(PartOfRecording):
     """The frames of a recording that have a pose; see `Recording` for what it gives.
 

@@ -34,7 +34,7 @@ def poses_at(
     known_s, known : (K,) and (K, 4, 4) float64
         Poses and their times, ascending.
     longest_gap_s : float
-        Poses farther apart than this have none between them.
+        Poses farther apart than this, by `SAME_S` and more, have none between them.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def poses_at(
     after = np.searchsorted(known_s, times_s).clip(0, len(known_s) - 1)
     before = np.where(known_s[after] == times_s, after, after - 1).clip(0)
     has_pose = (known_s[before] <= times_s) & (times_s <= known_s[after])
-    has_pose &= known_s[after] - known_s[before] <= longest_gap_s
+    has_pose &= known_s[after] - known_s[before] <= longest_gap_s + SAME_S
     nearest = np.where(times_s - known_s[before] <= known_s[after] - times_s, before, after)
     same = ~has_pose & (np.abs(known_s[nearest] - times_s) <= SAME_S)
     poses[same] = known[nearest[same]]

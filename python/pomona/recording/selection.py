@@ -18,7 +18,7 @@ from pomona.trajectory import Trajectory
 __all__ = ["SelectedRecording", "selected"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SelectedRecording(PartOfRecording):
     """Some frames of a recording; see `Recording` for what it gives.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,9 @@ from pomona.survey.tracking import Belief, Tracks, TrackViews, believed
 __all__ = ["Believing"]
 
 Array = NDArray[np.float64]
+
+SEEN_AGAIN = 2
+"""Frames that must show a fruit, however few it stays in view for: a single box is a claim that nothing bears out."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class Believing:
         boxes = np.cumsum([0, *(len(look.detections) for look in looks)])[frames] + tracks.rows
         fruitness, fruit_px = (_of_boxes(looks, name) for name in ("fruitness", "fruit_px"))
         shown_m2 = fruit_px[boxes] * depths_m**2 / (self.calibration.fx * self.calibration.fy)
-        return believed(
+        belief = believed(
             TrackViews(
                 centres=tracks.centres,
                 depths_m=_means(depths_m, tracks),
@@ -58,6 +61,8 @@ class Believing:
             elsewhere=np.concatenate([np.empty(0), *(look.elsewhere for look in looks if look.elsewhere is not None)]),
             config=self.config,
         )
+        seen_again = tracks.n_views + tracks.n_glimpses >= SEEN_AGAIN
+        return replace(belief, is_believed=belief.is_believed & seen_again)
 
 
 def _of_boxes(looks: Sequence[Look], name: str) -> Array:

@@ -71,6 +71,12 @@ class Lifted:
     def __len__(self) -> int:
         return len(self.rows)
 
+    @classmethod
+    def none(cls) -> Lifted:
+        """Give what is known where nothing was looked at."""
+        empty = np.empty(0)
+        return cls(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3, 3)), empty, empty, empty, empty, {})
+
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Which depths were measured, (M,); the others are guesses from the size of the outline."""

@@ -76,7 +76,8 @@ class Kept:
             if file.is_file():
                 return _read(file, frame.number)
             seen = see(frame)
-            _write(file, seen)
+            if seen.unusable is None:
+                _write(file, seen)
             return seen
 
         return look

@@ -44,7 +44,7 @@ class Boxes:
     fruits: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Part:
     """Fruits of a stretch of the recording.
 
@@ -72,6 +72,21 @@ class Part:
     began: str | None = None
     frames_in_view: float | None = None
     tally: Tally = field(default_factory=Tally)
+
+    def __repr__(self) -> str:
+        return f"Part({', '.join(f'{name}: {value}' for name, value in self.facts.items())})"
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What it holds, in short."""
+        frames, sizes_m = self.trajectory.frames, self.cloud.diameters_m
+        known_m = np.empty(0) if sizes_m is None else sizes_m[~np.isnan(sizes_m)]
+        return {
+            "frames": f"{frames.min()} to {frames.max()}" if len(frames) else "none",
+            "fruits": len(self.cloud),
+            "median diameter": f"{1000 * np.median(known_m):.1f} mm" if len(known_m) else "-",
+            "boxes": len(self.boxes.frames),
+        }
 
 
 class OpenPart:

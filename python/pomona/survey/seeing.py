@@ -40,6 +40,9 @@ class Look:
         rather fruit; None where the recording has no colour.
     elsewhere : (E,) float64 or None
         Fruitness of places that no box touches.
+    unusable : str or None
+        Why nothing was looked at: a picture cannot be read or shows nothing. The boxes are there as far as the detector
+        knows them all the same.
     """
 
     frame: int
@@ -49,6 +52,7 @@ class Look:
     fruitness: NDArray[np.float64] | None = None
     fruit_px: NDArray[np.float64] | None = None
     elsewhere: NDArray[np.float64] | None = None
+    unusable: str | None = None
 
 
 class _Depth(Protocol):
@@ -94,16 +98,17 @@ class Seeing:
         return isinstance(self._depth, _FromStereo)
 
     def __call__(self, frame: Frame) -> Look:
-        """Look at one frame.
+        """Look at one frame; `Look.unusable` where a picture fails, or the left one, which depth needs, is blank."""
+        detections = Detections.none()
+        try:
+            detections = self._detector(frame)
+            return self._seen(frame, detections)
+        except UnreadablePictureError as error:
+            return Look(frame.number, detections, Lifted.none(), unusable=str(error))
 
-        Raises
-        ------
-        UnreadablePictureError
-            When one of its pictures cannot be read, or the left one, which depth is measured in, shows nothing.
-        """
+    def _seen(self, frame: Frame, detections: Detections) -> Look:
         if "left" in self._depth.needs and frame.read_left is not None and is_blank(frame.read_left()):
             raise UnreadablePictureError(f"frame {frame.number}: the left picture shows nothing")
-        detections = self._detector(frame)
         lifted = self._depth(frame, detections.boxes_px)
         look = Look(frame.number, detections, lifted)
         if not self._colour or frame.read_left is None:

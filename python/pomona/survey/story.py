@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
 from pomona.detect import Detector
@@ -28,7 +29,7 @@ from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing
-from pomona.survey.tally import Tally, tell_little
+from pomona.survey.tally import BoxFate, Tally, tell_little
 from pomona.survey.tracking import Tracker
 from pomona.trajectory import Trajectory
 
@@ -44,7 +45,7 @@ FEW_FRAMES = 5
 """Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Survey:
     """What a scan found.
 
@@ -53,11 +54,13 @@ class Survey:
     parts : tuple of Part
         One where the camera was followed all the way; more where its track broke. At least one, maybe without fruits.
     detections : int
-        Boxes seen.
+        Boxes in all frames that were come to, also in those that were skipped, as far as those are known.
     refused : Counter of Refusal
         Boxes whose depth was not measured, by reason.
     skipped : dict
         Number of each frame that could not be used, and why.
+    skipped_boxes : int
+        Boxes of those.
     stopped : int or None
         Frame after which `stop` said yes.
     """
@@ -66,7 +69,17 @@ class Survey:
     detections: int
     refused: Counter[Refusal]
     skipped: dict[int, str] = field(default_factory=dict)
+    skipped_boxes: int = 0
     stopped: int | None = None
+
+    def __repr__(self) -> str:
+        where = f" in the longest of {len(self.parts)} parts" if len(self.parts) > 1 else ""
+        skipped = f", {len(self.skipped)} frames skipped" if self.skipped else ""
+        return f"Survey({len(self.cloud)} fruits{where}, from {self.detections} boxes{skipped})"
+
+    def _repr_html_(self) -> str:
+        rows = [(number, *part.facts.values()) for number, part in enumerate(self.parts, start=1)]
+        return as_table(repr(self), ("part", *self.parts[0].facts), rows)
 
     @property
     def longest(self) -> int:
@@ -76,8 +89,9 @@ class Survey:
 
     @property
     def tally(self) -> Tally:
-        """What became of the boxes and tracks of all parts."""
-        return sum((part.tally for part in self.parts), Tally())
+        """What became of all boxes, and of the tracks of all parts."""
+        skipped = Tally(+Counter[BoxFate | Refusal]({BoxFate.SKIPPED: self.skipped_boxes}))
+        return sum((part.tally for part in self.parts), skipped)
 
     @property
     def cloud(self) -> FruitCloud:
@@ -135,7 +149,8 @@ def scan(
         recording = straightened(recording)
     seeing = Seeing(recording, detector, depth=depth)
     camera = pose_source_of(recording, odometry=odometry, config=config)
-    named = not retrack and (len(recording) == 1 or bool(getattr(detector, "with_ids", False)))
+    # In a single frame nothing can be seen twice: each box is a fruit.
+    named = len(recording) == 1 or (not retrack and bool(getattr(detector, "with_ids", False)))
     findings = _Findings(partial(_open_part, recording, None if named else config or {}))
     look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
@@ -191,6 +206,7 @@ class _Findings:
         self._parts: dict[int, OpenPart] = {}
         self._detections = 0
         self._refused = Counter[Refusal]()
+        self._skipped_boxes = 0
         self.skipped: dict[int, str] = {}
         self.stopped: int | None = None
 
@@ -200,21 +216,18 @@ class _Findings:
 
     def add(self, frame: Frame, place: Place, coming: Future[Look]) -> None:
         """Take a frame, or note why it cannot be used."""
-        try:
-            look = coming.result()
-            left = frame.read_left() if look.colours is not None and frame.read_left is not None else None
-        except UnreadablePictureError as error:
-            self.skipped[frame.number] = str(error)
+        look = coming.result()
+        self._detections += len(look.detections)
+        if look.unusable is not None or place.session_from_camera is None:
+            self.skipped[frame.number] = look.unusable or f"frame {frame.number}: {place.broken}"
+            self._skipped_boxes += len(look.detections)
             return
-        if place.session_from_camera is None:
-            self.skipped[frame.number] = f"frame {frame.number}: {place.broken}"
-            return
+        left = frame.read_left() if look.colours is not None and frame.read_left is not None else None
         if place.part not in self._parts:
             self._parts[place.part] = self._open_part(place.part, place.broken)
         # Where nobody noted the time, frames are numbered: order is all that is known.
         time_s = float(frame.number if frame.time_s is None else frame.time_s)
         self._parts[place.part].add(look, time_s, place.session_from_camera, left)
-        self._detections += len(look.detections)
         self._refused.update(look.lifted.refused.values())
 
     def survey(self, camera: PoseSource) -> Survey:
@@ -222,7 +235,7 @@ class _Findings:
             raise PomonaError("stopped before a frame could be used")
         placed = [(part, part.refined(camera)) for part in self._parts.values()]
         parts = tuple(part.closed(poses) for part, poses in rejoined(placed))
-        return Survey(parts, self._detections, self._refused, self.skipped, self.stopped)
+        return Survey(parts, self._detections, self._refused, self.skipped, self._skipped_boxes, self.stopped)
 
 
 def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:

@@ -42,6 +42,7 @@ class BoxFate(StrEnum):
     NO_TRACK = "of no track"
     SECOND = "second box of a fruit in its frame"
     NO_FRUIT = "of a track that is no fruit"
+    SKIPPED = "in a skipped frame"
 
 
 class TrackFate(StrEnum):
@@ -81,6 +82,11 @@ class Tally:
 
     boxes: Counter[BoxFate | Refusal] = field(default_factory=Counter)
     tracks: Counter[TrackFate] = field(default_factory=Counter)
+
+    @property
+    def n_looked_at(self) -> int:
+        """Boxes in frames that were not skipped."""
+        return self.boxes.total() - self.boxes[BoxFate.SKIPPED]
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(self.boxes + other.boxes, self.tracks + other.tracks)
@@ -148,7 +154,7 @@ def often_enough(
 
 def tell_little(path: Path, n_frames: int, tally: Tally) -> None:
     """Warn where nothing or little of a recording became fruits, and say what to do."""
-    told = _few_boxes(n_frames, tally.boxes.total()) or _few_depths(tally) or _few_fruits(tally)
+    told = _few_boxes(n_frames, tally.n_looked_at) or _few_depths(tally) or _few_fruits(tally)
     if told is not None:
         warnings.warn(f"{path}: {told}", PomonaWarning, stacklevel=3)
 
@@ -164,7 +170,7 @@ def _few_boxes(n_frames: int, n_boxes: int) -> str | None:
 
 def _few_depths(tally: Tally) -> str | None:
     refused = Counter({reason: tally.boxes[reason] for reason in Refusal})
-    n_boxes, n_refused = tally.boxes.total(), refused.total()
+    n_boxes, n_refused = tally.n_looked_at, refused.total()
     if n_refused <= (1 - SMALL_SHARE) * n_boxes:
         return None
     reason = refused.most_common(1)[0][0]

@@ -5,7 +5,6 @@ How it decides, with the equations: `docs/tracking.md`. The algorithm is the cor
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
+from pomona.core_settings import core_settings
 from pomona.detect import Detections
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
@@ -94,7 +94,7 @@ class Tracks:
                 frames=self.frames,
                 fruits=self.fruits,
                 place_sigma_m=place_sigma_m,
-                config=json.dumps(dict(config or {})),
+                config=core_settings(config),
             )
         except ValueError as error:
             raise PomonaError(f"tracks: {error}") from None
@@ -250,7 +250,7 @@ def believed(
             elsewhere=np.ascontiguousarray(elsewhere, np.float64),
             camera=calibration,
             poses=np.ascontiguousarray(session_from_camera, np.float64),
-            config=json.dumps(dict(config or {})),
+            config=core_settings(config),
         )
     except ValueError as error:
         raise PomonaError(f"tracks: {error}") from None
@@ -278,7 +278,7 @@ class Tracker:
 
     def __init__(self, calibration: Calibration, config: Mapping[str, Any] | None = None) -> None:
         try:
-            self._core = _core.Tracker(calibration, config=json.dumps(dict(config or {})))
+            self._core = _core.Tracker(calibration, config=core_settings(config))
         except ValueError as error:
             raise PomonaError(str(error)) from None
 

@@ -19,6 +19,7 @@ from pomona.recording.bags.picture_messages import colour_of, depth_of
 from pomona.recording.bags.topics import Roles
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name, date_of_ns
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
@@ -31,8 +32,8 @@ JUMP_MESSAGES = 50
 """Fewer pictures than these are passed over rather than looked up: a jump opens the file anew."""
 
 
-@dataclass(frozen=True, eq=False)
-class BagRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class BagRecording(RecordingCard):
     """Frames by row; see `Recording` for what it gives.
 
     Attributes
@@ -75,6 +76,11 @@ class BagRecording:
         return tuple(next(iter(self.rows.values())).tolist())
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Rows of all left pictures."""
+        return tuple(range(len(self._first.stamps_ns)))
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of each frame's left picture."""
         return self._first.stamps_ns[next(iter(self.rows.values()))] / 1e9
@@ -110,7 +116,7 @@ class BagRecording:
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {kind: len(self) for kind in self.pictures}
-        found = describe(self, self.file.kind, self.times_s.tolist(), counts, detections=False)
+        found = describe(self, self.file.kind, self.times_s.tolist(), counts)
         return {**found, "topics": str(self.roles)}
 
     def _messages(self, kind: str, wanted: Sequence[int]) -> Iterator[Message | None]:

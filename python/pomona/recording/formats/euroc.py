@@ -73,6 +73,7 @@ def open_euroc(folder: Path, calibration: Path | None = None, *, own_poses: bool
         kind="EuRoC folder",
         optics=optics,
         numbers=tuple(rows[:, 0].tolist()),
+        recorded_numbers=tuple(range(len(left))),
         times_s=times_s,
         pictures={"left": tuple(left[row] for row in rows[:, 0]), "right": tuple(right[row] for row in rows[:, 1])},
         trajectory=None if poses is None else Trajectory(rows[:, 0], times_s, poses),

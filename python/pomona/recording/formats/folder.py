@@ -17,6 +17,7 @@ from pomona.reading import parsed_json, read_text, shown
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
 from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.formats.frame_times import times_beside_poses, times_in
@@ -32,8 +33,8 @@ __all__ = ["FolderRecording"]
 ABOUT = "an object with name and date"
 
 
-@dataclass(frozen=True, eq=False)
-class FolderRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class FolderRecording(RecordingCard):
     """A recording folder; see `Recording` for what it gives.
 
     Attributes
@@ -103,6 +104,11 @@ class FolderRecording:
         """The rectified left camera."""
         return self.optics.calibration
 
+    @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Numbers of all frames that have a picture."""
+        return _all_numbers(self.pictures)
+
     def __len__(self) -> int:
         return len(self.numbers)
 
@@ -133,8 +139,7 @@ class FolderRecording:
         """Say what was found."""
         times_s = None if self.times_s is None else self.times_s.tolist()
         counts = {kind: len(files) for kind, files in self.pictures.items()}
-        boxes = (self.path / "detections.csv").is_file()
-        return describe(self, "recording folder", times_s, counts, detections=boxes)
+        return describe(self, "recording folder", times_s, counts)
 
     def _reader(self, kind: str, number: int) -> Any:
         files = self.pictures.get(kind)
@@ -158,7 +163,11 @@ def _numbers(folder: Path, pictures: dict[str, dict[int, Path]]) -> tuple[int, .
     if not set.intersection(*(set(files) for files in kinds.values())):
         ranges = ", ".join(f"{kind}/ {min(files)} to {max(files)}" for kind, files in kinds.items())
         raise PomonaError(f"{folder}: found frames {ranges}, expected the same numbers in each folder")
-    return tuple(sorted(set.union(*(set(files) for files in kinds.values()))))
+    return _all_numbers(pictures)
+
+
+def _all_numbers(pictures: dict[str, dict[int, Path]]) -> tuple[int, ...]:
+    return tuple(sorted(set().union(*pictures.values())))
 
 
 def _optics(folder: Path, pictures: dict[str, dict[int, Path]], calibration: Path | None) -> Optics:

@@ -53,6 +53,7 @@ def open_kitti(folder: Path, _calibration: Path | None = None, *, own_poses: boo
         kind="KITTI folder",
         optics=optics,
         numbers=numbers,
+        recorded_numbers=numbers,
         times_s=times_s,
         pictures={"left": left, "right": right},
         trajectory=None if poses is None else Trajectory(np.array(numbers), clock_s, poses),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
@@ -22,8 +23,8 @@ from pomona.trajectory import Trajectory
 __all__ = ["ListedRecording"]
 
 
-@dataclass(frozen=True, eq=False)
-class ListedRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class ListedRecording(RecordingCard):
     """Frames by row; see `Recording` for what it gives.
 
     Attributes
@@ -34,6 +35,8 @@ class ListedRecording:
         Camera and rectification.
     numbers : tuple of int
         Frame numbers.
+    recorded_numbers : tuple of int
+        Numbers of all left pictures, also of those that are no frame.
     times_s : (F,) float64 or None
         Time of each frame.
     pictures : mapping
@@ -46,6 +49,7 @@ class ListedRecording:
     kind: str
     optics: Optics
     numbers: tuple[int, ...]
+    recorded_numbers: tuple[int, ...]
     times_s: NDArray[np.float64] | None
     pictures: Mapping[str, tuple[Path, ...]]
     trajectory: Trajectory | None
@@ -93,7 +97,7 @@ class ListedRecording:
         """Say what was found."""
         counts = {kind: len(files) for kind, files in self.pictures.items()}
         times_s = None if self.times_s is None else self.times_s.tolist()
-        return describe(self, self.kind, times_s, counts, detections=(self.path / "detections.csv").is_file())
+        return describe(self, self.kind, times_s, counts)
 
     def _reader(self, kind: str, row: int) -> Any:
         if kind not in self.pictures:

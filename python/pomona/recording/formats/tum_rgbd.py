@@ -58,6 +58,7 @@ def open_tum_rgbd(folder: Path, calibration: Path | None = None, *, own_poses: b
         kind="TUM RGB-D folder",
         optics=optics,
         numbers=tuple(rows[:, 0].tolist()),
+        recorded_numbers=tuple(range(len(colour))),
         times_s=times_s,
         pictures={"left": tuple(colour[row] for row in rows[:, 0]), "depth": tuple(depth[row] for row in rows[:, 1])},
         trajectory=None if poses is None else Trajectory(rows[:, 0], times_s, poses),

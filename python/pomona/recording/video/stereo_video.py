@@ -16,6 +16,7 @@ from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.calibration import Calibration
 from pomona.recording.calibration.rectification import Optics
 from pomona.recording.calibration.rig_files import find_optics
+from pomona.recording.card import RecordingCard
 from pomona.recording.dates import date_in_name
 from pomona.recording.description import describe
 from pomona.recording.frame import Frame, chosen_rows
@@ -47,8 +48,8 @@ class Video(Protocol):
         """Decode picture by picture, all or those of some rows, ascending."""
 
 
-@dataclass(frozen=True, eq=False)
-class VideoRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class VideoRecording(RecordingCard):
     """One or two video files; see `Recording` for what it gives.
 
     Attributes
@@ -94,6 +95,11 @@ class VideoRecording:
         return tuple(self.pairs[:, 0].tolist())
 
     @property
+    def recorded_numbers(self) -> tuple[int, ...]:
+        """Rows of all left pictures."""
+        return tuple(range(len(self.left.times_s)))
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of each frame's left picture."""
         return self.left.times_s[self.pairs[:, 0]]
@@ -127,7 +133,7 @@ class VideoRecording:
     def description(self) -> dict[str, Any]:
         """Say what was found."""
         counts = {"left": len(self), "right": len(self)}
-        return describe(self, self.kind, self.times_s.tolist(), counts, detections=False)
+        return describe(self, self.kind, self.times_s.tolist(), counts)
 
 
 def _columns(
