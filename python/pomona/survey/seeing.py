@@ -109,7 +109,8 @@ class Seeing:
         detections = self._detector(frame)
         lifted = self._depth(frame, detections.boxes_px)
         look = Look(frame.number, detections, lifted)
-        if not self._colour or frame.read_left is None:
+        # Where nobody looked, places without a box are no places without a fruit.
+        if not self._colour or frame.read_left is None or not detections.looked:
             return look
         left, boxes_px = frame.read_left(), detections.boxes_px
         colours = np.array([_colour(left, box_px) for box_px in boxes_px], np.uint8).reshape(-1, 3)
