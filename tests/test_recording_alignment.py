@@ -15,7 +15,6 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Recording, open_recording
 from pomona.recording.alignment import alignment_of, straightened
 
-
 HALVES = (slice(CALIBRATION.width // 2), slice(CALIBRATION.width // 2, None))
 """Columns; in an upright pair of two depths."""
 
