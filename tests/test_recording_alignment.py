@@ -15,16 +15,21 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Recording, open_recording
 from pomona.recording.alignment import alignment_of, straightened
 
+HALVES = (slice(CALIBRATION.width // 2), slice(CALIBRATION.width // 2, None))
+"""Columns; in an upright pair of two depths."""
 
-def recording(folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0) -> Recording:
-    """Three pairs whose right pictures are lower, and turned clockwise."""
+
+def recording(folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0) -> Recording:
+    """Three pairs whose right pictures are lower, turned clockwise, and larger."""
     scene, change = drive(sideways(3)), misaligned(lower_px, -turned_deg)
     for side in ("left", "right"):
         (folder / side).mkdir(parents=True)
     for row in range(3):
         left, right, _ = scene.pictures(row)
         cv2.imwrite(str(folder / "left" / f"{row:04d}.png"), left)
-        cv2.imwrite(str(folder / "right" / f"{row:04d}.png"), change(right, "right", row))
+        larger = cv2.getRotationMatrix2D((CALIBRATION.cx - 0.5, CALIBRATION.cy - 0.5), 0.0, size)
+        right = cv2.warpAffine(change(right, "right", row), larger, right.shape[1::-1], flags=cv2.INTER_CUBIC)
+        cv2.imwrite(str(folder / "right" / f"{row:04d}.png"), right)
     names = ("width", "height", "fx", "fy", "cx", "cy", "baseline_m")
     numbers = {name: getattr(CALIBRATION, name) for name in names}
     (folder / "calibration.json").write_text(json.dumps(numbers))
@@ -62,6 +67,62 @@ def test_what_no_knock_does_is_told_and_left(tmp_path: Path) -> None:
     odd = recording(tmp_path / "row", 4.0)
     with pytest.warns(PomonaWarning, match="calibrate the cameras again"):
         assert straightened(odd) is odd
+
+
+@pytest.mark.parametrize("side", ["larger", "smaller"])
+def test_another_size_is_told_and_taken_out(tmp_path: Path, side: str) -> None:
+    stretch = 0.01 if side == "larger" else -0.01
+    odd = recording(tmp_path / "row", size=1 + stretch)
+    found = alignment_of(odd)
+    assert found is not None
+    assert found.stretch == pytest.approx(stretch, abs=0.002)
+    with pytest.warns(PomonaWarning, match=rf"and (0\.9|1\.0|1\.1)% {side}: taken out"):
+        straight = straightened(odd)
+    again = alignment_of(straight)
+    assert again is not None
+    assert not again.is_off
+
+
+@pytest.mark.parametrize(("lower_px", "turned_deg", "size"), [(15.0, 0.0, 1.0), (0.0, 4.0, 1.0), (0.0, 0.0, 1.05)])
+def test_what_lies_beyond_the_rows_that_are_searched_is_told(
+    tmp_path: Path, lower_px: float, turned_deg: float, size: float
+) -> None:
+    found = alignment_of(recording(tmp_path / "row", lower_px, turned_deg, size))
+    assert found is not None
+    assert (found.is_off, found.is_correctable) == (True, False)
+    measured = [found.lower_px, np.degrees(found.turned_rad), 1 + found.stretch]
+    np.testing.assert_allclose(measured, [lower_px, turned_deg, size], atol=0.7)
+
+
+def test_info_fails_where_a_scan_would(pomona, tmp_path: Path) -> None:
+    recording(tmp_path / "far", 15.0)
+    code, printed, _ = pomona("info", tmp_path / "far", "--check")
+    assert code == 1
+    assert "px lower" in next(line for line in printed.splitlines() if line.startswith("misaligned"))
+
+
+def test_a_pair_on_its_side_is_told(pomona, tmp_path: Path) -> None:
+    row = recording(tmp_path / "row").path
+    for file in row.glob("left/*"):
+        left = cv2.imread(str(file))
+        right = np.hstack([np.roll(left, -px, axis=1)[:, part] for px, part in zip((12, 30), HALVES, strict=True)])
+        for side, picture in (("left", left), ("right", right)):
+            cv2.imwrite(str(row / side / file.name), cv2.rotate(picture, cv2.ROTATE_90_CLOCKWISE))
+    numbers = json.loads((row / "calibration.json").read_text())
+    turned = {"width": "height", "height": "width", "cx": "cy", "cy": "cx", "fx": "fy", "fy": "fx"}
+    (row / "calibration.json").write_text(json.dumps(numbers | {new: numbers[old] for new, old in turned.items()}))
+    code, printed, _ = pomona("info", row, "--check")
+    assert code == 1
+    assert "turned on its side" in printed
+
+
+def test_one_camera_twice_is_refused(pomona, tmp_path: Path) -> None:
+    row = recording(tmp_path / "row").path
+    for picture in row.glob("left/*"):
+        (row / "right" / picture.name).write_bytes(picture.read_bytes())
+    code, _, told = pomona("info", row, "--check")
+    assert code == 2
+    assert "found the same picture in 2 of 2 frames" in told
 
 
 def test_info_tells(pomona, tmp_path: Path) -> None:

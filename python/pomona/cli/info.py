@@ -36,7 +36,8 @@ def info(
 ) -> None:
     """Say what RECORDING holds: frames, rate, camera, depth error at 1.5 m, pictures, poses, detections.
 
-    With --check the exit code is 1 when a picture cannot be read, and 2 when left and right are swapped.
+    With --check the exit code is 1 when a picture cannot be read or the right pictures lie so far off that a scan
+    cannot take it out, and 2 when left and right are swapped or the same.
     """
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
@@ -54,7 +55,7 @@ def info(
         say_json(found)
     else:
         say(*_as_lines(found))
-    if faults is not None and faults.unreadable:
+    if faults is not None and (faults.unreadable or faults.is_spoiled):
         raise typer.Exit(1)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from pomona.recording import Recording
     from pomona.survey import Part, Progress, Survey
+    from pomona.survey.tally import Tally
 
 
 @contextmanager
@@ -64,6 +65,7 @@ def summary(recording: Recording, survey: Survey, written: Mapping[int, Path]) -
         "boxes": {fate.name.lower(): count for fate, count in sorted(survey.tally.boxes.items())},
         "n_tracks": survey.tally.tracks.total(),
         "tracks": {fate.name.lower(): count for fate, count in sorted(survey.tally.tracks.items())},
+        "frames": {fate.name.lower(): count for fate, count in sorted(survey.tally.frames.items())},
         "n_fruits": sum(len(part.cloud) for part in survey.parts),
         "parts": [_of_part(part, written.get(number)) for number, part in enumerate(survey.parts)],
         "median_diameter_mm": float(1000 * np.median(diameters_m)) if len(diameters_m) else None,
@@ -82,13 +84,23 @@ def _of_part(part: Part, path: Path | None) -> dict[str, Any]:
 
 
 def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
-    """Say the same in words, with a table of what became of boxes and tracks."""
+    """Say the same in words, with a table of what became of frames, boxes and tracks."""
     lines = [f"{found['output'][0]}: {_fruits(found)}, from {_boxes(found)}"]
     if found["stopped_after_frame"] is not None:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
         lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
-    return lines + _table("boxes", survey.tally.boxes) + _table("tracks", survey.tally.tracks)
+    return [
+        *lines,
+        *_frames(survey.tally),
+        *_table("boxes", survey.tally.boxes),
+        *_table("tracks", survey.tally.tracks),
+    ]
+
+
+def _frames(tally: Tally) -> list[str]:
+    """Say what frames gave, where not all gave boxes."""
+    return _table("frames", tally.frames) if len(tally.frames) > 1 else []
 
 
 def _table(what: str, fates: Counter[Any]) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -23,8 +23,8 @@ __all__ = ["read_coco"]
 EXPECTED = "COCO: an object with images and annotations, or a list of results with image_id and bbox"
 
 
-def read_coco(path: Path, text: str, calibration: Calibration) -> Iterator[ListedBox]:
-    """Give the boxes of a COCO file.
+def read_coco(path: Path, text: str, calibration: Calibration) -> tuple[Iterator[ListedBox], Collection[int] | None]:
+    """Give the boxes of a COCO file, and the frames that it lists; None of a list of results, which has boxes alone.
 
     Raises
     ------
@@ -33,9 +33,13 @@ def read_coco(path: Path, text: str, calibration: Calibration) -> Iterator[Liste
     """
     content = parsed_json(str(path), text, EXPECTED)
     if isinstance(content, list):
-        yield from (_box(path, f"[{row}]", entry, _result_frame(path, row, entry)) for row, entry in enumerate(content))
-        return
+        rows = enumerate(content)
+        return (_box(path, f"[{row}]", entry, _result_frame(path, row, entry)) for row, entry in rows), None
     frames = _frames(path, _list_of(path, content, "images"), calibration)
+    return _annotated(path, content, frames), frames.values()
+
+
+def _annotated(path: Path, content: Any, frames: Mapping[int | str, int]) -> Iterator[ListedBox]:
     groups = 0
     for row, entry in enumerate(_list_of(path, content, "annotations")):
         where = f"annotations[{row}]"

@@ -27,11 +27,14 @@ class Detections:
         Confidence, 0 to 1.
     ids : tuple of D str, optional
         Names of the fruits where they are known; each at most once in a frame.
+    looked : bool
+        Whether a detector looked at the frame. Where none did, that it has no boxes says nothing.
     """
 
     boxes_px: NDArray[np.float64]
     scores: NDArray[np.float64]
     ids: tuple[str, ...] | None = None
+    looked: bool = True
 
     def __post_init__(self) -> None:
         boxes_px = np.ascontiguousarray(self.boxes_px, np.float64)
@@ -49,9 +52,9 @@ class Detections:
         return len(self.boxes_px)
 
     @classmethod
-    def none(cls) -> Detections:
-        """Give the detections of a frame without fruits."""
-        return cls(np.empty((0, 4)), np.empty(0))
+    def none(cls, *, looked: bool = True) -> Detections:
+        """Give the detections of a frame without fruits, or of one that nobody looked at."""
+        return cls(np.empty((0, 4)), np.empty(0), looked=looked)
 
 
 class Detector(Protocol):

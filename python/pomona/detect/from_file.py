@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from pomona.detect.coco import read_coco
 from pomona.detect.csv_table import read_csv
 from pomona.detect.detections import Detections
 from pomona.detect.listed import ListedBox, by_frame
+from pomona.detect.looked_at import looked_at
 from pomona.detect.mot import is_mot, read_mot
 from pomona.errors import PomonaError
 from pomona.reading import read_text
@@ -31,10 +32,13 @@ class FileDetector:
         The file.
     by_frame : mapping
         Detections of each frame that has any.
+    looked_at : collection of int
+        Frames that were looked at, with boxes or without.
     """
 
     path: Path
     by_frame: dict[int, Detections]
+    looked_at: Collection[int]
 
     @classmethod
     def read(cls, path: Path, calibration: Calibration, numbers: Sequence[int]) -> FileDetector:
@@ -56,12 +60,16 @@ class FileDetector:
         PomonaError
             One line with the file, line and field, what was found and what was expected.
         """
-        boxes = _boxes(path, _text(path), calibration, numbers)
-        return cls(path, by_frame(path, boxes, calibration, numbers))
+        boxes, listed = _boxes(path, _text(path), calibration, numbers)
+        found = by_frame(path, boxes, calibration, numbers)
+        if listed is None:
+            listed = looked_at(numbers, {number: len(boxes) for number, boxes in found.items()})
+        return cls(path, found, listed)
 
     def __call__(self, frame: Frame) -> Detections:
         """Give the boxes of a frame."""
-        return self.by_frame.get(frame.number, Detections.none())
+        found = self.by_frame.get(frame.number)
+        return Detections.none(looked=frame.number in self.looked_at) if found is None else found
 
     @property
     def with_ids(self) -> bool:
@@ -86,14 +94,17 @@ class FileDetector:
         return f"{self.path}: {boxes} boxes{ids} in {len(self.by_frame)} frames"
 
 
-def _boxes(path: Path, text: str, calibration: Calibration, numbers: Sequence[int]) -> Iterator[ListedBox]:
+def _boxes(
+    path: Path, text: str, calibration: Calibration, numbers: Sequence[int]
+) -> tuple[Iterator[ListedBox], Collection[int] | None]:
+    """Give the boxes, and the frames that the file lists, where its kind lists frames."""
     first = next(filter(str.strip, text.splitlines()), "")
     if first.lstrip().startswith(("{", "[")):
         return read_coco(path, text, calibration)
     # A text without lines is how trackers say that they saw nothing; a table has a header at least.
     if is_mot(first) or (not first and path.suffix.lower() == ".txt"):
-        return read_mot(path, text, numbers)
-    return read_csv(path, text, numbers)
+        return read_mot(path, text, numbers), None
+    return read_csv(path, text, numbers), None
 
 
 def _text(path: Path) -> str:

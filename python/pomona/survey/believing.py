@@ -37,7 +37,7 @@ class Believing:
     config: Mapping[str, Any]
 
     def __call__(self, tracks: Tracks, looks: Sequence[Look], session_from_camera: Array) -> Belief:
-        """Weigh tracks that these frames, from these poses (F, 4, 4), saw."""
+        """Weigh tracks that these frames, from these poses (F, 4, 4), saw; where nobody looked does not count."""
         row_of_frame = {look.frame: row for row, look in enumerate(looks)}
         frames = np.array([row_of_frame[frame] for frame in tracks.frames.tolist()], np.int64)
         poses = session_from_camera[frames]
@@ -55,7 +55,7 @@ class Believing:
                 fruitness=_means(fruitness[boxes], tracks),
                 missed_boxes=tracks.missed_boxes,
             ),
-            session_from_camera,
+            session_from_camera[[look.detections.looked for look in looks]],
             self.calibration,
             box_fruitness=fruitness[np.isfinite(fruitness)],
             elsewhere=np.concatenate([np.empty(0), *(look.elsewhere for look in looks if look.elsewhere is not None)]),

@@ -26,7 +26,7 @@ from pomona.survey.seeing import Look
 
 __all__ = ["Kept"]
 
-FORMAT = 3
+FORMAT = 4
 
 APPEARANCE = ("colours", "fruitness", "fruit_px", "elsewhere")
 
@@ -86,6 +86,7 @@ class Kept:
 def _write(file: Path, look: Look) -> None:
     arrays: dict[str, Any] = {name: getattr(look.lifted, name) for name in LIFTED}
     arrays |= {"boxes_px": look.detections.boxes_px, "scores": look.detections.scores}
+    arrays["looked"] = np.array(look.detections.looked)
     arrays["refused"] = np.array(json.dumps({row: reason.name for row, reason in look.lifted.refused.items()}))
     if look.detections.ids is not None:
         arrays["ids"] = np.array(json.dumps(look.detections.ids))
@@ -109,7 +110,7 @@ def _read(file: Path, frame: int) -> Look:
             refused = json.loads(str(arrays["refused"]))
             return Look(
                 frame,
-                Detections(arrays["boxes_px"], arrays["scores"], ids),
+                Detections(arrays["boxes_px"], arrays["scores"], ids, bool(arrays["looked"])),
                 Lifted(
                     **{name: arrays[name] for name in LIFTED},
                     refused=_refused(refused, len(arrays["boxes_px"])),

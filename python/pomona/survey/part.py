@@ -125,7 +125,7 @@ class OpenPart:
         self._times_s.append(time_s)
         if self._tracker is None:
             self._seen.update(_names(look))
-        else:
+        elif look.detections.looked:
             numbers = self._tracker.update(look.frame, session_from_camera, look.detections, look.lifted)
             self._seen.update(numbers[numbers >= 0].tolist())
             if left is not None:

@@ -111,7 +111,8 @@ class Seeing:
             raise UnreadablePictureError(f"frame {frame.number}: the left picture shows nothing")
         lifted = self._depth(frame, detections.boxes_px)
         look = Look(frame.number, detections, lifted)
-        if not self._colour or frame.read_left is None:
+        # Where nobody looked, places without a box are no places without a fruit.
+        if not self._colour or frame.read_left is None or not detections.looked:
             return look
         left, boxes_px = frame.read_left(), detections.boxes_px
         colours, fruitness, fruit_px, elsewhere = _core.look_of(np.ascontiguousarray(left), boxes_px)

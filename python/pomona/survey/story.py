@@ -22,9 +22,11 @@ from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
+from pomona.survey.box_check import check_boxes
 from pomona.survey.depth import Refusal
 from pomona.survey.kept import Kept
 from pomona.survey.part import OpenPart, Part
+from pomona.survey.pose_check import check_poses
 from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
@@ -147,6 +149,8 @@ def scan(
     """
     if not (depth == "auto" and "depth" in recording.description()["pictures"]):
         recording = straightened(recording)
+    if not odometry:
+        check_poses(recording)
     seeing = Seeing(recording, detector, depth=depth)
     camera = pose_source_of(recording, odometry=odometry, config=config)
     # In a single frame nothing can be seen twice: each box is a fruit.
@@ -164,6 +168,7 @@ def scan(
                 break
     _tell_skipped(recording, findings.skipped)
     survey = findings.survey(camera)
+    check_boxes(recording.path, [part.boxes for part in survey.parts])
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)

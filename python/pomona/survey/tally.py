@@ -1,4 +1,4 @@
-"""What became of every box and of every track of a scan, and a word where little became a fruit."""
+"""What became of every box, track and frame of a scan, and a word where little became a fruit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pomona.survey.depth import Refusal
 from pomona.survey.seeing import Look
 from pomona.survey.tracking import Tracks
 
-__all__ = ["BoxFate", "Tally", "TrackFate", "often_enough", "tell_little", "track_fates"]
+__all__ = ["BoxFate", "FrameFate", "Tally", "TrackFate", "often_enough", "tell_little", "track_fates"]
 
 Rows = NDArray[np.int64]
 
@@ -55,6 +55,14 @@ class TrackFate(StrEnum):
     NO_PLACE = "never measured"
 
 
+class FrameFate(StrEnum):
+    """What a frame gave."""
+
+    BOXES = "with boxes"
+    NONE_FOUND = "without boxes: nothing was found there"
+    NOT_LOOKED_AT = "without boxes in the file, taken as not looked at"
+
+
 _CODES: dict[BoxFate | Refusal, int] = {fate: code for code, fate in enumerate((*BoxFate, *Refusal))}
 
 ADVICE = {
@@ -71,17 +79,19 @@ ADVICE = {
 
 @dataclass(frozen=True)
 class Tally:
-    """Every box and every track, once each.
+    """Every box, every track and every frame, once each.
 
     Attributes
     ----------
     boxes : Counter of BoxFate or Refusal
     tracks : Counter of TrackFate
         Of boxes with names: the names.
+    frames : Counter of FrameFate
     """
 
     boxes: Counter[BoxFate | Refusal] = field(default_factory=Counter)
     tracks: Counter[TrackFate] = field(default_factory=Counter)
+    frames: Counter[FrameFate] = field(default_factory=Counter)
 
     @property
     def n_looked_at(self) -> int:
@@ -89,7 +99,7 @@ class Tally:
         return self.boxes.total() - self.boxes[BoxFate.SKIPPED]
 
     def __add__(self, other: Tally) -> Tally:
-        return Tally(self.boxes + other.boxes, self.tracks + other.tracks)
+        return Tally(self.boxes + other.boxes, self.tracks + other.tracks, self.frames + other.frames)
 
     @classmethod
     def of(cls, looks: Sequence[Look], fruits: Rows, first: Rows, joined: Rows, tracks: Counter[TrackFate]) -> Tally:
@@ -114,7 +124,13 @@ class Tally:
             offset += len(look.detections)
         codes[fruits >= 0] = _CODES[BoxFate.FRUIT]
         counts = np.bincount(codes, minlength=len(_CODES)).tolist()
-        return cls(+Counter(dict(zip(_CODES, counts, strict=True))), +tracks)
+        return cls(+Counter(dict(zip(_CODES, counts, strict=True))), +tracks, Counter(map(_frame_fate, looks)))
+
+
+def _frame_fate(look: Look) -> FrameFate:
+    if len(look.detections):
+        return FrameFate.BOXES
+    return FrameFate.NONE_FOUND if look.detections.looked else FrameFate.NOT_LOOKED_AT
 
 
 def track_fates(

@@ -33,11 +33,14 @@ class Checked:
         A picture shows nothing: it is black, white or plain.
     misaligned : str or None
         How the right pictures lie to the left ones, where their rows are not the same.
+    is_spoiled : bool
+        Whether a scan cannot take that out.
     """
 
     unreadable: dict[int, str] = field(default_factory=dict)
     blank: dict[int, str] = field(default_factory=dict)
     misaligned: str | None = None
+    is_spoiled: bool = False
 
 
 def checked(recording: Recording, progress: Callable[[int, int], None] | None = None) -> Checked:
@@ -65,7 +68,9 @@ def checked(recording: Recording, progress: Callable[[int, int], None] | None = 
         if progress is not None:
             progress(done, len(recording))
     alignment = alignment_of(recording)
-    return found if alignment is None or not alignment.is_off else replace(found, misaligned=str(alignment))
+    if alignment is None or not alignment.is_off:
+        return found
+    return replace(found, misaligned=str(alignment), is_spoiled=not alignment.is_correctable)
 
 
 def unreadable_frames(recording: Recording, progress: Callable[[int, int], None] | None = None) -> dict[int, str]:

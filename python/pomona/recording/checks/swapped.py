@@ -1,4 +1,4 @@
-"""Whether left and right are what they are called: a few frames tell."""
+"""Whether left and right are what they are called, and are two: a few frames tell."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
+from pomona.recording.checks.readable import is_blank
 from pomona.recording.frame import Recording
 from pomona.recording.pictures import UnreadablePictureError
 
@@ -31,9 +32,12 @@ NEAREST_PX = 1.0
 LARGEST_SHARE = 0.25
 """Of the width of the picture, as disparity."""
 
+SAME_GREY = 1.0
+"""Mean difference of the two pictures, of 255: noise alone makes more of two cameras, compression less of one."""
+
 
 def check_sides(recording: Recording) -> None:
-    """Refuse a recording whose left pictures are from the right camera.
+    """Refuse a recording whose left pictures are from the right camera, or are its right pictures too.
 
     In a rectified pair everything lies farther left in the right picture: disparities are positive. Recordings without
     right pictures, and frames that cannot be read or show nothing, say nothing.
@@ -41,9 +45,9 @@ def check_sides(recording: Recording) -> None:
     Raises
     ------
     PomonaError
-        One line that says to swap them.
+        One line that says to swap them, or that both are the same.
     """
-    found = np.zeros(0)
+    found, same = np.zeros(0), []
     middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
     looked_at = {recording.numbers[min(row, len(recording) - 1)] for row in middles.tolist()}
     for frame in recording.frames(looked_at):
@@ -53,13 +57,22 @@ def check_sides(recording: Recording) -> None:
             left, right = frame.read_left(), frame.read_right()
         except UnreadablePictureError:
             continue
+        if not is_blank(left):
+            same.append(_is_same(left, right))
         found = np.concatenate([found, disparities_px(left, right)])
         if len(found) >= ENOUGH:
             break
+    if same and all(same):
+        seen = f"the same picture in {len(same)} of {len(same)} frames that were compared"
+        raise PomonaError(f"{recording.path}: left and right: found {seen}, expected those of two cameras")
     negative = int((found < 0).sum())
     if len(found) >= ENOUGH and negative >= SWAPPED_SHARE * len(found):
         seen = f"{negative} of {len(found)} corners farther right in the right picture than in the left one"
         raise PomonaError(f"{recording.path}: left and right are swapped: found {seen}, expected farther left")
+
+
+def _is_same(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bool:
+    return left.shape == right.shape and float(np.abs(left - right.astype(np.float32)).mean()) < SAME_GREY
 
 
 def disparities_px(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float64]:
