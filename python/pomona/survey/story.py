@@ -43,6 +43,9 @@ Progress = Callable[[int, int, int], None]
 LOOKS_AHEAD = 2
 """Frames that are looked at before the camera is followed to them: neither waits for an uneven other."""
 
+SMALLEST_MEDIAN_M = 0.01
+"""Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm. Single fruits may be smaller."""
+
 FEW_FRAMES = 5
 """Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
 
@@ -266,7 +269,7 @@ def _check_pace(recording: Recording, survey: Survey) -> None:
 
 def _check_sizes(recording: Recording, survey: Survey) -> None:
     """Warn when the fruits cannot be fruits: then a unit is wrong, mostly that of depth or baseline."""
-    low_m, high_m = PLAUSIBLE_DIAMETER_M
+    low_m, high_m = SMALLEST_MEDIAN_M, PLAUSIBLE_DIAMETER_M[1]
     diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
     if len(diameters_m) and not low_m <= (median_m := float(np.median(diameters_m))) <= high_m:
         expected = f"{1000 * low_m:g} to {1000 * high_m:g} mm"
