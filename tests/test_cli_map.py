@@ -135,7 +135,7 @@ def test_millimetres_go_into_a_map_only_where_that_is_said(visits: Path, tmp_pat
     done = run(*doubtful)
     assert (done.returncode, done.stdout) == (2, "")
     assert "--unit mm" in done.stderr
-    assert done.stderr.endswith("; a map takes it as it is with --unit m\n")
+    assert done.stderr.endswith("; a map takes it as it is with --unit m, in Python unit='m'\n")
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "wrong.gpkg").exists()
     assert run(*doubtful, "--unit", "m").returncode == 0

@@ -144,7 +144,7 @@ def _w_last(pose: Array) -> Array:
 
 
 MISTAKES: dict[str, Callable[[Array], Array]] = {
-    "they are inverted, of the session in the camera": np.linalg.inv,
+    "they are inverted, of the session in the camera": lambda pose: np.asarray(np.linalg.inv(pose)),
     "their quaternions are w x y z, expected x y z w": _w_last,
     "their axes are x ahead, y left, z up, expected x right, y down, z forward": lambda pose: pose @ BODY_FROM_CAMERA,
 }
