@@ -7,9 +7,9 @@ import time
 from pathlib import Path
 
 import torch
+
 from pomona.detect.training.cache import cached
 from pomona.detect.training.loop import Plan, Source, train
-
 from training.sources import TEST_ROWS, VALIDATION_ROWS, photographs, rendered
 
 RENDERED_SHARE = 0.35
@@ -39,7 +39,9 @@ def main() -> None:
 def _sources(data: Path, recordings: list[Path], cache: Path) -> list[Source]:
     held_out = TEST_ROWS + VALIDATION_ROWS
     apples = [
-        labelled for kind in ("apple_76", "apple_81") for labelled in photographs(data / "orchard_photos", kind, but=held_out)
+        labelled
+        for kind in ("apple_76", "apple_81")
+        for labelled in photographs(data / "orchard_photos", kind, but=held_out)
     ]
     sources = [Source(cached(apples, cache), 1.0)]
     if recordings:

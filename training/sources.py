@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
 from pomona.detect.training.labels import Labelled
 
 __all__ = ["TEST_ROWS", "VALIDATION_ROWS", "photographs", "rendered"]
@@ -28,7 +29,9 @@ LEAST_PX = 5.0
 """The same for smaller ones."""
 
 
-def photographs(folder: Path, kind: str, rows: tuple[int, ...] | None = None, but: tuple[int, ...] = ()) -> list[Labelled]:
+def photographs(
+    folder: Path, kind: str, rows: tuple[int, ...] | None = None, but: tuple[int, ...] = ()
+) -> list[Labelled]:
     """Read the pictures of a kind, `apple_76`, `apple_81` or `pear`, in some rows, None for all, but not in others."""
     boxes = defaultdict(list)
     with (folder / "boxes.csv").open(encoding="utf-8", newline="") as file:

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypedDict, Unpack
 from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MaskDetector
+from pomona.detect.shipped import SHIPPED, model_named
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
 
@@ -66,22 +67,25 @@ def open_detector(
     detections : Path or None
         File of boxes, or folder of masks.
     model : Path or None
-        ONNX file.
+        ONNX file, or the name of a shipped one.
     recording : Recording
-        Where neither is given, its folder may have a `detections.csv`, or else masks in `ids/`.
+        Where neither is given, its folder may have a `detections.csv`, or else masks in `ids/`; where it has neither,
+        the shipped model looks.
     **settings
         Of the model.
 
     Raises
     ------
     PomonaError
-        When both are given or none is there, a setting of a model comes without one, or the file is wrong.
+        When both are given, a setting of a model comes without one, or the file is wrong.
     """
     given = {name: value for name, value in settings.items() if value is not None}
-    if model is None:
+    boxes = _boxes_of(recording) if detections is None and model is None else detections
+    if boxes is not None and model is None:
         if given:
-            raise PomonaError(f"{', '.join(given)}: found without a model, expected --model FILE with it")
-        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.numbers)
+            found = f"{', '.join(given)}: found without a model"
+            raise PomonaError(f"{found}, expected --model FILE with it, or --model {SHIPPED}: there is {boxes}")
+        return open_detections(boxes, recording.calibration, recording.numbers)
     if detections is not None:
         raise PomonaError(f"found --detections {detections} and --model {model}, expected one of them")
     pictures = recording.description()["pictures"]
@@ -90,15 +94,9 @@ def open_detector(
         raise PomonaError(f"{recording.path}: found {found} pictures, expected left ones: a model looks at them")
     from pomona.detect.onnx import OnnxDetector
 
-    return OnnxDetector.open(model, **given)  # type: ignore[arg-type] # the same names and types, None left out
+    return OnnxDetector.open(model_named(model or SHIPPED), **given)  # type: ignore[arg-type] # the same names and types, None left out
 
 
-def _boxes_of(detections: Path | None, recording: Recording) -> Path:
-    if detections is not None:
-        return detections
-    places = [recording.path / name for name in IN_FOLDER]
-    for place in places:
-        if place.exists():
-            return place
-    expected = "boxes there, masks in ids/, or --detections FILE or --model FILE"
-    raise PomonaError(f"{places[0]}: not found, expected {expected}")
+def _boxes_of(recording: Recording) -> Path | None:
+    places = (recording.path / name for name in IN_FOLDER)
+    return next((place for place in places if place.exists()), None)

@@ -22,6 +22,9 @@ SIZE_PX = 16.0
 FARTHEST = 4.0
 """Logs of distances are cut there: e^4 times 16 px is wider than the input."""
 
+MOST = 1000
+"""Boxes of one picture: the best, where a least score near 0 would take every cell for one."""
+
 
 @dataclass(frozen=True)
 class CentreDecoder:
@@ -49,6 +52,8 @@ class CentreDecoder:
         # Beyond 60 float64 has no more to say.
         scores = 1 / (1 + np.exp(-np.clip(cells[0], -60, 60)))
         rows, columns = np.nonzero((scores >= selection.min_score) & (scores >= _highest_around(scores)))
+        best = np.argsort(-scores[rows, columns], kind="stable")[:MOST]
+        rows, columns = rows[best], columns[best]
         edges_px = SIZE_PX * np.exp(np.clip(cells[1:5, rows, columns].T, -FARTHEST, FARTHEST))
         middles_px = (np.stack([columns, rows], axis=1) + 0.5) * self.stride
         boxes_px = np.hstack([middles_px - edges_px[:, :2], middles_px + edges_px[:, 2:]])

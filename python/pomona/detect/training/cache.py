@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
+from pomona.detect.picture_file import read_picture
 from pomona.detect.training.labels import Labelled
-from pomona.detect.training.picture_file import read_picture
 
 __all__ = ["Sample", "cached"]
 

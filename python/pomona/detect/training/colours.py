@@ -52,7 +52,7 @@ def _shadowed(crop: NDArray[np.uint8], draw: np.random.Generator) -> NDArray[Any
     angle = draw.uniform(0, 2 * np.pi)
     across = np.cos(angle) * np.arange(width)[None] + np.sin(angle) * np.arange(height)[:, None]
     lit = 1 / (1 + np.exp(-(across - draw.choice(across.ravel())) / draw.uniform(2, 30)))
-    light = np.float32(1 - draw.uniform(0.3, 0.7) * lit)
+    light = np.asarray(1 - draw.uniform(0.3, 0.7) * lit, np.float32)
     return (crop * light[..., None]).astype(np.uint8)
 
 
@@ -71,7 +71,7 @@ def _blurred(crop: NDArray[np.uint8], draw: np.random.Generator) -> NDArray[Any]
 def _noisy(crop: NDArray[np.uint8], draw: np.random.Generator) -> NDArray[Any]:
     noise = np.empty(crop.shape, np.int16)
     cv2.setRNGSeed(int(draw.integers(1 << 31)))
-    cv2.randn(noise, (0.0, 0.0, 0.0), (draw.uniform(2, 12),) * 3)
+    cv2.randn(noise, np.zeros(3), np.full(3, draw.uniform(2, 12)))
     return cv2.add(crop, noise, dtype=cv2.CV_8U)
 
 

@@ -98,7 +98,7 @@ def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Ge
     pixels = _resized(sample.pixels[top : top + seen, left : left + seen], side)
     labelled, by = sample.labelled, side / seen
     boxes_px, ignored_px = (
-        (boxes - np.float32([left, top, left, top])) * np.float32(by)
+        (boxes - np.array([left, top, left, top], np.float32)) * np.float32(by)
         for boxes in (labelled.boxes_px, labelled.ignored_px)
     )
     for axis, chance in ((0, 0.5), (1, 0.1)):
@@ -149,7 +149,7 @@ def _cut(
     corner: tuple[int, int],
 ) -> Crop:
     """Cut labels at the edge of their square, and move them to its corner of the crop."""
-    side, move = len(pixels), np.float32([*corner, *corner])
+    side, move = len(pixels), np.array([*corner, *corner], np.float32)
     inside_px = np.clip(boxes_px, 0, side)
     sides, left_over = _sides(inside_px), (_sides(inside_px) / np.maximum(_sides(boxes_px), 1e-3)) ** 2
     wanted = (left_over >= LEAST_INSIDE) & (sides >= LEAST_PX)

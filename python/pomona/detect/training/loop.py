@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
 from pomona.detect.training.crops import Crop, drawn_crop
+from pomona.detect.training.fruit_network import FruitNetwork
 from pomona.detect.training.loss import loss_of
-from pomona.detect.training.network import FruitNetwork
 from pomona.detect.training.targets import Targets, targets_of
 
-__all__ = ["Plan", "Source", "train"]
+__all__ = ["Plan", "Source", "mean_of", "train"]
 
 SAVED_EVERY = 100
 """Batches between two checkpoints, some minutes: that is what an interruption costs."""
@@ -173,7 +173,7 @@ def _batch(sources: Sequence[Source], plan: Plan, number: int) -> tuple[torch.Te
 
 def _as_input(crops: Sequence[Crop]) -> NDArray[np.float32]:
     stacked = np.stack([crop.pixels[:, :, ::-1] for crop in crops]).transpose(0, 3, 1, 2)
-    return stacked.astype(np.float32) / 255
+    return stacked.astype(np.float32) / np.float32(255)
 
 
 def _drawn(sources: Sequence[Source], draw: np.random.Generator) -> list[Sample]:
@@ -201,3 +201,10 @@ def _restore(state: _State, checkpoint: Path) -> None:
     state.mean.load_state_dict(content["mean"])
     state.optimiser.load_state_dict(content["optimiser"])
     state.done, state.loss = content["done"], content["loss"]
+
+
+def mean_of(checkpoint: Path) -> tuple[FruitNetwork, int]:
+    """Give the mean network of a checkpoint, and how many batches it has seen."""
+    state = _begun(FruitNetwork(), Plan())
+    _restore(state, checkpoint)
+    return state.mean.eval(), state.done

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch.nn import functional
 
-from pomona.detect.training.network import SIZE_PX
+from pomona.detect.training.fruit_network import SIZE_PX
 
 __all__ = ["edges_of", "loss_of"]
 

@@ -18,7 +18,7 @@ SPREAD = 0.09
 """Standard deviation of the heat around a centre, as a part of the box's side: at a quarter of the side it is 2 %."""
 
 LEAST_SPREAD = 0.55
-"""The same in cells, at least: the neighbours of a centre get some heat, or a shift by half a cell would be an error."""
+"""The same in cells, at least: neighbours of a centre get some heat, or a shift by half a cell would be an error."""
 
 REGRESSED = 0.25
 """Cells of so much heat say where the box is."""
