@@ -27,11 +27,15 @@ class Found:
         Of the fruits.
     ignored_px : (M, 4) float
         What lies there is neither right nor wrong.
+    smallest_px : float
+        Smaller boxes, by the geometric mean of their sides, may be fruits of rows behind that nobody labelled: neither
+        right nor wrong too.
     """
 
     detections: Detections
     boxes_px: NDArray[np.floating]
     ignored_px: NDArray[np.floating]
+    smallest_px: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +90,18 @@ def judged(pictures: Iterable[Found]) -> Judged:
     scores, right, n_fruits = [np.empty(0)], [np.empty(0, bool)], 0
     for found in pictures:
         hits = _hits(found)
-        free = ~hits & (_share_in(found.detections.boxes_px, found.ignored_px) >= SAME_IOU)
+        free = ~hits & _is_open(found)
         scores.append(found.detections.scores[~free])
         right.append(hits[~free])
         n_fruits += len(found.boxes_px)
     all_scores, all_right = np.concatenate(scores), np.concatenate(right)
     order = np.argsort(-all_scores, kind="stable")
     return Judged(all_scores[order], all_right[order], n_fruits)
+
+
+def _is_open(found: Found) -> NDArray[np.bool_]:
+    boxes_px = found.detections.boxes_px
+    return (_share_in(boxes_px, found.ignored_px) >= SAME_IOU) | (_areas(boxes_px) < found.smallest_px**2)
 
 
 def _hits(found: Found) -> NDArray[np.bool_]:

@@ -32,12 +32,6 @@ LEAST_INSIDE = 0.4
 LEAST_PX = 5.0
 """The same for fruits that are smaller."""
 
-USUAL_PX = 25.0
-"""Side of a small fruit in a picture without any."""
-
-SMALLEST = 0.6
-"""Where small fruits have no boxes: what is smaller than this times the smallest labelled fruit may be one of them."""
-
 
 @dataclass(frozen=True, eq=False)
 class Crop:
@@ -105,7 +99,7 @@ def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Ge
         if draw.random() < chance:
             pixels = np.flip(pixels, 1 - axis)
             boxes_px, ignored_px = (_turned_over(boxes, axis, side) for boxes in (boxes_px, ignored_px))
-    smallest_px = 0.0 if labelled.complete else SMALLEST * by * _smallest(labelled.boxes_px)
+    smallest_px = by * labelled.smallest_px
     return _cut(pixels, boxes_px, labelled.visible, ignored_px, smallest_px, corner)
 
 
@@ -129,11 +123,6 @@ def _turned_over(boxes_px: NDArray[np.float32], axis: int, side: int) -> NDArray
     turned = boxes_px.copy()
     turned[:, axis], turned[:, axis + 2] = side - boxes_px[:, axis + 2], side - boxes_px[:, axis]
     return turned
-
-
-def _smallest(boxes_px: NDArray[np.float32]) -> float:
-    """Side of a small labelled fruit of a picture; the very smallest may be a sliver between leaves."""
-    return float(np.quantile(_sides(boxes_px), 0.1)) if len(boxes_px) else USUAL_PX
 
 
 def _sides(boxes_px: NDArray[np.float32]) -> NDArray[np.float32]:

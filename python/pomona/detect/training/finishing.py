@@ -42,5 +42,6 @@ def finished(network: FruitNetwork, validation: Sequence[Labelled]) -> tuple[Fru
 def judged_on(detector: OnnxDetector, pictures: Iterable[Labelled]) -> Judged:
     """Judge a detector on labelled pictures."""
     return judged(
-        Found(detector.detect(read_picture(each.picture)), each.boxes_px, each.ignored_px) for each in pictures
+        Found(detector.detect(read_picture(each.picture)), each.boxes_px, each.ignored_px, each.smallest_px)
+        for each in pictures
     )

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 __all__ = ["Labelled"]
 
+USUAL_PX = 25.0
+"""Side of a small fruit in a picture without any."""
+
+SMALLEST = 0.6
+"""Where small fruits have no boxes: what is smaller than this times a small labelled fruit may be one of them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
@@ -34,3 +40,14 @@ class Labelled:
     visible: NDArray[np.float32]
     ignored_px: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), np.float32))
     complete: bool = False
+
+    @property
+    def smallest_px(self) -> float:
+        """Side, in the geometric mean, from which on a fruit is sure to have a box.
+
+        The smallest labelled fruit may be a sliver between leaves: the smallest tenth does not count.
+        """
+        if self.complete:
+            return 0.0
+        sides_px = np.sqrt(np.prod(self.boxes_px[:, 2:] - self.boxes_px[:, :2], axis=1))
+        return SMALLEST * float(np.quantile(sides_px, 0.1) if len(sides_px) else USUAL_PX)

@@ -12,7 +12,7 @@ __all__ = ["edges_of", "loss_of"]
 SURE = 0.3
 """A cell that is so sure of a fruit, too small to have been labelled, may well be right."""
 
-DOUBTED = 0.1
+DOUBTED = 0.5
 """Weight of the punishment there."""
 
 BOXES = 2.0
