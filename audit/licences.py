@@ -54,7 +54,7 @@ EXCEPTIONS = {
 
 BUNDLED = {
     "av": "BSD-3-Clause; its wheels carry FFmpeg with x264 and x265 under the GPL, loaded where a user installs "
-    "pomona[video], and no part of what pomona ships",
+    "pomona, and no part of what pomona ships",
     "numpy": "its wheels carry OpenBLAS, BSD-3-Clause, and libgfortran, GPL with the runtime exception",
     "opencv-python-headless": "Apache-2.0; its wheels carry FFmpeg under the LGPL, as libraries of their own",
     "pillow": "MIT-CMU; its wheels carry codecs of pictures under permissive licences",

@@ -10,6 +10,10 @@ from pathlib import Path
 MOST_EXTENSION_BYTES = 8_000_000
 """Of the compiled core: some 3 MB without debug symbols, 27 MB with them."""
 
+MODELS = "pomona/detect/model/"
+MOST_MODEL_BYTES = 6_000_000
+"""Of the shipped detector, in 32 and in 8 bits."""
+
 NEEDED = ("Summary", "Author", "License-Expression", "Project-URL", "Keywords", "Classifier", "Requires-Python")
 """Fields of the metadata by which people find out what it is."""
 
@@ -46,8 +50,17 @@ def _of_metadata(text: str) -> list[str]:
 
 
 def _of_files(sizes: dict[str, int]) -> list[str]:
-    needed = ("pomona/py.typed", "pomona/_core.pyi")
-    return [f"found no {name}" for name in needed if name not in sizes]
+    needed = (
+        "pomona/py.typed",
+        "pomona/_core.pyi",
+        *(f"{MODELS}{name}" for name in ("fruits.onnx", "fruits_int8.onnx", "CARD.md")),
+    )
+    missing = [f"found no {name}" for name in needed if name not in sizes]
+    models = sum(size for name, size in sizes.items() if name.startswith(MODELS))
+    large = (
+        [f"{MODELS}: found {models} bytes, expected at most {MOST_MODEL_BYTES}"] if models > MOST_MODEL_BYTES else []
+    )
+    return missing + large
 
 
 def main(folder: Path) -> None:

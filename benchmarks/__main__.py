@@ -10,6 +10,7 @@ NAMES = (
     "robustness",
     "cells",
     "units",
+    "detector",
     "stereo",
     "lifting",
     "field",

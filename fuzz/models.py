@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzz.bundle import packed_folder, unpacked
+from fuzz.bundle import packed, packed_folder, unpacked
 from pomona.detect.onnx import OnnxDetector
+from pomona.detect.shipped import SHIPPED, model_named
 from pomona.recording import Calibration
 from pomona.stereo import OnnxStereo
 
@@ -17,7 +18,7 @@ ULTRALYTICS = {"names": "{0: 'apple', 1: 'pear'}", "task": "detect", "imgsz": "[
 
 
 def seeds() -> list[bytes]:
-    """Small models of the families, and a network that matches blocks."""
+    """The shipped model, small models of the families, and a network that matches blocks."""
     from onnx_maker import end_to_end, rfdetr, rtdetr, yolov5, yolov8, yolox
     from test_stereo_onnx import block_matcher
 
@@ -34,7 +35,7 @@ def seeds() -> list[bytes]:
         "rfdetr": lambda path: rfdetr(path, 64, 64),
         "stereo": block_matcher,
     }
-    found = []
+    found = [packed("shipped", {"model.onnx": model_named(SHIPPED).read_bytes()})]
     for kind, make in makers.items():
         with tempfile.TemporaryDirectory() as place:
             make(Path(place) / ("stereo.onnx" if kind == "stereo" else "model.onnx"))

@@ -9,6 +9,7 @@ import numpy as np
 from fuzz.bundle import packed, unpacked
 from pomona import FruitCloud
 from pomona.detect.from_file import FileDetector
+from pomona.detect.picture_boxes import boxes_within, read_boxes
 from pomona.pairs import read_pairs
 from pomona.recording import Calibration
 from pomona.settings import Settings
@@ -19,6 +20,7 @@ CLOUD = FruitCloud(np.eye(3), ids=("a", "b", "c"))
 TOML = b'[match]\nmethod = "verified"\nup = [[0, 0, 1], [0.0, -1, 0]]\nnoise_m = 0.01\n[tracking]\nmin_views = 3\n'
 BOXES = b"frame,xmin,ymin,xmax,ymax,score,id\n0,10,10,20.5,30,0.9,a\n1,11,10,21,30,0.8,a\n1,50,10,61,30,0.5,b\n"
 MOT = b"1,1,10,10,20,20,0.9,-1,-1,-1\n2,1,11,10,20,20,0.9,-1,-1,-1\n"
+NAMED = b"image,xmin,ymin,xmax,ymax,score\na.png,10,10,20.5,30,0.9\nb.png,-1,10,21,3e1,0.8\n"
 PAIRS = b"query,map,probability,distance_m\na,b,0.9,0.01\nb,c,0.8,0.02\n"
 
 
@@ -38,7 +40,7 @@ def seeds() -> list[bytes]:
     answer = {"status": "Found", "matches": [{"query": "a", "map": "b", "probability": 0.9}]}
     boxes = [packed("boxes", {"boxes": each}) for each in (BOXES, MOT, *_dumped(coco, results))]
     pairs = [packed("pairs", {"pairs": each}) for each in (PAIRS, *_dumped(answer))]
-    return [packed("settings", {"settings.toml": TOML}), *boxes, *pairs]
+    return [packed("settings", {"settings.toml": TOML}), packed("named", {"named": NAMED}), *boxes, *pairs]
 
 
 def _dumped(*contents: object) -> list[bytes]:
@@ -52,5 +54,8 @@ def target(content: bytes) -> None:
             Settings.load(folder / "settings.toml", {}).as_toml()
         if (folder / "boxes").is_file():
             FileDetector.read(folder / "boxes", CAMERA, (0, 1, 2))
+        if (folder / "named").is_file():
+            for rows in read_boxes(folder / "named", ("a.png", "b.png")).values():
+                boxes_within(folder / "named", rows, (640, 480))
         if (folder / "pairs").is_file():
             read_pairs(folder / "pairs", CLOUD, CLOUD)

@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from pomona import PomonaError
 from pomona.detect.from_file import FileDetector
 from pomona.detect.onnx import OnnxDetector
 from pomona.detect.opening import open_detector
+from pomona.detect.shipped import SHIPPED, model_named
 from pomona.recording import open_recording
 from recording_maker import make_recording
 
@@ -65,12 +67,22 @@ def test_what_does_not_go_together_is_told(row):
     with pytest.raises(PomonaError, match="min_score: found without a model, expected --model FILE"):
         open_detector(None, None, recording, min_score=0.5)
     (row / "detections.csv").unlink()
-    with pytest.raises(
-        PomonaError,
-        match=r"detections\.csv: not found, expected boxes there, masks in ids/, or --detections FILE or --model FILE",
-    ):
-        open_detector(None, None, recording)
     (row / "left" / "0000.png").unlink()
     (row / "left").rmdir()
     with pytest.raises(PomonaError, match="found depth pictures, expected left ones"):
         open_detector(None, row / "apples.onnx", open_recording(row))
+    with pytest.raises(PomonaError, match="found depth pictures, expected left ones"):
+        open_detector(None, None, open_recording(row))
+
+
+def test_the_shipped_model_looks_where_there_are_no_boxes(row):
+    recording = open_recording(row)
+    named = open_detector(None, Path("shipped"), recording)
+    (row / "detections.csv").unlink()
+    found = open_detector(None, None, recording, min_score=0.5)
+    assert isinstance(found, OnnxDetector)
+    assert isinstance(named, OnnxDetector)
+    assert found.path == named.path == model_named(SHIPPED)
+    assert found.signature.family == "pomona"
+    assert found.selection.min_score == 0.5
+    assert 0 < named.selection.min_score < 1

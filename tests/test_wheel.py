@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from audit.wheel import MOST_EXTENSION_BYTES, NEEDED, faults
+from audit.wheel import MODELS, MOST_EXTENSION_BYTES, MOST_MODEL_BYTES, NEEDED, faults
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -15,6 +15,7 @@ GOOD = {
     "pomona/_core.abi3.so": b"\x7fELF",
     "pomona/_core.pyi": b"",
     "pomona/py.typed": b"",
+    **{f"{MODELS}{name}": b"" for name in ("fruits.onnx", "fruits_int8.onnx", "CARD.md")},
     "pomona-0.1.0.dist-info/METADATA": "".join(f"{name}: something\n" for name in NEEDED).encode(),
 }
 
@@ -36,6 +37,8 @@ def test_a_good_wheel_has_no_faults(tmp_path: Path) -> None:
     [
         ({"pomona/_core.abi3.so": bytes(MOST_EXTENSION_BYTES + 1)}, "debug symbols are in it"),
         ({"pomona/_core.abi3.so": None}, "found no compiled core"),
+        ({f"{MODELS}fruits.onnx": None}, "found no pomona/detect/model/fruits.onnx"),
+        ({f"{MODELS}fruits.onnx": bytes(MOST_MODEL_BYTES + 1)}, "expected at most 6000000"),
         ({"pomona/py.typed": None}, "found no pomona/py.typed"),
         ({"pomona-0.1.0.dist-info/METADATA": b"Author: us\n"}, "METADATA: found no Classifier"),
         ({"pomona/_core.abi3.so": f"\0{Path.home()}/.cargo/a.rs".encode()}, "names a folder of who built it"),

@@ -11,12 +11,16 @@ from pathlib import Path
 from typing import Literal
 
 __all__ = [
+    "BOXES",
+    "BOXES_DRAWN",
     "DEMO",
     "DEMO_DATES",
     "DEMO_RECORDING",
     "DEMO_SEED",
+    "DRAWN_BOXES",
     "EXPORTS",
     "KEPT",
+    "MODEL",
     "PAIRS",
     "PICTURE",
     "RENDERED",
@@ -40,8 +44,14 @@ SQLITE = b"SQLite format 3\0"
 VIDEO_MARK = "boxes drawn by pomona"
 """Comment in the videos of `--preview`, by which they are told from recordings."""
 
+BOXES_DRAWN = ".boxes.png"
+"""How the names of pictures end in which boxes were drawn, by which they are told from photographs."""
+
 PLY_MARK = "comment fruits written by pomona, metres"
 """Line in the header of the PLY files that are written here."""
+
+MODEL_MARK = b"pomona_training"
+"""Key in the metadata of the models that are trained here."""
 
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
@@ -164,6 +174,15 @@ def _is_video(path: Path) -> bool:
     return _head(path)[4:8] == b"ftyp" and VIDEO_MARK.encode() in _tail(path)
 
 
+def _is_model(path: Path) -> bool:
+    """Tell a model that was trained here from one of others: ONNX writes its metadata at the end."""
+    return MODEL_MARK in _tail(path)
+
+
+def _has_drawn_boxes(folder: Path) -> bool:
+    return all(path.name.endswith(BOXES_DRAWN) for path in folder.iterdir())
+
+
 def _has_note(folder: Path) -> bool:
     return (folder / "made_from.json").is_file() or not any(folder.iterdir())
 
@@ -220,6 +239,9 @@ def _is_truth(path: Path) -> bool:
 
 SCANNED = Like("what a scan writes", _is_scanned)
 PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "distance_m"))
+BOXES = Like("a table of boxes", _has_columns("image", "xmin", "ymin", "xmax", "ymax", "score"))
+MODEL = Like("a model that was trained here", _is_model)
+DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 PICTURE = Like("a plot", _is_picture)
 VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)

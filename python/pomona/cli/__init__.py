@@ -7,7 +7,7 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import config, demo, evaluate, export, import_, info, map, match, scan, synth
+from pomona.cli import config, demo, detect, evaluate, export, import_, info, map, match, scan, synth, train
 from pomona.cli.terminal import say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
@@ -41,6 +41,8 @@ def _pomona(
 app.command()(demo.demo)
 app.add_typer(import_.app, name="import")
 app.command()(info.info)
+app.command()(detect.detect)
+app.command()(train.train)
 app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")

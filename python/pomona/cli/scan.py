@@ -34,9 +34,13 @@ def scan(
     detections: Path | None = typer.Option(
         None,
         metavar="FILE",
-        help="Boxes: CSV, MOTChallenge, COCO json, a folder of masks; else detections.csv or ids/ in RECORDING.",
+        help="Boxes: CSV, MOTChallenge, COCO json, folder of masks; else detections.csv or ids/ there, else --model.",
     ),
-    model: Path | None = typer.Option(None, metavar="ONNX", help="Detector that finds the boxes, instead of a file."),
+    model: Path | None = typer.Option(
+        None,
+        metavar="ONNX",
+        help="Detector instead of boxes: a file, or shipped, which looks where there are no boxes.",
+    ),
     family: str | None = typer.Option(None, help="Family of the model, where the file does not say it."),
     min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least confidence of the model's boxes."),
     classes: str | None = typer.Option(None, metavar="NAME,...", help="Classes of the model that are fruits."),

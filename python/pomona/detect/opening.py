@@ -10,9 +10,10 @@ from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MaskDetector
 from pomona.detect.own import OwnDetector
+from pomona.detect.shipped import SHIPPED, model_named
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
-from pomona.recording.boxes_beside import BESIDE, boxes_beside
+from pomona.recording.boxes_beside import boxes_beside
 
 __all__ = ["FoundBoxes", "ModelSettings", "open_detections", "open_detector"]
 
@@ -65,24 +66,27 @@ def open_detector(
     detections : Path, Detector or None
         File of boxes, folder of masks, or whatever gives boxes when it is called with a frame.
     model : Path or None
-        ONNX file.
+        ONNX file, or the name of a shipped one.
     recording : Recording
-        Where neither is given, its folder may have a `detections.csv`, or else masks in `ids/`.
+        Where neither is given, its folder may have a `detections.csv`, or else masks in `ids/`; where it has neither,
+        the shipped model looks.
     **settings
         Of the model.
 
     Raises
     ------
     PomonaError
-        When both are given or none is there, a setting of a model comes without one, or the file is wrong.
+        When both are given, a setting of a model comes without one, or the file is wrong.
     """
     given = {name: value for name, value in settings.items() if value is not None}
-    if model is None:
+    boxes = boxes_beside(recording.path) if detections is None and model is None else detections
+    if boxes is not None and model is None:
         if given:
-            raise PomonaError(f"{', '.join(given)}: found without a model, expected --model FILE with it")
-        if detections is not None and not isinstance(detections, Path):
-            return detections if _says_what_it_is(detections) else OwnDetector(detections)
-        return open_detections(_boxes_of(detections, recording), recording.calibration, recording.recorded_numbers)
+            found = f"{', '.join(given)}: found without a model"
+            raise PomonaError(f"{found}, expected --model FILE with it, or --model {SHIPPED}: there is {boxes}")
+        if not isinstance(boxes, Path):
+            return boxes if _says_what_it_is(boxes) else OwnDetector(boxes)
+        return open_detections(boxes, recording.calibration, recording.recorded_numbers)
     if detections is not None:
         raise PomonaError(f"found --detections {detections} and --model {model}, expected one of them")
     pictures = recording.description()["pictures"]
@@ -91,18 +95,8 @@ def open_detector(
         raise PomonaError(f"{recording.path}: found {found} pictures, expected left ones: a model looks at them")
     from pomona.detect.onnx import OnnxDetector
 
-    return OnnxDetector.open(model, **given)  # type: ignore[arg-type] # the same names and types, None left out
+    return OnnxDetector.open(model_named(model or SHIPPED), **given)  # type: ignore[arg-type] # the same names and types, None left out
 
 
 def _says_what_it_is(detector: Detector) -> TypeGuard[FoundBoxes]:
     return all(hasattr(detector, name) for name in ("inputs", "configuration", "description"))
-
-
-def _boxes_of(detections: Path | None, recording: Recording) -> Path:
-    if detections is not None:
-        return detections
-    beside = boxes_beside(recording.path)
-    if beside is not None:
-        return beside
-    expected = "boxes there, masks in ids/, or --detections FILE or --model FILE"
-    raise PomonaError(f"{recording.path / BESIDE[0]}: not found, expected {expected}")

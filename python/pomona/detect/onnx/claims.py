@@ -15,7 +15,10 @@ from pomona.reading import number_in, parsed_json, shown
 __all__ = ["OWN_KEY", "Claim", "claim_of"]
 
 OWN_KEY = "pomona_detector"
-"""Our own key: JSON with `version` 1, `family`, and where they differ from the family's `names` and `preparation`."""
+"""Our own key: JSON with `version` 1, `family`, and where they differ from the family's `names`, `preparation`
+and `min_score`."""
+
+OWN_FIELDS = "version, family, names, preparation, min_score"
 
 RFDETR_KEY = "rfdetr_inference"
 MISUNDERSTOOD = (
@@ -45,6 +48,8 @@ class Claim:
         Names of outputs by what they are, where they are not the family's.
     size_px : (int, int) or None
         Width and height it was made for.
+    min_score : float or None
+        The least score that makes counts right.
     """
 
     source: str
@@ -53,6 +58,7 @@ class Claim:
     preparation: dict[str, Any] = field(default_factory=dict)
     outputs: dict[str, str] = field(default_factory=dict)
     size_px: tuple[int, int] | None = None
+    min_score: float | None = None
 
 
 def claim_of(path: Path, metadata: Mapping[str, str]) -> Claim:
@@ -80,10 +86,10 @@ def claim_of(path: Path, metadata: Mapping[str, str]) -> Claim:
 
 def _own(where: str, metadata: Mapping[str, str]) -> Claim:
     content = parsed_json(where, metadata[OWN_KEY], "what we write")
-    unknown = content.keys() - {"version", "family", "names", "preparation"}
+    unknown = content.keys() - {"version", "family", "names", "preparation", "min_score"}
     unknown |= content.get("preparation", {}).keys() - {known.name for known in fields(Preparation)}
     if unknown:
-        raise PomonaError(f"{where}: found {', '.join(sorted(unknown))}, expected version, family, names, preparation")
+        raise PomonaError(f"{where}: found {', '.join(sorted(unknown))}, expected {OWN_FIELDS}")
     if content["version"] != 1:
         raise PomonaError(f"{where}: version: found {shown(content['version'])}, expected 1")
     names = content.get("names")
@@ -92,11 +98,21 @@ def _own(where: str, metadata: Mapping[str, str]) -> Claim:
         family=str(content["family"]),
         names=None if names is None else dict(enumerate(map(str, names))),
         preparation=_checked_preparation(where, content.get("preparation", {})),
+        min_score=_checked_score(where, content),
     )
 
 
+def _checked_score(where: str, content: Mapping[str, Any]) -> float | None:
+    if "min_score" not in content:
+        return None
+    score = number_in(where, "min_score", content["min_score"])
+    if not 0 <= score <= 1:
+        raise PomonaError(f"{where}: min_score: found {score:g}, expected 0 to 1")
+    return score
+
+
 def _checked_preparation(where: str, given: dict[str, Any]) -> dict[str, Any]:
-    accepted = {"fit": ("letterbox", "corner", "stretch"), "channels": ("RGB", "BGR")}
+    accepted = {"fit": ("letterbox", "corner", "inside", "stretch"), "channels": ("RGB", "BGR")}
     for name, values in {**accepted, "resize": ("linear", "float", "smooth")}.items():
         if name in given and given[name] not in values:
             raise PomonaError(f"{where}: {name}: found {shown(given[name])}, expected one of {', '.join(values)}")

@@ -51,7 +51,7 @@ class OnnxDetector:
         path: str | Path,
         *,
         family: str | None = None,
-        min_score: float = MIN_SCORE,
+        min_score: float | None = None,
         iou: float = IOU,
         classes: tuple[str | int, ...] | None = None,
         class_agnostic: bool = True,
@@ -67,8 +67,8 @@ class OnnxDetector:
             The ONNX file.
         family : str, optional
             What it is, where it does not say so itself: a key of `FAMILIES`.
-        min_score : float
-            Least confidence of a box.
+        min_score : float, optional
+            Least confidence of a box; else what the file asks for, else `MIN_SCORE`.
         iou : float
             Boxes that overlap more are one fruit, in families that give one fruit many times.
         classes : tuple of str or int, optional
@@ -89,12 +89,13 @@ class OnnxDetector:
             When the file cannot be run, is of no known family, or a setting is wrong.
         """
         for name, value in (("min_score", min_score), ("iou", iou)):
-            if not 0 <= value <= 1:
+            if value is not None and not 0 <= value <= 1:
                 raise PomonaError(f"{name}: found {value}, expected 0 to 1")
         tiling = read_tiling(tiles)
         network = Network.open(Path(path), threads)
         signature = identify(network, family, size_px)
-        selection = signature.selection(str(path), min_score, classes)
+        asked = MIN_SCORE if signature.min_score is None else signature.min_score
+        selection = signature.selection(str(path), asked if min_score is None else min_score, classes)
         return cls(network, signature, selection, iou, class_agnostic, tiling)
 
     @property
@@ -126,7 +127,7 @@ class OnnxDetector:
     def description(self) -> str:
         """Say in one line what the model was taken for."""
         signature = self.signature
-        size = "x".join(map(str, signature.size_px))
+        size = "x".join(map(str, signature.size_px)) + (" at most" if signature.multiple_px else "")
         title = f"{signature.family} ({FAMILIES[signature.family].title}) {signature.grounds}"
         return f"{self.path}: {title}; input {size} {signature.preparation}; {self._classes()}"
 
@@ -174,7 +175,8 @@ class OnnxDetector:
 
     def _in_tile(self, picture: NDArray[np.uint8], tile: Tile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Boxes and scores of one tile, in the pixels of the picture."""
-        part, size_px = picture[tile.ymin : tile.ymax, tile.xmin : tile.xmax], self.signature.size_px
+        part = picture[tile.ymin : tile.ymax, tile.xmin : tile.xmax]
+        size_px = self.signature.input_px((part.shape[1], part.shape[0]))
         given, placement = prepare(part, size_px, self.signature.preparation)
         outputs = self.network.run(given)
         # A network may give NaN and infinity; boxes of such numbers are left out at the end.
@@ -186,7 +188,7 @@ class OnnxDetector:
         return boxes_px, candidates.scores
 
     def _margin_px(self, tile: Tile) -> float:
-        width, height = self.signature.size_px
+        width, height = self.signature.input_px((tile.xmax - tile.xmin, tile.ymax - tile.ymin))
         return CUT_PX * max((tile.xmax - tile.xmin) / width, (tile.ymax - tile.ymin) / height)
 
 

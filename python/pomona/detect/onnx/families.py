@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from pomona.detect.onnx.candidates import Candidates, Selection
+from pomona.detect.onnx.centres import CHANNELS, CentreDecoder
 from pomona.detect.onnx.claims import Claim
 from pomona.detect.onnx.detr import ChosenDecoder, LogitDecoder, NormalisedDecoder
 from pomona.detect.onnx.network import Outputs
@@ -19,6 +20,9 @@ __all__ = ["FAMILIES", "Decoder", "Family", "Layout"]
 
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_STD = (0.229, 0.224, 0.225)
+FRUITS = "fruits"
+"""Output of our own network."""
+
 COCO_SLOTS = 91
 """Logits of models trained on COCO's own numbers of categories, where the last stands for a thing."""
 
@@ -85,6 +89,9 @@ class Family:
         Whether it gives one thing many times, so that overlapping boxes must be suppressed.
     decoder : callable
         Gives the decoder for a layout, None where the layout is another.
+    multiple_px : int or None
+        A network that takes any size is given the picture as it is, its sides filled up to multiples of this; None
+        where it wants the size that it was trained at.
     """
 
     title: str
@@ -92,6 +99,7 @@ class Family:
     preparation: Preparation
     overlapping: bool
     decoder: Callable[[Layout], Decoder | None]
+    multiple_px: int | None = None
 
 
 def _dense(layout: Layout, per_cell: int, *, objectness: bool, transposed: bool) -> DenseDecoder | None:
@@ -171,11 +179,22 @@ def _rfdetr(layout: Layout) -> Decoder | None:
     return LogitDecoder(boxes, logits, masks if masks in outputs else None, layout.size_px, classes)
 
 
+def _pomona(layout: Layout) -> Decoder | None:
+    found = layout.outputs.get(FRUITS)
+    if found is None or found.ndim != 3 or len(found) != CHANNELS or layout.size_px[1] % found.shape[1]:
+        return None
+    stride = layout.size_px[1] // found.shape[1]
+    return CentreDecoder(FRUITS, stride) if found.shape[2] * stride == layout.size_px[0] else None
+
+
 _RTDETR = Preparation(fit="stretch", resize="smooth")
 _RFDETR = Preparation(fit="stretch", resize="float", mean=IMAGENET_MEAN, std=IMAGENET_STD)
 _YOLOX = Preparation(fit="corner", channels="BGR", divide_by=1.0)
 
 FAMILIES = {
+    "pomona": Family(
+        "our own", "fruits (6, cells)", Preparation(fit="inside"), overlapping=True, decoder=_pomona, multiple_px=16
+    ),
     "rfdetr": Family("RF-DETR", "dets (N, 4), labels (N, slots)[, masks]", _RFDETR, False, _rfdetr),
     "rtdetr": Family(
         "RT-DETR, D-FINE, DEIM", "labels, boxes, scores, and an input orig_target_sizes", _RTDETR, False, _rtdetr

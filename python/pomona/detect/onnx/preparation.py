@@ -25,7 +25,8 @@ class Preparation:
     Attributes
     ----------
     fit : str
-        `letterbox`: shape kept, centred between grey bars; `corner`: shape kept, in the top left corner; `stretch`.
+        `letterbox`: shape kept, centred between grey bars; `corner`: shape kept, in the top left corner; `inside`: the
+        same, and never enlarged; `stretch`.
     channels : str
         Their order.
     resize : str
@@ -37,7 +38,7 @@ class Preparation:
         Taken off and divided by, after that; in the order of `channels`.
     """
 
-    fit: Literal["letterbox", "corner", "stretch"] = "letterbox"
+    fit: Literal["letterbox", "corner", "inside", "stretch"] = "letterbox"
     channels: Literal["RGB", "BGR"] = "RGB"
     resize: Literal["linear", "float", "smooth"] = "linear"
     divide_by: float = 255.0
@@ -100,7 +101,8 @@ def _fit(old_px: tuple[int, int], size_px: tuple[int, int], fit: str) -> tuple[t
     if fit == "stretch":
         return size_px, (0, 0)
     ratio = min(size_px[0] / old_px[0], size_px[1] / old_px[1])
-    if fit == "corner":
+    if fit in ("corner", "inside"):
+        ratio = ratio if fit == "corner" else min(ratio, 1.0)
         return (max(int(old_px[0] * ratio), 1), max(int(old_px[1] * ratio), 1)), (0, 0)
     new_px = max(round(old_px[0] * ratio), 1), max(round(old_px[1] * ratio), 1)
     # An odd rest puts the smaller half left and above.

@@ -5,6 +5,7 @@ In this order: what the user says, our own metadata, RF-DETR's, Ultralytics', th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,9 @@ ALIASES = {
 DEFAULT_SIDE_PX = 640
 """Input of a network that takes any size and does not say what it was trained at: what most are trained at."""
 
+LARGEST_SIDE_PX = 1280
+"""Of a picture that is taken as it is; larger ones are shrunk, or cut in tiles: 0.1 s of one core."""
+
 
 @dataclass(frozen=True)
 class Signature:
@@ -53,7 +57,11 @@ class Signature:
     names : mapping or None
         Names of its classes by number.
     size_px : (int, int)
-        Width and height of its input; where any goes, those to use.
+        Width and height of its input; where any goes, those to use, or with `multiple_px` the largest.
+    multiple_px : int or None
+        Where the input is as large as the picture: sides are multiples of this.
+    min_score : float or None
+        Least confidence that the file asks for.
     """
 
     family: str
@@ -62,6 +70,18 @@ class Signature:
     preparation: Preparation
     names: dict[int, str] | None
     size_px: tuple[int, int]
+    multiple_px: int | None = None
+    min_score: float | None = None
+
+    def input_px(self, picture_px: tuple[int, int]) -> tuple[int, int]:
+        """Width and height of the input for a picture of such a size."""
+        if self.multiple_px is None:
+            return self.size_px
+        ratio = min(1.0, self.size_px[0] / picture_px[0], self.size_px[1] / picture_px[1])
+        width, height = (
+            self.multiple_px * math.ceil(max(int(side * ratio), 1) / self.multiple_px) for side in picture_px
+        )
+        return width, height
 
     def selection(self, where: str, min_score: float, classes: tuple[str | int, ...] | None) -> Selection:
         """Turn names or numbers of classes into a selection.
@@ -102,7 +122,7 @@ def identify(network: Network, family: str | None = None, size_px: tuple[int, in
     PomonaError
         When it is of no known family: what was found and what is accepted.
     """
-    claim = claim_of(network.path, network.metadata)
+    claim, wanted_px = claim_of(network.path, network.metadata), size_px
     asked = family or claim.family
     key = None if asked is None else _known(network, asked, claim.source if family is None else "the setting")
     size_px = _size(network, size_px or claim.size_px)
@@ -112,13 +132,16 @@ def identify(network: Network, family: str | None = None, size_px: tuple[int, in
         decoder = candidate.decoder(layout) if key in (None, name) else None
         if decoder is not None:
             changed = {} if family else claim.preparation
+            free = network.size_px is None and wanted_px is None and candidate.multiple_px is not None
             return Signature(
                 family=name,
                 grounds="as was said" if family else f"by {claim.source}",
                 decoder=decoder,
                 preparation=replace(candidate.preparation, **changed),
                 names=claim.names,
-                size_px=size_px,
+                size_px=(LARGEST_SIDE_PX, LARGEST_SIDE_PX) if free else size_px,
+                multiple_px=candidate.multiple_px if free else None,
+                min_score=claim.min_score,
             )
     raise PomonaError(_unknown(network, layout, None if key is None else (key, FAMILIES[key])))
 

@@ -1,0 +1,39 @@
+"""Boxes drawn over their picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.atomic import whole_file
+from pomona.detect.detections import Detections
+from pomona.errors import PomonaError
+from pomona.likes import BOXES_DRAWN
+
+__all__ = ["draw_boxes", "drawn_name"]
+
+COLOUR = (255, 64, 255)
+"""BGR: no fruit and no leaf has it."""
+
+
+def drawn_name(name: str) -> str:
+    """Give the name of the drawn picture of a picture."""
+    return f"{name}{BOXES_DRAWN}"
+
+
+def draw_boxes(path: Path, picture: NDArray[np.uint8], found: Detections) -> None:
+    """Write a picture, (H, W, 3) uint8 BGR, with its boxes and their scores as PNG."""
+    import cv2
+
+    drawn = picture.copy()
+    for corners, score in zip(np.round(found.boxes_px).astype(int).tolist(), found.scores, strict=True):
+        cv2.rectangle(drawn, corners[:2], corners[2:], COLOUR, 1)
+        place = (corners[0], max(corners[1] - 2, 8))
+        cv2.putText(drawn, f"{score:.2f}", place, cv2.FONT_HERSHEY_SIMPLEX, 0.35, COLOUR, 1, cv2.LINE_AA)
+    done, encoded = cv2.imencode(".png", drawn)
+    if not done:
+        raise PomonaError(f"{path}: cannot be encoded as PNG")
+    with whole_file(path) as partial:
+        partial.write_bytes(encoded.tobytes())

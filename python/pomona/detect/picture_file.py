@@ -1,0 +1,58 @@
+"""Pictures that a user names: files, or all those in a folder; each a name of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.reading import require_file
+from pomona.recording.pictures import decoded_picture
+
+__all__ = ["SUFFIXES", "pictures_in", "read_picture"]
+
+SUFFIXES = (".png", ".jpg", ".jpeg")
+"""Of the pictures that are taken out of a folder; a file that is named may be called anything."""
+
+
+def pictures_in(places: Iterable[Path]) -> dict[str, Path]:
+    """List pictures by the names of their files, in the order given; in folders by name.
+
+    Raises
+    ------
+    PomonaError
+        A folder holds no picture, or two pictures have the same name.
+    """
+    found: dict[str, Path] = {}
+    for place in places:
+        for path in _of_folder(place) if place.is_dir() else [place]:
+            if path.name in found:
+                raise PomonaError(f"{path}: found the name of {found[path.name]}, expected names that differ")
+            found[path.name] = path
+    return found
+
+
+def _of_folder(folder: Path) -> list[Path]:
+    pictures = sorted(
+        file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")
+    )
+    if not pictures:
+        raise PomonaError(f"{folder}: found no pictures, expected {', '.join(SUFFIXES)}")
+    return pictures
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Read a picture as (H, W, 3) uint8, BGR.
+
+    Raises
+    ------
+    UnreadablePictureError
+        It is not there, is none, or is cut off.
+    """
+    import cv2
+
+    require_file(path, "a picture")
+    return np.asarray(decoded_picture(path, np.fromfile(path, np.uint8), cv2.IMREAD_COLOR), np.uint8)

@@ -1,0 +1,80 @@
+"""The fruit network: plain 3x3 convolutions and ReLU, one map at a quarter of the picture's size."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+__all__ = ["SIZE_PX", "FruitNetwork", "folded"]
+
+SIZE_PX = 16.0
+"""Half of the side of a usual fruit: what a distance to an edge of its box is told against."""
+
+CHANNELS = 6
+"""Of the map: logit of a fruit's centre; log of left, top, right, bottom over `SIZE_PX`; logit of the visible share."""
+
+RARE = -4.6
+"""Logit that the map begins with: one cell in a hundred is a fruit's centre."""
+
+
+def _convolution(given: int, made: int, normalised: bool, stride: int = 1) -> nn.Sequential:
+    convolution = nn.Conv2d(given, made, 3, stride, 1, bias=not normalised)
+    return nn.Sequential(convolution, nn.BatchNorm2d(made) if normalised else nn.Identity(), nn.ReLU(inplace=True))
+
+
+class FruitNetwork(nn.Module):
+    """Takes pictures (N, 3, H, W), RGB from 0 to 1, sides divisible by 16; gives maps (N, 6, H / 4, W / 4).
+
+    Parameters
+    ----------
+    normalised : bool
+        With a normalisation by batches after each convolution: for training from nothing.
+    """
+
+    def __init__(self, normalised: bool = True) -> None:
+        super().__init__()
+
+        def block(given: int, made: int, stride: int = 1) -> nn.Sequential:
+            return _convolution(given, made, normalised, stride)
+
+        self.stem = nn.Sequential(block(3, 16, 2), block(16, 32, 2), block(32, 32))
+        self.eighth = nn.Sequential(block(32, 96, 2), block(96, 96), block(96, 96))
+        self.sixteenth = nn.Sequential(block(96, 144, 2), block(144, 144), block(144, 144))
+        self.to_eighth, self.at_eighth = nn.Conv2d(144, 96, 1), block(96, 96)
+        self.to_quarter, self.at_quarter = nn.Conv2d(96, 32, 1), block(32, 32)
+        self.map = nn.Conv2d(32, CHANNELS, 1)
+        nn.init.normal_(self.map.weight, std=0.01)
+        nn.init.zeros_(self.map.bias)
+        self.map.bias.data[0] = RARE
+
+    def forward(self, pictures: torch.Tensor) -> torch.Tensor:
+        """Give the maps of some pictures."""
+        quarter = self.stem(pictures)
+        eighth = self.eighth(quarter)
+        sixteenth = self.sixteenth(eighth)
+        eighth = self.at_eighth(eighth + _doubled(self.to_eighth(sixteenth)))
+        features = self.at_quarter(quarter + _doubled(self.to_quarter(eighth)))
+        # Boxes need more than the 8 bits of a bfloat16's mantissa.
+        with torch.autocast("cpu", enabled=False):
+            return self.map(features.float())
+
+
+def _doubled(features: torch.Tensor) -> torch.Tensor:
+    return functional.interpolate(features, scale_factor=2.0, mode="nearest")
+
+
+def folded(network: FruitNetwork) -> FruitNetwork:
+    """Give a copy without normalisations: they have gone into the convolutions before them."""
+    plain = FruitNetwork(normalised=False).eval()
+    weights = network.state_dict()
+    for name, module in network.named_modules():
+        if isinstance(module, nn.BatchNorm2d):
+            convolution = f"{name.removesuffix('.1')}.0"
+            assert module.running_mean is not None
+            assert module.running_var is not None
+            gain = module.weight / torch.sqrt(module.running_var + module.eps)
+            weights[f"{convolution}.weight"] = weights[f"{convolution}.weight"] * gain[:, None, None, None]
+            weights[f"{convolution}.bias"] = module.bias - module.running_mean * gain
+    plain.load_state_dict({name: weights[name] for name in plain.state_dict()})
+    return plain

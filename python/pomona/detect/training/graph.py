@@ -1,0 +1,126 @@
+"""The network as an ONNX graph, and its numbers back out of one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from onnx import TensorProto, helper, numpy_helper
+
+from pomona.atomic import whole_file
+from pomona.detect.onnx.claims import OWN_KEY
+from pomona.detect.onnx.families import FRUITS
+from pomona.detect.training.fruit_network import FruitNetwork
+from pomona.errors import PomonaError
+from pomona.likes import MODEL_MARK
+
+__all__ = ["LAST", "network_in", "write_network"]
+
+OPSET = 17
+LAST = "map"
+"""Name of the last convolution."""
+
+
+def write_network(path: Path, network: FruitNetwork, min_score: float, about: Mapping[str, Any]) -> None:
+    """Write a network without normalisations.
+
+    Parameters
+    ----------
+    path : Path
+        The ONNX file.
+    network : FruitNetwork
+        As `folded` gives it.
+    min_score : float
+        Least score that a detector with it takes.
+    about : mapping
+        What it was trained on, JSON values.
+    """
+    graph = _Graph({name: weights.detach().numpy() for name, weights in network.state_dict().items()})
+    graph.network()
+    sides = ["height", "width"]
+    made = helper.make_graph(
+        graph.nodes,
+        "fruits",
+        [helper.make_tensor_value_info("pictures", TensorProto.FLOAT, [1, 3, *sides])],
+        [helper.make_tensor_value_info(FRUITS, TensorProto.FLOAT, [1, 6, "rows", "columns"])],
+        graph.initializers,
+    )
+    model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
+    own = {"version": 1, "family": "pomona", "names": ["fruit"], "min_score": round(min_score, 4)}
+    model.metadata_props.add(key=OWN_KEY, value=json.dumps(own))
+    model.metadata_props.add(key=MODEL_MARK.decode(), value=json.dumps(about))
+    onnx.checker.check_model(model)
+    with whole_file(path) as partial:
+        partial.write_bytes(model.SerializeToString())
+
+
+def network_in(path: Path) -> FruitNetwork:
+    """Read the network out of a file that `write_network` wrote.
+
+    Raises
+    ------
+    PomonaError
+        It holds another one.
+    """
+    try:
+        initializers = onnx.load(path).graph.initializer
+    except Exception as error:  # protobuf's errors have no base of their own
+        raise PomonaError(f"{path}: not an ONNX model ({' '.join(str(error).split())[:100]})") from None
+    found = {each.name: torch.from_numpy(np.array(numpy_helper.to_array(each))) for each in initializers}
+    network = FruitNetwork(normalised=False)
+    wanted = network.state_dict()
+    if any(name not in found or found[name].shape != weights.shape for name, weights in wanted.items()):
+        raise PomonaError(f"{path}: found another network, expected the shipped one or one that was trained from it")
+    network.load_state_dict({name: found[name] for name in wanted})
+    return network
+
+
+class _Graph:
+    """Nodes of the network, under the names of its parts."""
+
+    def __init__(self, weights: dict[str, Any]) -> None:
+        self.weights = weights
+        self.nodes: list[onnx.NodeProto] = []
+        self.initializers = [numpy_helper.from_array(array, name) for name, array in weights.items()]
+        self.initializers.append(numpy_helper.from_array(np.array([1, 1, 2, 2], np.float32), "doubled"))
+
+    def network(self) -> None:
+        quarter = self.part("stem", "pictures")
+        eighth = self.part("eighth", quarter)
+        sixteenth = self.part("sixteenth", eighth)
+        eighth = self.joined("to_eighth", sixteenth, eighth)
+        quarter = self.joined("to_quarter", self.block("at_eighth", eighth), quarter)
+        self.convolution(LAST, self.block("at_quarter", quarter), FRUITS)
+
+    def part(self, name: str, given: str) -> str:
+        for row, stride in self.strides(name):
+            given = self.block(f"{name}.{row}", given, stride)
+        return given
+
+    def strides(self, name: str) -> Iterator[tuple[int, int]]:
+        rows = [row for row in range(9) if f"{name}.{row}.0.weight" in self.weights]
+        halved = 2 if name == "stem" else 1
+        yield from ((row, 2 if row < halved else 1) for row in rows)
+
+    def block(self, name: str, given: str, stride: int = 1) -> str:
+        return self.node("Relu", [self.convolution(f"{name}.0", given, f"{name}.made", stride)], f"{name}.out")
+
+    def joined(self, name: str, coarse: str, fine: str) -> str:
+        given = self.convolution(name, coarse, f"{name}.made")
+        steps = {"mode": "nearest", "coordinate_transformation_mode": "asymmetric", "nearest_mode": "floor"}
+        larger = self.node("Resize", [given, "", "doubled"], f"{name}.larger", **steps)
+        return self.node("Add", [fine, larger], f"{name}.joined")
+
+    def convolution(self, name: str, given: str, made: str, stride: int = 1) -> str:
+        side = self.weights[f"{name}.weight"].shape[2]
+        sizes = {"kernel_shape": [side, side], "strides": [stride, stride], "pads": [side // 2] * 4}
+        return self.node("Conv", [given, f"{name}.weight", f"{name}.bias"], made, name=name, **sizes)
+
+    def node(self, kind: str, given: list[str], made: str, name: str = "", **attributes: Any) -> str:
+        self.nodes.append(helper.make_node(kind, given, [made], name=name or made, **attributes))
+        return made

@@ -1,0 +1,60 @@
+"""What the network is punished for."""
+
+from __future__ import annotations
+
+import torch
+from torch.nn import functional
+
+from pomona.detect.training.fruit_network import SIZE_PX
+
+__all__ = ["edges_of", "loss_of"]
+
+SURE = 0.3
+"""A cell that is so sure of a fruit, too small to have been labelled, may well be right."""
+
+DOUBTED = 0.5
+"""Weight of the punishment there."""
+
+BOXES = 2.0
+SHARES = 0.2
+"""Weights of boxes and of visible shares against centres."""
+
+
+def edges_of(maps: torch.Tensor) -> torch.Tensor:
+    """Left, top, right, bottom in pixels, (N, 4, h, w), out of maps."""
+    return SIZE_PX * torch.exp(maps[:, 1:5].clamp(-4, 4))
+
+
+def loss_of(maps: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Give the loss of maps (N, 6, h, w) against targets by name, (N, ...) each, for one fruit in the mean."""
+    edges_px = edges_of(maps)
+    n_fruits = (wanted["heat"] == 1).sum().clamp(min=1)
+    centres = _centres(maps[:, 0], edges_px.detach(), wanted) / n_fruits
+    weights = wanted["weights"]
+    total = weights.sum().clamp(min=1)
+    boxes = (weights * _unlike(edges_px, wanted["edges_px"])).sum() / total
+    known = torch.isfinite(wanted["visible"]) & (weights > 0)
+    shares = functional.binary_cross_entropy_with_logits(maps[:, 5][known], wanted["visible"][known], reduction="sum")
+    return centres + BOXES * boxes + SHARES * shares / total
+
+
+def _centres(logits: torch.Tensor, edges_px: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Give the focal loss of CornerNet (Law and Deng 2018, eq. 1), without what nobody can know to be wrong."""
+    heat, scores = wanted["heat"], logits.sigmoid()
+    sides = ((edges_px[:, 0] + edges_px[:, 2]) * (edges_px[:, 1] + edges_px[:, 3])).sqrt()
+    unlabelled = (sides < wanted["smallest_px"]) & (scores.detach() > SURE) & (heat < 0.1)
+    punished = torch.where(unlabelled, DOUBTED, 1.0) * wanted["punished"]
+    missed = functional.softplus(-logits) * (1 - scores) ** 2
+    false = functional.softplus(logits) * scores**2 * (1 - heat) ** 4 * punished
+    return torch.where(heat == 1, missed, false).sum()
+
+
+def _unlike(found: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
+    """1 - GIoU of boxes that hold the same point, given as distances to their edges."""
+    shared = torch.minimum(found, wanted)
+    around = torch.maximum(found, wanted)
+    both, one, other, hull = (
+        (edges[:, 0] + edges[:, 2]) * (edges[:, 1] + edges[:, 3]) for edges in (shared, found, wanted, around)
+    )
+    union = one + other - both
+    return 1 - both / union + (hull - union) / hull

@@ -1,0 +1,100 @@
+"""From the labels of a crop to what the network's map should be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.detect.training.crops import Crop
+
+__all__ = ["STRIDE", "Targets", "targets_of"]
+
+STRIDE = 4
+"""Pixels of the picture for one cell of the map: a fruit of 7 px is still wider than a cell."""
+
+SPREAD = 0.09
+"""Standard deviation of the heat around a centre, as a part of the box's side: at a quarter of the side it is 2 %."""
+
+LEAST_SPREAD = 0.55
+"""The same in cells, at least: neighbours of a centre get some heat, or a shift by half a cell would be an error."""
+
+REGRESSED = 0.25
+"""Cells of so much heat say where the box is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """What is wanted of the map of one crop, h by w cells.
+
+    Attributes
+    ----------
+    heat : (h, w) float32
+        1 at the centre of a fruit, falling off around it.
+    punished : (h, w) float32
+        1 where the absence of a fruit is known, 0 where it is not.
+    smallest_px : (h, w) float32
+        Smaller fruits may be there without a box; 0 where all have one.
+    weights : (h, w) float32
+        How much the box of a cell counts.
+    edges_px : (4, h, w) float32
+        Left, top, right, bottom of the box from the middle of the cell.
+    visible : (h, w) float32
+        NaN where nobody knows.
+    """
+
+    heat: NDArray[np.float32]
+    punished: NDArray[np.float32]
+    smallest_px: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    edges_px: NDArray[np.float32]
+    visible: NDArray[np.float32]
+
+
+def targets_of(crop: Crop) -> Targets:
+    """Give the targets of a crop."""
+    cells = len(crop.pixels) // STRIDE
+    made = Targets(
+        heat=np.zeros((cells, cells), np.float32),
+        punished=np.ones((cells, cells), np.float32),
+        smallest_px=np.zeros((cells, cells), np.float32),
+        weights=np.zeros((cells, cells), np.float32),
+        edges_px=np.ones((4, cells, cells), np.float32),
+        visible=np.full((cells, cells), np.nan, np.float32),
+    )
+    for place, side_px in crop.smallest_px:
+        made.smallest_px[_cells_in(np.array(place, np.float32))] = side_px
+    for box_px in crop.ignored_px:
+        made.punished[_cells_in(box_px)] = 0
+    # Small fruits last: where boxes overlap, a small one has no other cells.
+    areas = np.prod(crop.boxes_px[:, 2:] - crop.boxes_px[:, :2], axis=1)
+    for row in np.argsort(-areas, kind="stable"):
+        _paint(made, crop.boxes_px[row], crop.visible[row])
+    return made
+
+
+def _cells_in(box_px: NDArray[np.float32]) -> tuple[slice, slice]:
+    left, top = np.floor(box_px[:2] / STRIDE).astype(int)
+    right, bottom = np.ceil(box_px[2:] / STRIDE).astype(int)
+    return slice(max(top, 0), bottom), slice(max(left, 0), right)
+
+
+def _paint(made: Targets, box_px: NDArray[np.float32], visible: np.float32) -> None:
+    """Lay one fruit over the maps."""
+    middle, sides = (box_px[:2] + box_px[2:]) / (2 * STRIDE), (box_px[2:] - box_px[:2]) / STRIDE
+    spread = np.maximum(SPREAD * sides, LEAST_SPREAD)
+    rows, columns = _cells_in(box_px)
+    y, x = np.mgrid[rows, columns][:, : len(made.heat), : len(made.heat)]
+    rows, columns = slice(y[0, 0], y[-1, 0] + 1), slice(x[0, 0], x[0, -1] + 1)
+    centre = np.minimum(middle.astype(int), len(made.heat) - 1)
+    off = ((x - centre[0]) / spread[0]) ** 2 + ((y - centre[1]) / spread[1]) ** 2
+    heat = np.exp(-off / 2).astype(np.float32)
+    made.heat[rows, columns] = np.maximum(made.heat[rows, columns], heat)
+    nearer = (heat >= REGRESSED) & (heat >= made.weights[rows, columns])
+    # The weights of a fruit add up to about the same, whatever its size.
+    made.weights[rows, columns][nearer] = heat[nearer]
+    x_px, y_px = (x + 0.5) * STRIDE, (y + 0.5) * STRIDE
+    edges_px = np.stack([x_px - box_px[0], y_px - box_px[1], box_px[2] - x_px, box_px[3] - y_px])
+    made.edges_px[:, rows, columns][:, nearer] = np.maximum(edges_px, 0.5)[:, nearer]
+    made.visible[rows, columns][nearer] = visible

@@ -1,0 +1,132 @@
+"""`pomona detect` with the shipped detector, on photographs of rows that it was not trained on."""
+
+import csv
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pomona.detect import Detections
+from pomona.detect.accuracy import Found, judged
+from pomona.detect.onnx import OnnxDetector
+from pomona.detect.picture_file import read_picture
+from pomona.detect.shipped import EXACT, SHIPPED, model_named
+
+PICTURES = Path(__file__).parents[1] / "testdata" / "pictures"
+NAMES = sorted(path.name for path in PICTURES.glob("*.jpg"))
+
+
+def boxes_in(path):
+    boxes = {name: [] for name in NAMES}
+    with path.open(encoding="utf-8", newline="") as file:
+        for line in csv.DictReader(file):
+            boxes[line["image"]].append([float(value) for value in list(line.values())[1:]])
+    return {name: np.array(rows).reshape(len(rows), -1) for name, rows in boxes.items()}
+
+
+def accuracy(path):
+    """Precision and recall of a table of boxes."""
+    truth, found = boxes_in(PICTURES / "boxes.csv"), boxes_in(path)
+    pairs = [Found(Detections(found[name][:, :4], found[name][:, 4]), truth[name], np.empty((0, 4))) for name in NAMES]
+    return judged(pairs).above(0.0)
+
+
+@pytest.mark.parametrize("model", [SHIPPED, EXACT])
+def test_the_shipped_detector_finds_fruits_in_photographs(pomona, tmp_path, model):
+    code, out, _ = pomona("detect", PICTURES, "-o", tmp_path / "boxes.csv", "--model", model)
+    assert code == 0
+    assert [line.split(":")[0] for line in out.splitlines()] == NAMES
+    assert (tmp_path / "boxes.csv").read_text().splitlines()[0] == "image,xmin,ymin,xmax,ymax,score"
+    precision, recall = accuracy(tmp_path / "boxes.csv")
+    assert precision >= 0.6
+    assert recall >= 0.6
+
+
+def test_without_a_model_it_is_the_shipped_one_and_twice_the_same(pomona, tmp_path):
+    for name, more in (("one.csv", ()), ("two.csv", ("--model", SHIPPED))):
+        assert pomona("detect", *(PICTURES / each for each in NAMES), "-o", tmp_path / name, *more)[0] == 0
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+
+
+def test_a_least_score_leaves_the_better_boxes(pomona, tmp_path):
+    pomona("detect", PICTURES, "-o", tmp_path / "few.csv", "--min-score", 0.8)
+    pomona("detect", PICTURES, "-o", tmp_path / "many.csv", "--min-score", 0.1)
+    few, many = ((tmp_path / name).read_text().splitlines()[1:] for name in ("few.csv", "many.csv"))
+    assert 0 < len(few) < len(many)
+    assert set(few) < set(many)
+    assert all(float(line.split(",")[-1]) >= 0.8 for line in few)
+
+
+def test_boxes_are_drawn_and_json_counts_them(pomona, tmp_path):
+    code, out, _ = pomona("detect", PICTURES, "-o", tmp_path / "b.csv", "--plot", tmp_path / "drawn", "--json")
+    assert code == 0
+    counts = json.loads(out)["n_boxes"]
+    assert counts == {name: len(rows) for name, rows in boxes_in(tmp_path / "b.csv").items()}
+    for name in NAMES:
+        drawn = read_picture(tmp_path / "drawn" / f"{name}.boxes.png")
+        changed = (drawn != read_picture(PICTURES / name)).any(axis=2)
+        assert 0 < changed.mean() < 0.5
+
+
+def test_the_table_goes_through_a_pipe(tmp_path):
+    command = [sys.executable, "-m", "pomona", "detect", str(PICTURES), "-o", "-"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[0] == "image,xmin,ymin,xmax,ymax,score"
+    assert {line.split(",")[0] for line in done.stdout.splitlines()[1:]} == set(NAMES)
+
+
+def test_pictures_of_odd_sizes_have_the_same_boxes():
+    detector = OnnxDetector.open(model_named(EXACT))
+    picture = read_picture(PICTURES / NAMES[0])
+    whole = detector.detect(picture)
+    # The bars that fill up 447x441 are no fruit; a fruit far from the cut edges is the same.
+    cut = detector.detect(picture[:441, :447])
+    inside = whole.boxes_px[(whole.boxes_px[:, 2:] < 380).all(axis=1)]
+    assert len(inside) > 0
+    for box in inside:
+        assert np.abs(cut.boxes_px - box).max(axis=1).min() < 1.0
+    assert (cut.boxes_px[:, 2] <= 447).all()
+    assert (cut.boxes_px[:, 3] <= 441).all()
+
+
+def test_a_picture_smaller_than_a_cell_and_a_very_large_one():
+    detector = OnnxDetector.open(model_named(SHIPPED))
+    assert len(detector.detect(np.zeros((1, 1, 3), np.uint8))) == 0
+    assert len(detector.detect(np.full((2000, 3000, 3), 128, np.uint8))) == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "arguments", "line"),
+    [
+        (None, ["none.jpg"], "none.jpg: not found, expected a picture"),
+        (("bad.png", b"no picture"), ["bad.png"], "bad.png: not a picture, or a corrupt one"),
+        (("empty/x.txt", b""), ["empty"], "empty: found no pictures, expected .png, .jpg, .jpeg"),
+        (("bad.onnx", b"no model"), [PICTURES, "--model", "bad.onnx"], "bad.onnx: not a model that ONNX Runtime can"),
+        (None, [PICTURES, "--model", "none.onnx"], "none.onnx: not found, expected an ONNX model"),
+    ],
+)
+def test_wrong_input_is_one_line(pomona, tmp_path, monkeypatch, make, arguments, line):
+    monkeypatch.chdir(tmp_path)
+    if make:
+        (tmp_path / make[0]).parent.mkdir(exist_ok=True)
+        (tmp_path / make[0]).write_bytes(make[1])
+    code, out, err = pomona("detect", *arguments, "-o", "b.csv")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert line in err
+    assert not (tmp_path / "b.csv").exists()
+
+
+def test_no_input_is_destroyed(pomona, tmp_path):
+    folder = tmp_path / "pictures"
+    shutil.copytree(PICTURES, folder)
+    before = (folder / NAMES[0]).read_bytes()
+    assert pomona("detect", folder, "-o", folder / NAMES[0], "--force")[0] == 2
+    code, _, err = pomona("detect", folder, "-o", tmp_path / "b.csv", "--plot", folder, "--force")
+    assert code == 2
+    assert "expected another place to write" in err
+    assert (folder / NAMES[0]).read_bytes() == before
+    assert pomona("detect", folder, folder / NAMES[0], "-o", tmp_path / "b.csv")[0] == 2  # two of one name

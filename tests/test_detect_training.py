@@ -1,0 +1,147 @@
+"""Training and exporting; the parts that need torch run where it is installed."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pomona.detect.picture_file import read_picture
+
+PICTURES = Path(__file__).parents[1] / "testdata" / "pictures"
+HAS_TORCH = importlib.util.find_spec("torch") is not None
+needs_torch = pytest.mark.skipif(not HAS_TORCH, reason="torch is not installed: pip install 'pomona[train]'")
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Six small pictures with boxes."""
+    folder = tmp_path / "own"
+    folder.mkdir()
+    lines = ["image,xmin,ymin,xmax,ymax"]
+    for number in range(6):
+        picture = np.full((160, 160, 3), 60, np.uint8)
+        cv2.circle(picture, (50 + 10 * number, 80), 20, (40, 40, 200), -1)
+        assert cv2.imwrite(str(folder / f"{number}.png"), picture)
+        lines.append(f"{number}.png,{30 + 10 * number},60,{70 + 10 * number},100")
+    (tmp_path / "boxes.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.mark.skipif(HAS_TORCH, reason="torch is installed")
+def test_without_the_extra_the_one_command_is_told(pomona, own, tmp_path):
+    code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.onnx")
+    assert code == 2
+    assert err == "pomona: training needs torch, not installed: pip install 'pomona[train]'\n"
+
+
+@needs_torch
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("image,xmin,ymin,xmax,ymax\n0.png,1,2,3\n", "line 2: found 4 cells"),
+        ("image,xmin,ymin,xmax,ymax\n0.png,200,2,230,9\n", "line 2: the box 200,2,230,9 is outside the picture"),
+        ("image,xmin,ymin,xmax,ymax\n", "found 6 pictures with 0 boxes, expected 5 pictures or more, and boxes"),
+    ],
+)
+def test_wrong_labels_are_one_line(pomona, own, tmp_path, lines, told):
+    (tmp_path / "boxes.csv").write_text(lines)
+    code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.onnx")
+    assert (code, err.count("\n")) == (2, 1)
+    assert told in err
+    assert not (tmp_path / "my.onnx").exists()
+
+
+@needs_torch
+def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path):
+    import torch
+
+    from pomona.detect.training import loop
+    from pomona.detect.training.cache import cached
+    from pomona.detect.training.fine_tuning import labelled_pictures
+
+    torch.set_num_threads(1)
+    samples = cached(labelled_pictures([own], tmp_path / "boxes.csv"), tmp_path / "cache")
+    plan = loop.Plan(batches=3, batch=2, warm_up=1, half_precision=False)
+    ends = []
+    for stops in ((), (1,)):
+        checkpoint = tmp_path / f"{len(ends)}.pt"
+
+        def killed(done, _loss, stops=stops):
+            if done in stops:
+                raise KeyboardInterrupt
+
+        loop.SAVED_EVERY = 1
+        if stops:
+            checkpointed = loop.Plan(**{**vars(plan), "batches": 3})
+            with pytest.raises(KeyboardInterrupt):
+                loop.train([loop.Source(samples, 1.0)], checkpointed, checkpoint, None, killed)
+        network = loop.train([loop.Source(samples, 1.0)], plan, checkpoint, None, lambda _done, _loss: None)
+        ends.append(network.state_dict())
+    assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+@needs_torch
+def test_the_graph_gives_what_the_network_gives(tmp_path):
+    import torch
+
+    from pomona.detect.onnx.network import Network
+    from pomona.detect.training.fruit_network import FruitNetwork, folded
+    from pomona.detect.training.graph import network_in, write_network
+
+    torch.manual_seed(0)
+    network = FruitNetwork()
+    with torch.no_grad():
+        network(torch.rand(4, 3, 64, 64))  # fills the statistics of the normalisations
+    network.eval()
+    write_network(tmp_path / "net.onnx", folded(network), 0.3, {})
+    picture = torch.rand(3, 64, 96)
+    with torch.no_grad():
+        expected = network(picture[None])[0].numpy()
+        again = network_in(tmp_path / "net.onnx").eval()(picture[None])[0].numpy()
+    given = Network.open(tmp_path / "net.onnx").run(picture.numpy())["fruits"]
+    assert given.shape == (6, 16, 24)
+    assert np.abs(given - expected).max() < 1e-4
+    assert np.abs(again - expected).max() < 1e-4
+
+
+@needs_torch
+def test_a_fine_tuned_model_is_found_by_detect(pomona, own, tmp_path):
+    output = tmp_path / "my.onnx"
+    code, out, _ = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", output, "--batches", 2)
+    assert code == 0
+    assert "trained on 6 pictures with 6 fruits" in out
+    assert pomona("detect", own, "-o", tmp_path / "found.csv", "--model", output)[0] == 0
+    # The same call is refused nothing: what was trained here may be replaced, and the finished run is not run again.
+    assert pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", output, "--batches", 2)[0] == 0
+    other = tmp_path / "other.onnx"
+    shutil.copy(PICTURES / "boxes.csv", other)
+    code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", other)
+    assert code == 2
+    assert "is not a model that was trained here" in err
+
+
+@needs_torch
+def test_eight_bits_find_what_thirty_two_find(tmp_path):
+    from pomona.detect.onnx import OnnxDetector
+    from pomona.detect.shipped import EXACT, SHIPPED, model_named
+
+    picture = read_picture(next(PICTURES.glob("*.jpg")))
+    small, exact = (OnnxDetector.open(model_named(name), min_score=0.5).detect(picture) for name in (SHIPPED, EXACT))
+    assert abs(len(small) - len(exact)) <= 2
+
+
+def test_help_of_both_verbs_loads_neither_numpy_nor_torch():
+    for verb in ("detect", "train"):
+        code = (
+            f"import sys; sys.argv = ['pomona', '{verb}', '--help']\n"
+            "from pomona.cli import main\n"
+            "try:\n    main()\nexcept SystemExit as ended:\n    assert not ended.code\n"
+            "assert not {'numpy', 'torch', 'onnx'} & set(sys.modules)\n"
+        )
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, env=os.environ)

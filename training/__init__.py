@@ -1,0 +1,1 @@
+"""How the shipped detector was trained: `python -m training DATA -o RUN`."""

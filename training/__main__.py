@@ -1,0 +1,55 @@
+"""Train the shipped detector; an interrupted run goes on, a finished one is exported by `python -m training.ship`."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import torch
+
+from pomona.detect.training.cache import cached
+from pomona.detect.training.loop import Plan, Source, train
+from training.sources import TEST_ROWS, VALIDATION_ROWS, photographs, rendered
+
+RENDERED_SHARE = 0.35
+"""Of the pictures that are drawn, where there are rendered ones."""
+
+
+def main() -> None:
+    """Run the recipe."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder with orchard_photos/")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
+    parser.add_argument("--rendered", type=Path, nargs="*", default=[], help="recordings of `pomona synth video`")
+    parser.add_argument("--batches", type=int, default=Plan.batches)
+    given = parser.parse_args()
+    torch.set_num_threads(1)
+    given.output.mkdir(parents=True, exist_ok=True)
+    begun_s = time.monotonic()
+
+    def tell(done: int, loss: float) -> None:
+        if done % 20 == 0:
+            print(f"{done} of {given.batches} batches, loss {loss:.3f}, {time.monotonic() - begun_s:.0f} s", flush=True)
+
+    sources = _sources(given.data, given.rendered, given.output / "cache")
+    train(sources, Plan(batches=given.batches), given.output / "checkpoint.pt", None, tell)
+
+
+def _sources(data: Path, recordings: list[Path], cache: Path) -> list[Source]:
+    held_out = TEST_ROWS + VALIDATION_ROWS
+    apples = [
+        labelled
+        for kind in ("apple_76", "apple_81")
+        for labelled in photographs(data / "orchard_photos", kind, but=held_out)
+    ]
+    sources = [Source(cached(apples, cache), 1.0)]
+    if recordings:
+        drawn = [labelled for recording in recordings for labelled in rendered(recording)]
+        share = RENDERED_SHARE / (1 - RENDERED_SHARE)
+        sources.append(Source(cached(drawn, cache), share))
+    return sources
+
+
+if __name__ == "__main__":
+    main()
