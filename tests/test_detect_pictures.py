@@ -15,6 +15,7 @@ from pomona.detect.accuracy import Found, judged
 from pomona.detect.onnx import OnnxDetector
 from pomona.detect.picture_file import read_picture
 from pomona.detect.shipped import EXACT, SHIPPED, model_named
+from pomona.detect.training.labels import Labelled
 
 PICTURES = Path(__file__).parents[1] / "testdata" / "pictures"
 NAMES = sorted(path.name for path in PICTURES.glob("*.jpg"))
@@ -28,10 +29,14 @@ def boxes_in(path):
     return {name: np.array(rows).reshape(len(rows), -1) for name, rows in boxes.items()}
 
 
-def accuracy(path):
-    """Precision and recall of a table of boxes."""
+def accuracy(path, names):
+    """Precision and recall of a table of boxes in some pictures."""
     truth, found = boxes_in(PICTURES / "boxes.csv"), boxes_in(path)
-    pairs = [Found(Detections(found[name][:, :4], found[name][:, 4]), truth[name], np.empty((0, 4))) for name in NAMES]
+    pairs = []
+    for name in names:
+        detections = Detections(found[name][:, :4], found[name][:, 4])
+        known = Labelled(PICTURES / name, truth[name].astype(np.float32), np.ones(len(truth[name]), np.float32))
+        pairs.append(Found(detections, known.boxes_px, known.ignored_px, known.smallest_px))
     return judged(pairs).above(0.0)
 
 
@@ -41,9 +46,9 @@ def test_the_shipped_detector_finds_fruits_in_photographs(pomona, tmp_path, mode
     assert code == 0
     assert [line.split(":")[0] for line in out.splitlines()] == NAMES
     assert (tmp_path / "boxes.csv").read_text().splitlines()[0] == "image,xmin,ymin,xmax,ymax,score"
-    precision, recall = accuracy(tmp_path / "boxes.csv")
-    assert precision >= 0.6
-    assert recall >= 0.6
+    assert accuracy(tmp_path / "boxes.csv", NAMES)[1] >= 0.7
+    # In the other picture a row behind is full of fruits that have no boxes.
+    assert accuracy(tmp_path / "boxes.csv", [name for name in NAMES if "apple_81" in name])[0] >= 0.8
 
 
 def test_without_a_model_it_is_the_shipped_one_and_twice_the_same(pomona, tmp_path):

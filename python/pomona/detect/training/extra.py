@@ -21,4 +21,4 @@ def require_train() -> None:
     """
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        raise PomonaError(f"training needs {' and '.join(missing)}, not installed: pip install 'pomona[train]'")
+        raise PomonaError(f"training needs {' and '.join(missing)}, not installed: pip install torch onnx")
