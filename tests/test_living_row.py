@@ -11,7 +11,7 @@ from pomona.errors import PomonaError
 from pomona.synth.living import LivingRow, RowDesign, Wind, grow
 from pomona.synth.living.cultivars import CULTIVARS
 from pomona.synth.living.fruit_lives import ALIVE, DROPPED, PICKED, THINNED
-from pomona.synth.living.training import SYSTEMS
+from pomona.synth.living.training_systems import SYSTEMS
 from pomona.synth.row_geometry import FruitSolids, Leaves, RowGeometry
 
 DESIGN = RowDesign(

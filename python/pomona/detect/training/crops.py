@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pomona.detect.training.cache import Sample
 from pomona.detect.training.colours import disturbed
 
-__all__ = ["SIDE_PX", "Crop", "drawn_crop"]
+__all__ = ["SIDE_PX", "PictureCrop", "drawn_crop"]
 
 SIDE_PX = 320
 """Of a crop; half of it is the side of one of four pictures in a crop."""
@@ -34,7 +34,7 @@ LEAST_PX = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Crop:
+class PictureCrop:
     """A crop and what is wanted of it.
 
     Attributes
@@ -57,7 +57,7 @@ class Crop:
     smallest_px: list[tuple[tuple[int, int, int, int], float]]
 
 
-def drawn_crop(samples: Sequence[Sample], draw: np.random.Generator) -> Crop:
+def drawn_crop(samples: Sequence[Sample], draw: np.random.Generator) -> PictureCrop:
     """Draw a crop out of pictures, of which four are needed at most, the first ones."""
     if draw.random() < FOUR:
         half = SIDE_PX // 2
@@ -69,11 +69,11 @@ def drawn_crop(samples: Sequence[Sample], draw: np.random.Generator) -> Crop:
         crop = _joined(np.vstack(rows), parts)
     else:
         crop = _part(samples[0], SIDE_PX, (0, 0), draw)
-    return Crop(disturbed(crop.pixels, draw), crop.boxes_px, crop.visible, crop.ignored_px, crop.smallest_px)
+    return PictureCrop(disturbed(crop.pixels, draw), crop.boxes_px, crop.visible, crop.ignored_px, crop.smallest_px)
 
 
-def _joined(pixels: NDArray[np.uint8], parts: Sequence[Crop]) -> Crop:
-    return Crop(
+def _joined(pixels: NDArray[np.uint8], parts: Sequence[PictureCrop]) -> PictureCrop:
+    return PictureCrop(
         pixels,
         np.concatenate([part.boxes_px for part in parts]),
         np.concatenate([part.visible for part in parts]),
@@ -82,7 +82,7 @@ def _joined(pixels: NDArray[np.uint8], parts: Sequence[Crop]) -> Crop:
     )
 
 
-def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Generator) -> Crop:
+def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Generator) -> PictureCrop:
     """Cut a square of a picture, scaled and turned over at random, to lie at a corner of the crop."""
     height, width = sample.pixels.shape[:2]
     least = side / min(height, width)
@@ -136,7 +136,7 @@ def _cut(
     ignored_px: NDArray[np.float32],
     smallest_px: float,
     corner: tuple[int, int],
-) -> Crop:
+) -> PictureCrop:
     """Cut labels at the edge of their square, and move them to its corner of the crop."""
     side, move = len(pixels), np.array([*corner, *corner], np.float32)
     inside_px = np.clip(boxes_px, 0, side)
@@ -144,7 +144,7 @@ def _cut(
     wanted = (left_over >= LEAST_INSIDE) & (sides >= LEAST_PX)
     open_px = np.concatenate([inside_px[~wanted & (sides > 0)], np.clip(ignored_px, 0, side)])
     place = (corner[0], corner[1], corner[0] + side, corner[1] + side)
-    return Crop(
+    return PictureCrop(
         np.ascontiguousarray(pixels),
         inside_px[wanted] + move,
         visible[wanted],

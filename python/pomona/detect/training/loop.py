@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
-from pomona.detect.training.crops import Crop, drawn_crop
+from pomona.detect.training.crops import PictureCrop, drawn_crop
 from pomona.detect.training.fruit_network import FruitNetwork
 from pomona.detect.training.loss import loss_of
 from pomona.detect.training.targets import Targets, targets_of
@@ -171,7 +171,7 @@ def _batch(sources: Sequence[Source], plan: Plan, number: int) -> tuple[torch.Te
     return torch.from_numpy(_as_input(crops)).contiguous(memory_format=torch.channels_last), wanted
 
 
-def _as_input(crops: Sequence[Crop]) -> NDArray[np.float32]:
+def _as_input(crops: Sequence[PictureCrop]) -> NDArray[np.float32]:
     stacked = np.stack([crop.pixels[:, :, ::-1] for crop in crops]).transpose(0, 3, 1, 2)
     return stacked.astype(np.float32) / np.float32(255)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.detect.training.crops import Crop
+from pomona.detect.training.crops import PictureCrop
 
 __all__ = ["STRIDE", "Targets", "targets_of"]
 
@@ -52,7 +52,7 @@ class Targets:
     visible: NDArray[np.float32]
 
 
-def targets_of(crop: Crop) -> Targets:
+def targets_of(crop: PictureCrop) -> Targets:
     """Give the targets of a crop."""
     cells = len(crop.pixels) // STRIDE
     made = Targets(

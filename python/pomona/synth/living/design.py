@@ -7,7 +7,7 @@ from datetime import date
 
 from pomona.errors import PomonaError
 from pomona.synth.living.cultivars import CULTIVARS, Cultivar
-from pomona.synth.living.training import SYSTEMS, TrainingSystem
+from pomona.synth.living.training_systems import SYSTEMS, TrainingSystem
 
 __all__ = ["RowDesign"]
 

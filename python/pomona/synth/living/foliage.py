@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pomona.synth.living.axis_growth import perpendiculars, unit
-from pomona.synth.living.training import GOLDEN_ANGLE_RAD
+from pomona.synth.living.training_systems import GOLDEN_ANGLE_RAD
 from pomona.synth.living.wood import along_axes
 
 if TYPE_CHECKING:

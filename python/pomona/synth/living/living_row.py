@@ -21,7 +21,7 @@ from pomona.synth.living.limbs_of_day import all_limbs, spur_limbs, stalk_limbs,
 from pomona.synth.living.spurs import Spurs, grow_spurs
 from pomona.synth.living.streams_of_chance import chance
 from pomona.synth.living.supports import posts_and_wires
-from pomona.synth.living.training import grow_wood
+from pomona.synth.living.training_systems import grow_wood
 from pomona.synth.living.wind import Wind, wind_forces
 from pomona.synth.living.wood import WoodAxes
 from pomona.synth.row_geometry import FruitSolids, Leaves, Limbs, RowGeometry

@@ -9,7 +9,7 @@ import numpy as np
 from pomona.synth.row_geometry import Limbs
 
 if TYPE_CHECKING:
-    from pomona.synth.living.training import TrainingSystem
+    from pomona.synth.living.training_systems import TrainingSystem
 
 __all__ = ["posts_and_wires"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.synth.living.training import GOLDEN_ANGLE_RAD
+from pomona.synth.living.training_systems import GOLDEN_ANGLE_RAD
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
