@@ -272,7 +272,7 @@ def test_files_that_are_no_models_are_told(tmp_path):
         OnnxDetector.open(tmp_path / "model.onnx")
     with pytest.raises(PomonaError, match=r"none\.onnx: not found, expected an ONNX model"):
         OnnxDetector.open(tmp_path / "none.onnx")
-    with pytest.raises(PomonaError, match="family: found .ssd. in the setting, expected one of pomona, rfdetr, "):
+    with pytest.raises(PomonaError, match=r"family: found .ssd. in the setting, expected one of pomona, rfdetr, "):
         OnnxDetector.open(make("yolov8", tmp_path / "model.onnx"), family="ssd")
     with pytest.raises(PomonaError, match="min_score: found 25, expected 0 to 1"):
         OnnxDetector.open(tmp_path / "model.onnx", min_score=25)
