@@ -21,8 +21,8 @@ from pomona.detect.training.targets import Targets, targets_of
 
 __all__ = ["Plan", "Source", "mean_of", "train"]
 
-SAVED_EVERY = 100
-"""Batches between two checkpoints, some minutes: that is what an interruption costs."""
+SAVED_EVERY = 25
+"""Batches between two checkpoints: that is what an interruption costs at most."""
 
 KEPT = 0.998
 """Of the mean of the weights, from one batch to the next; at the beginning less."""
