@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 import stat
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
@@ -104,11 +105,14 @@ def read_given_text(path: Path, expected: str) -> str:
         As in `read_text`.
     """
     descriptor = _descriptor(path)
-    if descriptor is None:
+    if descriptor is None and str(path) != "-":
         return read_text(path, expected)
     try:
-        with open(descriptor, "rb", closefd=False) as stream:
-            content = stream.read(MOST_TEXT_BYTES + 1)
+        if descriptor is None:
+            content = sys.stdin.buffer.read(MOST_TEXT_BYTES + 1)
+        else:
+            with open(descriptor, "rb", closefd=False) as stream:
+                content = stream.read(MOST_TEXT_BYTES + 1)
     except OSError as error:
         raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
     if len(content) > MOST_TEXT_BYTES:
@@ -117,8 +121,6 @@ def read_given_text(path: Path, expected: str) -> str:
 
 
 def _descriptor(path: Path) -> int | None:
-    if str(path) == "-":
-        return 0
     named = re.fullmatch(r"/(?:dev|proc/self)/fd/(\d{1,9})", str(path))
     return None if named is None else int(named[1])
 
