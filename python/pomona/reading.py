@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 import stat
+import sys
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
