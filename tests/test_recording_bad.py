@@ -98,7 +98,7 @@ def test_sides_of_the_rendered_rows_and_of_a_car(shared_data, tmp_path):
     [
         pairs(1)[:1],
         [(leaves(1), leaves(2))] * 3,  # nothing in common
-        [(leaves(1), leaves(1))] * 3,  # all at infinity
+        [(leaves(1), leaves(1) ^ 1)] * 3,  # all at infinity, seen by two cameras
         [(np.zeros((SIZE[1], SIZE[0], 3), np.uint8),) * 2] * 3,  # a covered lens
     ],
     ids=["one frame", "strangers", "infinity", "black"],

@@ -29,6 +29,9 @@ from pomona.recording.bags import mcap_file
 from pomona.recording.bags.picture_messages import ENCODINGS
 from pomona.recording.checks.readable import unreadable_frames
 
+OTHER_EYE = np.uint8(1)
+"""What the right pictures differ by: a pair of one picture is refused."""
+
 
 def refused(path, *parts, **options):
     with pytest.raises(PomonaError) as caught:
@@ -456,9 +459,9 @@ def test_a_ros_bag_cut_off_in_the_middle_is_used_as_far_as_it_goes(pomona, tmp_p
     entries = []
     for row in range(20):
         at = START_NS + row * STEP_NS
-        for side, shift in (("left", 0.0), ("right", -600 * 0.12)):
+        for side, shift, changed in (("left", 0.0, 0), ("right", -600 * 0.12, OTHER_EYE)):
             entries.append(info(f"/{side}/camera_info", at, shift, size=size, f=600.0))
-            entries.append(image(f"/{side}/image_rect", at, picture(row, size), "bgr8"))
+            entries.append(image(f"/{side}/image_rect", at, picture(row, size) ^ changed, "bgr8"))
     bag = write_bag(tmp_path / "row", entries, form)
     file = bag if bag.is_file() else next(bag.glob("*.db3"))
     with file.open("rb+") as content:
@@ -468,7 +471,7 @@ def test_a_ros_bag_cut_off_in_the_middle_is_used_as_far_as_it_goes(pomona, tmp_p
     assert abs(len(recording) - 20 * share) <= 3
     for frame in recording.frames():
         assert np.array_equal(frame.read_left(), picture(frame.number, size))
-        assert np.array_equal(frame.read_right(), picture(frame.number, size))
+        assert np.array_equal(frame.read_right(), picture(frame.number, size) ^ OTHER_EYE)
     code, printed, errors = pomona("info", bag, "--check")
     assert (code, errors.count("cut off")) == (0, 1)
     assert "unreadable     0" in printed

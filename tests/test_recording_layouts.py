@@ -289,10 +289,10 @@ def test_info_checks_every_picture(pomona, kitti):
     assert json.loads(pomona("info", kitti, "--check", "--json")[1])["unreadable"][0]["frame"] == 2
 
 
-def test_scan_says_where_boxes_come_from_in_one_line(pomona, kitti, tmp_path):
-    code, printed, told = pomona("scan", kitti, "-o", tmp_path / "fruits.csv")
+def test_scan_says_in_one_line_that_boxes_are_not_there(pomona, kitti, tmp_path):
+    code, printed, told = pomona("scan", kitti, "-o", tmp_path / "fruits.csv", "--detections", tmp_path / "boxes.csv")
     assert (code, printed, told.count("\n")) == (2, "", 1)
-    assert "detections.csv: not found" in told
+    assert "boxes.csv: not found" in told
     assert not (tmp_path / "fruits.csv").exists()
 
 

@@ -294,7 +294,7 @@ def test_a_recording_that_cannot_be_read_leaves_the_old_session_as_it_was(pomona
     ("change", "named"),
     [
         (lambda row: (row / "calibration.json").unlink(), ["calibration.json"]),
-        (lambda row: (row / "detections.csv").unlink(), ["detections.csv", "not found"]),
+        (lambda row: (row / "detections.csv").unlink(), ["found depth pictures", "expected left ones"]),
         (lambda row: (row / "detections.csv").write_text(f"{HEADER}\n9,1,2,3,4,1,a\n"), ["line 2", "frame: found 9"]),
         (lambda row: (row / "detections.csv").write_text(f"{HEADER}\n0,9,2,3,4,1,a\n"), ["line 2", "xmin 9"]),
         (lambda row: (row / "depth" / "0000.png").unlink(), ["3 poses", "2 frames"]),
