@@ -1,4 +1,4 @@
-"""Detectors as ONNX files, run by ONNX Runtime (extra `onnx`), which is imported when a model is opened."""
+"""Detectors as ONNX files, run by ONNX Runtime, which is imported when a model is opened."""
 
 from pomona.detect.onnx.detector import OnnxDetector
 from pomona.detect.onnx.families import FAMILIES
