@@ -98,12 +98,10 @@ def test_targets_mark_each_fruit_once_and_leave_out_what_is_ignored():
     pixels = np.zeros((SIDE_PX, SIDE_PX, 3), np.uint8)
     boxes_px = np.array([[40, 40, 80, 88], [200, 100, 207, 107]], np.float32)
     ignored_px = np.array([[240, 240, 300, 300]], np.float32)
-    part = [((0, 0, SIDE_PX, SIDE_PX), 12.0)]
-    made = targets_of(PictureCrop(pixels, boxes_px, np.array([0.5, np.nan], np.float32), ignored_px, part))
+    made = targets_of(PictureCrop(pixels, boxes_px, np.array([0.5, np.nan], np.float32), ignored_px))
     assert np.argwhere(made.heat == 1).tolist() == [[16, 15], [25, 50]]
     assert made.punished[60:75, 60:75].max() == 0
     assert made.punished[:60].min() == 1
-    assert (made.smallest_px == 12).all()
     # The distances to the edges lead back to the box.
     rows, columns = np.nonzero(made.weights)
     edges = made.edges_px[:, rows, columns]
@@ -113,9 +111,7 @@ def test_targets_mark_each_fruit_once_and_leave_out_what_is_ignored():
 
 
 def test_a_picture_without_fruits_is_all_background():
-    crop = PictureCrop(
-        np.zeros((64, 64, 3), np.uint8), *(np.empty(shape, np.float32) for shape in ((0, 4), 0, (0, 4))), []
-    )
+    crop = PictureCrop(np.zeros((64, 64, 3), np.uint8), *(np.empty(shape, np.float32) for shape in ((0, 4), 0, (0, 4))))
     made = targets_of(crop)
     assert made.heat.max() == 0
     assert made.weights.max() == 0

@@ -152,3 +152,11 @@ def test_an_interpreter_that_is_none_is_named(tmp_path):
 def test_impossible_settings_are_told(wrong):
     with pytest.raises(PomonaError, match="found 0, expected a whole number from 1"):
         next(PathTracer(**wrong).render(geometry(), CAMERA, poses(1), SUN, seed=5))
+
+
+@needs_blender
+def test_a_graphics_card_that_is_not_there_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "")
+    tracer = PathTracer(samples=1, gpu=True, folder=tmp_path)
+    with pytest.raises(PomonaError, match="Blender: ended with 1: no graphics card that Blender can render with"):
+        list(tracer.render(geometry(), CAMERA, np.eye(4)[None], OVERCAST, 1))

@@ -23,6 +23,8 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
     parser.add_argument("--rendered", type=Path, nargs="*", default=[], help="recordings of `pomona synth video`")
     parser.add_argument("--batches", type=int, default=Plan.batches)
+    parser.add_argument("--device", default=Plan.device, help="cpu or cuda")
+    parser.add_argument("--workers", type=int, default=0, help="processes that draw crops")
     given = parser.parse_args()
     torch.set_num_threads(1)
     given.output.mkdir(parents=True, exist_ok=True)
@@ -33,7 +35,8 @@ def main() -> None:
             print(f"{done} of {given.batches} batches, loss {loss:.3f}, {time.monotonic() - begun_s:.0f} s", flush=True)
 
     sources = _sources(given.data, given.rendered, given.output / "cache")
-    train(sources, Plan(batches=given.batches), given.output / "checkpoint.pt", None, tell)
+    plan = Plan(batches=given.batches, device=given.device)
+    train(sources, plan, given.output / "checkpoint.pt", None, tell, workers=given.workers)
 
 
 def _sources(data: Path, recordings: list[Path], cache: Path) -> list[Source]:

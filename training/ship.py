@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,8 +48,11 @@ def main() -> None:
         "batches": batches,
         "calibration": {"slope": scaled.slope, "offset": scaled.offset},
     }
-    write_network(model_named(EXACT), network, min_score, about)
-    write_eight_bits(model_named(SHIPPED), model_named(EXACT), _prepared(validation))
+    with tempfile.TemporaryDirectory() as folder:
+        exact = Path(folder) / "exact.onnx"
+        write_network(exact, network, min_score, about)
+        write_eight_bits(model_named(SHIPPED), exact, _prepared(validation))
+    write_network(model_named(EXACT), network, min_score, about, halved=True)
     print(f"{batches} batches, {scaled}, least score {min_score:.3f}")
 
 

@@ -33,7 +33,7 @@ def synth_video(
     right_gain: float = typer.Option(1.0, min=0.1, max=4.0, help="Exposure of the right eye against the left."),
     shutter_ms: float = typer.Option(2.0, min=0.0, max=50.0, help="How long a picture is exposed."),
     jpeg: int = typer.Option(0, min=0, max=100, help="Quality of JPEG pictures; 0 writes PNG."),
-    renderer: str = typer.Option("raster", help="raster is fast, photo traces paths."),
+    renderer: str = typer.Option("raster", help="raster is fast, photo traces paths, photo-gpu on a graphics card."),
 ) -> None:
     """Render a drive along a seeded row as a stereo recording, with poses, depth, ids, boxes and fruits as truth."""
     from pomona.cli.progress import counting

@@ -18,6 +18,7 @@ from pomona.render.recording_writer import RecordingWriter
 from pomona.render.sensor import Sensor, exposure_for
 from pomona.render.weather import draw_weather
 from pomona.synth.living import RowDesign, grow
+from pomona.threads import cores
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +38,7 @@ BASELINE_M = 0.12
 
 FORMAT = 1
 
-RENDERERS = ("raster", "photo")
+RENDERERS = ("raster", "photo", "photo-gpu")
 
 
 @dataclass(frozen=True)
@@ -135,10 +136,12 @@ def renderer_called(name: str) -> Renderer:
         from pomona.render.raster import RasterRenderer
 
         return RasterRenderer()
-    if name == "photo":
-        from pomona.render.photo import PathTracer
+    if name in ("photo", "photo-gpu"):
+        from pomona.render.photo import GPU_SAMPLES, PathTracer
 
-        return PathTracer()
+        if name == "photo-gpu":
+            return PathTracer(samples=GPU_SAMPLES, threads=cores(), gpu=True)
+        return PathTracer(threads=cores())
     raise PomonaError(f"no renderer is called {name!r}; expected one of {', '.join(RENDERERS)}")
 
 

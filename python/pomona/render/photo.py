@@ -30,12 +30,15 @@ if TYPE_CHECKING:
     from pomona.render.surfaces import Surface
     from pomona.synth.row_geometry import RowGeometry
 
-__all__ = ["BLENDER_PYTHON", "PathTracer"]
+__all__ = ["BLENDER_PYTHON", "GPU_SAMPLES", "PathTracer"]
 
 SCRIPT = Path(__file__).with_name("blender_script") / "render_job.py"
 
 BLENDER_PYTHON = "POMONA_BLENDER_PYTHON"
 """Environment variable: a Python with `bpy`, where that of Pomona has none."""
+
+GPU_SAMPLES = 64
+"""Paths of a pixel on a graphics card, which traces so many while the next leaves are arranged."""
 
 NO_BLENDER = 3
 """Exit code of the script when Blender's module cannot be loaded."""
@@ -55,6 +58,8 @@ class PathTracer:
     samples : int
         Paths of a pixel, before the noise is removed.
     threads : int
+    gpu : bool
+        On a graphics card; its pictures differ in their last digits from those of the processor.
     folder : Path or None
         Where the job and its pairs are kept; None for a folder that is gone afterwards.
     interpreter : str or None
@@ -65,6 +70,7 @@ class PathTracer:
 
     samples: int = 8
     threads: int = 1
+    gpu: bool = False
     folder: Path | None = None
     interpreter: str | None = None
 
@@ -102,6 +108,7 @@ class PathTracer:
             "weather": dataclasses.asdict(weather),
             "samples": self.samples,
             "threads": require_threads(self.threads),
+            "gpu": self.gpu,
             "seed": seed,
         }
 

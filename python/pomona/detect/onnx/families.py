@@ -193,7 +193,7 @@ _YOLOX = Preparation(fit="corner", channels="BGR", divide_by=1.0)
 
 FAMILIES = {
     "pomona": Family(
-        "our own", "fruits (6, cells)", Preparation(fit="inside"), overlapping=True, decoder=_pomona, multiple_px=16
+        "our own", "fruits (6, cells)", Preparation(fit="inside"), overlapping=True, decoder=_pomona, multiple_px=32
     ),
     "rfdetr": Family("RF-DETR", "dets (N, 4), labels (N, slots)[, masks]", _RFDETR, False, _rfdetr),
     "rtdetr": Family(

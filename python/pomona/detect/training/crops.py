@@ -46,15 +46,12 @@ class PictureCrop:
     visible : (N,) float32
         NaN where nobody knows.
     ignored_px : (M, 4) float32
-    smallest_px : list of ((4,) tuple, float)
-        Parts of the crop, xmin, ymin, xmax, ymax, and how large a fruit must be there to be sure of a box.
     """
 
     pixels: NDArray[np.uint8]
     boxes_px: NDArray[np.float32]
     visible: NDArray[np.float32]
     ignored_px: NDArray[np.float32]
-    smallest_px: list[tuple[tuple[int, int, int, int], float]]
 
 
 def drawn_crop(samples: Sequence[Sample], draw: np.random.Generator) -> PictureCrop:
@@ -69,7 +66,7 @@ def drawn_crop(samples: Sequence[Sample], draw: np.random.Generator) -> PictureC
         crop = _joined(np.vstack(rows), parts)
     else:
         crop = _part(samples[0], SIDE_PX, (0, 0), draw)
-    return PictureCrop(disturbed(crop.pixels, draw), crop.boxes_px, crop.visible, crop.ignored_px, crop.smallest_px)
+    return PictureCrop(disturbed(crop.pixels, draw), crop.boxes_px, crop.visible, crop.ignored_px)
 
 
 def _joined(pixels: NDArray[np.uint8], parts: Sequence[PictureCrop]) -> PictureCrop:
@@ -78,7 +75,6 @@ def _joined(pixels: NDArray[np.uint8], parts: Sequence[PictureCrop]) -> PictureC
         np.concatenate([part.boxes_px for part in parts]),
         np.concatenate([part.visible for part in parts]),
         np.concatenate([part.ignored_px for part in parts]),
-        [smallest for part in parts for smallest in part.smallest_px],
     )
 
 
@@ -99,8 +95,7 @@ def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Ge
         if draw.random() < chance:
             pixels = np.flip(pixels, 1 - axis)
             boxes_px, ignored_px = (_turned_over(boxes, axis, side) for boxes in (boxes_px, ignored_px))
-    smallest_px = by * labelled.smallest_px
-    return _cut(pixels, boxes_px, labelled.visible, ignored_px, smallest_px, corner)
+    return _cut(pixels, boxes_px, labelled.visible, ignored_px, corner)
 
 
 def _corner(sample: Sample, seen: int, draw: np.random.Generator) -> tuple[int, int]:
@@ -134,7 +129,6 @@ def _cut(
     boxes_px: NDArray[np.float32],
     visible: NDArray[np.float32],
     ignored_px: NDArray[np.float32],
-    smallest_px: float,
     corner: tuple[int, int],
 ) -> PictureCrop:
     """Cut labels at the edge of their square, and move them to its corner of the crop."""
@@ -143,11 +137,9 @@ def _cut(
     sides, left_over = _sides(inside_px), (_sides(inside_px) / np.maximum(_sides(boxes_px), 1e-3)) ** 2
     wanted = (left_over >= LEAST_INSIDE) & (sides >= LEAST_PX)
     open_px = np.concatenate([inside_px[~wanted & (sides > 0)], np.clip(ignored_px, 0, side)])
-    place = (corner[0], corner[1], corner[0] + side, corner[1] + side)
     return PictureCrop(
         np.ascontiguousarray(pixels),
         inside_px[wanted] + move,
         visible[wanted],
         open_px[_sides(open_px) > 0] + move,
-        [(place, smallest_px)],
     )

@@ -24,7 +24,7 @@ def _convolution(given: int, made: int, normalised: bool, stride: int = 1) -> nn
 
 
 class FruitNetwork(nn.Module):
-    """Takes pictures (N, 3, H, W), RGB from 0 to 1, sides divisible by 16; gives maps (N, 6, H / 4, W / 4).
+    """Takes pictures (N, 3, H, W), RGB from 0 to 1, sides divisible by 32; gives maps (N, 6, H / 4, W / 4).
 
     Parameters
     ----------
@@ -41,6 +41,8 @@ class FruitNetwork(nn.Module):
         self.stem = nn.Sequential(block(3, 16, 2), block(16, 32, 2), block(32, 32))
         self.eighth = nn.Sequential(block(32, 96, 2), block(96, 96), block(96, 96))
         self.sixteenth = nn.Sequential(block(96, 144, 2), block(144, 144), block(144, 144))
+        self.thirtysecond = nn.Sequential(block(144, 160, 2), block(160, 160), block(160, 160))
+        self.to_sixteenth, self.at_sixteenth = nn.Conv2d(160, 144, 1), block(144, 144)
         self.to_eighth, self.at_eighth = nn.Conv2d(144, 96, 1), block(96, 96)
         self.to_quarter, self.at_quarter = nn.Conv2d(96, 32, 1), block(32, 32)
         self.map = nn.Conv2d(32, CHANNELS, 1)
@@ -53,10 +55,12 @@ class FruitNetwork(nn.Module):
         quarter = self.stem(pictures)
         eighth = self.eighth(quarter)
         sixteenth = self.sixteenth(eighth)
+        thirtysecond = self.thirtysecond(sixteenth)
+        sixteenth = self.at_sixteenth(sixteenth + _doubled(self.to_sixteenth(thirtysecond)))
         eighth = self.at_eighth(eighth + _doubled(self.to_eighth(sixteenth)))
         features = self.at_quarter(quarter + _doubled(self.to_quarter(eighth)))
         # Boxes need more than the 8 bits of a bfloat16's mantissa.
-        with torch.autocast("cpu", enabled=False):
+        with torch.autocast(pictures.device.type, enabled=False):
             return self.map(features.float())
 
 

@@ -25,8 +25,13 @@ OPSET = 17
 LAST = "map"
 """Name of the last convolution."""
 
+HALF = ".half"
+"""Ends the names of numbers that are kept in 16 bits."""
 
-def write_network(path: Path, network: FruitNetwork, min_score: float, about: Mapping[str, Any]) -> None:
+
+def write_network(
+    path: Path, network: FruitNetwork, min_score: float, about: Mapping[str, Any], *, halved: bool = False
+) -> None:
     """Write a network without normalisations.
 
     Parameters
@@ -39,8 +44,10 @@ def write_network(path: Path, network: FruitNetwork, min_score: float, about: Ma
         Least score that a detector with it takes.
     about : mapping
         What it was trained on, JSON values.
+    halved : bool
+        Whether the file holds its numbers in 16 bits; it calculates in 32 bits all the same.
     """
-    graph = _Graph({name: weights.detach().numpy() for name, weights in network.state_dict().items()})
+    graph = _Graph({name: weights.detach().numpy() for name, weights in network.state_dict().items()}, halved)
     graph.network()
     sides = ["height", "width"]
     made = helper.make_graph(
@@ -71,7 +78,8 @@ def network_in(path: Path) -> FruitNetwork:
         initializers = onnx.load(path).graph.initializer
     except Exception as error:  # protobuf's errors have no base of their own
         raise PomonaError(f"{path}: not an ONNX model ({' '.join(str(error).split())[:100]})") from None
-    found = {each.name: torch.from_numpy(np.array(numpy_helper.to_array(each))) for each in initializers}
+    arrays = {each.name.removesuffix(HALF): np.array(numpy_helper.to_array(each)) for each in initializers}
+    found = {name: torch.from_numpy(array) for name, array in arrays.items()}
     network = FruitNetwork(normalised=False)
     wanted = network.state_dict()
     if any(name not in found or found[name].shape != weights.shape for name, weights in wanted.items()):
@@ -83,16 +91,24 @@ def network_in(path: Path) -> FruitNetwork:
 class _Graph:
     """Nodes of the network, under the names of its parts."""
 
-    def __init__(self, weights: dict[str, Any]) -> None:
+    def __init__(self, weights: dict[str, Any], halved: bool) -> None:
         self.weights = weights
         self.nodes: list[onnx.NodeProto] = []
-        self.initializers = [numpy_helper.from_array(array, name) for name, array in weights.items()]
+        self.initializers: list[onnx.TensorProto] = []
+        for name, array in weights.items():
+            if halved:
+                self.initializers.append(numpy_helper.from_array(array.astype(np.float16), name + HALF))
+                self.node("Cast", [name + HALF], name, to=TensorProto.FLOAT)
+            else:
+                self.initializers.append(numpy_helper.from_array(array, name))
         self.initializers.append(numpy_helper.from_array(np.array([1, 1, 2, 2], np.float32), "doubled"))
 
     def network(self) -> None:
         quarter = self.part("stem", "pictures")
         eighth = self.part("eighth", quarter)
         sixteenth = self.part("sixteenth", eighth)
+        sixteenth = self.joined("to_sixteenth", self.part("thirtysecond", sixteenth), sixteenth)
+        sixteenth = self.block("at_sixteenth", sixteenth)
         eighth = self.joined("to_eighth", sixteenth, eighth)
         quarter = self.joined("to_quarter", self.block("at_eighth", eighth), quarter)
         self.convolution(LAST, self.block("at_quarter", quarter), FRUITS)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 __all__ = ["Labelled"]
 
-USUAL_PX = 25.0
-"""Side of a small fruit in a picture without any."""
+USUAL_PX = 35.0
+"""Side of a usual fruit in a picture without any."""
 
 SMALLEST = 0.6
-"""Where small fruits have no boxes: what is smaller than this times a small labelled fruit may be one of them."""
+"""Where small fruits have no boxes: what is smaller than this times the usual labelled fruit may be one of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,8 @@ class Labelled:
 
     @property
     def smallest_px(self) -> float:
-        """Side, in the geometric mean, from which on a fruit is sure to have a box.
-
-        The smallest labelled fruit may be a sliver between leaves: the smallest tenth does not count.
-        """
+        """Side, in the geometric mean, from which on a fruit is sure to have a box."""
         if self.complete:
             return 0.0
         sides_px = np.sqrt(np.prod(self.boxes_px[:, 2:] - self.boxes_px[:, :2], axis=1))
-        return SMALLEST * float(np.quantile(sides_px, 0.1) if len(sides_px) else USUAL_PX)
+        return SMALLEST * float(np.median(sides_px) if len(sides_px) else USUAL_PX)

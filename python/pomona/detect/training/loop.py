@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from torch.utils.data import DataLoader, Dataset
 
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
-from pomona.detect.training.crops import PictureCrop, drawn_crop
+from pomona.detect.training.crops import drawn_crop
 from pomona.detect.training.fruit_network import FruitNetwork
 from pomona.detect.training.loss import loss_of
 from pomona.detect.training.targets import Targets, targets_of
@@ -63,15 +64,18 @@ class Plan:
     seed : int
     half_precision : bool
         bfloat16 where it helps: on processors that calculate with it.
+    device : str
+        As PyTorch names it: cpu, cuda.
     """
 
-    batches: int = 8000
-    batch: int = 8
-    rate: float = 2e-3
-    warm_up: int = 100
-    falling: float = 0.4
+    batches: int = 13000
+    batch: int = 32
+    rate: float = 3e-3
+    warm_up: int = 300
+    falling: float = 0.5
     seed: int = 1
     half_precision: bool = True
+    device: str = "cpu"
 
     def rate_at(self, number: int) -> float:
         """Give the rate of a batch."""
@@ -93,7 +97,13 @@ class _State:
 
 
 def train(
-    sources: Sequence[Source], plan: Plan, checkpoint: Path, begin: FruitNetwork | None, progress: Progress
+    sources: Sequence[Source],
+    plan: Plan,
+    checkpoint: Path,
+    begin: FruitNetwork | None,
+    progress: Progress,
+    *,
+    workers: int = 0,
 ) -> FruitNetwork:
     """Train a network, going on from a checkpoint that is there.
 
@@ -107,6 +117,8 @@ def train(
     begin : FruitNetwork or None
         What to begin with, None for numbers drawn by the seed.
     progress : callable
+    workers : int
+        Processes that draw crops meanwhile; 0 for none besides this one.
 
     Returns
     -------
@@ -117,28 +129,27 @@ def train(
     state = _begun(FruitNetwork() if begin is None else begin, plan)
     if checkpoint.is_file():
         _restore(state, checkpoint)
-    while state.done < plan.batches:
-        _step(state, sources, plan)
+    for pictures, wanted in _batches(sources, plan, state.done, workers):
+        _step(state, pictures, wanted, plan)
         progress(state.done, state.loss)
         if state.done % SAVED_EVERY == 0 or state.done == plan.batches:
             _save(state, checkpoint)
-    return state.mean
+    return state.mean.cpu()
 
 
 def _begun(network: FruitNetwork, plan: Plan) -> _State:
-    network = network.to(memory_format=torch.channels_last)
+    network = network.to(plan.device, memory_format=torch.channels_last)
     bent = [weights for weights in network.parameters() if weights.ndim > 1]
     plain = [weights for weights in network.parameters() if weights.ndim == 1]
     groups = [{"params": bent, "weight_decay": 0.02}, {"params": plain, "weight_decay": 0.0}]
     return _State(network, copy.deepcopy(network), torch.optim.AdamW(groups, lr=plan.rate))
 
 
-def _step(state: _State, sources: Sequence[Source], plan: Plan) -> None:
-    pictures, wanted = _batch(sources, plan, state.done)
+def _step(state: _State, pictures: torch.Tensor, wanted: dict[str, torch.Tensor], plan: Plan) -> None:
     for group in state.optimiser.param_groups:
         group["lr"] = plan.rate_at(state.done)
     state.network.train()
-    with torch.autocast("cpu", torch.bfloat16, enabled=plan.half_precision):
+    with torch.autocast(pictures.device.type, torch.bfloat16, enabled=plan.half_precision):
         maps = state.network(pictures)
     loss = loss_of(maps.float(), wanted)
     state.optimiser.zero_grad(set_to_none=True)
@@ -160,20 +171,44 @@ def _follow(mean: FruitNetwork, network: FruitNetwork, kept: float) -> None:
             ours.copy_(theirs)
 
 
-def _batch(sources: Sequence[Source], plan: Plan, number: int) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-    draw = np.random.default_rng([plan.seed, number])
-    crops = [drawn_crop(_drawn(sources, draw), draw) for _ in range(plan.batch)]
-    targets = [targets_of(crop) for crop in crops]
-    wanted = {
-        each.name: torch.from_numpy(np.stack([getattr(target, each.name) for target in targets]))
-        for each in fields(Targets)
-    }
-    return torch.from_numpy(_as_input(crops)).contiguous(memory_format=torch.channels_last), wanted
+_Batch = tuple[torch.Tensor, dict[str, torch.Tensor]]
+"""Pictures and what is wanted of them."""
 
 
-def _as_input(crops: Sequence[PictureCrop]) -> NDArray[np.float32]:
-    stacked = np.stack([crop.pixels[:, :, ::-1] for crop in crops]).transpose(0, 3, 1, 2)
-    return stacked.astype(np.float32) / np.float32(255)
+def _batches(sources: Sequence[Source], plan: Plan, first: int, workers: int) -> Iterator[_Batch]:
+    """Give the batches from number `first` on, on the plan's device: pictures (N, 3, S, S), RGB from 0 to 1."""
+    drawn = DataLoader(
+        _Drawn(sources, plan),
+        batch_size=None,
+        sampler=range(first, plan.batches),
+        num_workers=workers,
+        worker_init_fn=_alone,
+        pin_memory=plan.device != "cpu",
+    )
+    for pictures, wanted in drawn:
+        moved = {name: target.to(plan.device, non_blocking=True) for name, target in wanted.items()}
+        yield pictures.to(plan.device, non_blocking=True).permute(0, 3, 1, 2).float() / 255, moved
+
+
+def _alone(_worker: int) -> None:
+    cv2.setNumThreads(1)
+
+
+class _Drawn(Dataset[_Batch]):
+    """Batches by their numbers: pictures (N, S, S, 3) uint8 RGB."""
+
+    def __init__(self, sources: Sequence[Source], plan: Plan) -> None:
+        self.sources, self.plan = sources, plan
+
+    def __getitem__(self, number: int) -> _Batch:
+        draw = np.random.default_rng([self.plan.seed, number])
+        crops = [drawn_crop(_drawn(self.sources, draw), draw) for _ in range(self.plan.batch)]
+        targets = [targets_of(crop) for crop in crops]
+        wanted = {
+            each.name: torch.from_numpy(np.stack([getattr(target, each.name) for target in targets]))
+            for each in fields(Targets)
+        }
+        return torch.from_numpy(np.stack([crop.pixels[:, :, ::-1] for crop in crops])), wanted
 
 
 def _drawn(sources: Sequence[Source], draw: np.random.Generator) -> list[Sample]:
@@ -196,7 +231,7 @@ def _save(state: _State, checkpoint: Path) -> None:
 
 
 def _restore(state: _State, checkpoint: Path) -> None:
-    content = torch.load(checkpoint, weights_only=True)
+    content = torch.load(checkpoint, map_location="cpu", weights_only=True)
     state.network.load_state_dict(content["network"])
     state.mean.load_state_dict(content["mean"])
     state.optimiser.load_state_dict(content["optimiser"])
@@ -205,6 +240,7 @@ def _restore(state: _State, checkpoint: Path) -> None:
 
 def mean_of(checkpoint: Path) -> tuple[FruitNetwork, int]:
     """Give the mean network of a checkpoint, and how many batches it has seen."""
-    state = _begun(FruitNetwork(), Plan())
-    _restore(state, checkpoint)
-    return state.mean.eval(), state.done
+    content = torch.load(checkpoint, map_location="cpu", weights_only=True)
+    mean = FruitNetwork()
+    mean.load_state_dict(content["mean"])
+    return mean.eval(), content["done"]

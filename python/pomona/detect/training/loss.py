@@ -9,12 +9,6 @@ from pomona.detect.training.fruit_network import SIZE_PX
 
 __all__ = ["edges_of", "loss_of"]
 
-SURE = 0.3
-"""A cell that is so sure of a fruit, too small to have been labelled, may well be right."""
-
-DOUBTED = 0.5
-"""Weight of the punishment there."""
-
 BOXES = 2.0
 SHARES = 0.2
 """Weights of boxes and of visible shares against centres."""
@@ -29,7 +23,7 @@ def loss_of(maps: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor
     """Give the loss of maps (N, 6, h, w) against targets by name, (N, ...) each, for one fruit in the mean."""
     edges_px = edges_of(maps)
     n_fruits = (wanted["heat"] == 1).sum().clamp(min=1)
-    centres = _centres(maps[:, 0], edges_px.detach(), wanted) / n_fruits
+    centres = _centres(maps[:, 0], wanted) / n_fruits
     weights = wanted["weights"]
     total = weights.sum().clamp(min=1)
     boxes = (weights * _unlike(edges_px, wanted["edges_px"])).sum() / total
@@ -38,14 +32,11 @@ def loss_of(maps: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor
     return centres + BOXES * boxes + SHARES * shares / total
 
 
-def _centres(logits: torch.Tensor, edges_px: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:
+def _centres(logits: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:
     """Give the focal loss of CornerNet (Law and Deng 2018, eq. 1), without what nobody can know to be wrong."""
     heat, scores = wanted["heat"], logits.sigmoid()
-    sides = ((edges_px[:, 0] + edges_px[:, 2]) * (edges_px[:, 1] + edges_px[:, 3])).sqrt()
-    unlabelled = (sides < wanted["smallest_px"]) & (scores.detach() > SURE) & (heat < 0.1)
-    punished = torch.where(unlabelled, DOUBTED, 1.0) * wanted["punished"]
     missed = functional.softplus(-logits) * (1 - scores) ** 2
-    false = functional.softplus(logits) * scores**2 * (1 - heat) ** 4 * punished
+    false = functional.softplus(logits) * scores**2 * (1 - heat) ** 4 * wanted["punished"]
     return torch.where(heat == 1, missed, false).sum()
 
 

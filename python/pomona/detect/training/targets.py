@@ -34,8 +34,6 @@ class Targets:
         1 at the centre of a fruit, falling off around it.
     punished : (h, w) float32
         1 where the absence of a fruit is known, 0 where it is not.
-    smallest_px : (h, w) float32
-        Smaller fruits may be there without a box; 0 where all have one.
     weights : (h, w) float32
         How much the box of a cell counts.
     edges_px : (4, h, w) float32
@@ -46,7 +44,6 @@ class Targets:
 
     heat: NDArray[np.float32]
     punished: NDArray[np.float32]
-    smallest_px: NDArray[np.float32]
     weights: NDArray[np.float32]
     edges_px: NDArray[np.float32]
     visible: NDArray[np.float32]
@@ -58,13 +55,10 @@ def targets_of(crop: PictureCrop) -> Targets:
     made = Targets(
         heat=np.zeros((cells, cells), np.float32),
         punished=np.ones((cells, cells), np.float32),
-        smallest_px=np.zeros((cells, cells), np.float32),
         weights=np.zeros((cells, cells), np.float32),
         edges_px=np.ones((4, cells, cells), np.float32),
         visible=np.full((cells, cells), np.nan, np.float32),
     )
-    for place, side_px in crop.smallest_px:
-        made.smallest_px[_cells_in(np.array(place, np.float32))] = side_px
     for box_px in crop.ignored_px:
         made.punished[_cells_in(box_px)] = 0
     # Small fruits last: where boxes overlap, a small one has no other cells.

@@ -71,7 +71,7 @@ def animate(scene: Any, frames: range, path: Path, arrange: Arrange, take: Take)
 
 def _common(scene: Any, job: dict[str, Any], samples: int) -> None:
     scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
+    scene.cycles.device = "GPU" if job["gpu"] else "CPU"
     scene.cycles.samples, scene.cycles.use_adaptive_sampling = samples, False
     scene.render.use_persistent_data = True
     scene.render.threads_mode, scene.render.threads = "FIXED", job["threads"]

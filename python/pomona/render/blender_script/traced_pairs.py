@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from graphics_card import use_graphics_card
 from light import light
 from passes import animate, light_pass, truth_pass
 from stage import Stage
@@ -21,6 +22,8 @@ def render_missing(folder: Path, first: int) -> None:
     """Set the stage once; look what is there, then render what is missing, in runs of pairs."""
     job = json.loads((folder / "job.json").read_text())
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    if job["gpu"]:
+        use_graphics_card()
     scene = bpy.context.scene
     shown = bpy.data.collections.new("shown")
     scene.collection.children.link(shown)
