@@ -24,8 +24,8 @@ install: $(UV) ## build pomona and install it with its tools into .venv
 develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
 	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install
 
-demo: install ## the main job in half a minute: two dates of a row, one map, one picture
-	$(RUN) pomona demo
+demo: install ## the main job in a minute: three recordings of a row, one map, every fruit found again
+	$(RUN) pomona demo examples/row
 
 test: test-rust test-python ## all tests
 

@@ -21,6 +21,7 @@ NAMES = (
     "odometry",
     "tracking",
     "scan",
+    "shipped",
     "disturbed",
     "endurance",
     "speed",

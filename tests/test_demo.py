@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from pomona.demo import Demo, run_demo
+from pomona.demo_row import run_row_demo
+from pomona.errors import PomonaError
 from pomona.orchard import OrchardMap
 
 
@@ -56,3 +58,54 @@ def test_refuses_a_folder_that_cannot_be(tmp_path: Path) -> None:
     done = subprocess.run([pomona, "demo", "-o", tmp_path / "file"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
+
+
+ROW = Path(__file__).parents[1] / "examples" / "row"
+
+
+@pytest.fixture
+def two_visits(tmp_path: Path) -> Path:
+    row = tmp_path / "row"
+    row.mkdir()
+    for day in ("2024-08-28", "2024-09-12"):
+        (row / day).symlink_to(ROW / day)
+    return row
+
+
+def test_recordings_go_in_and_fruits_found_again_come_out(two_visits: Path, tmp_path: Path) -> None:
+    lines: list[str] = []
+    made = run_row_demo(two_visits, tmp_path / "out", lines.append)
+    first, second = made.visits
+    assert len(lines) == 2
+    assert first.match is None
+    assert second.match is not None
+    assert second.score is not None
+    assert second.match.status.value == "Found"
+    assert second.score.precision is not None
+    assert second.score.precision > 0.9
+    assert len(second.match.pairs) > 100
+    # The apples of the model grow by 4 to 5 mm in these 15 days.
+    assert second.growth_mm == pytest.approx(4.5, abs=2.0)
+    assert made.n_identities == first.n_fruits + second.n_fruits - len(second.match.pairs)
+    assert second.picture is not None
+    assert second.picture.stat().st_size > 10_000
+
+
+def test_a_row_with_a_visit_without_its_truth_is_refused_before_anything_is_made(
+    two_visits: Path, tmp_path: Path
+) -> None:
+    (two_visits / "2024-08-30").mkdir()
+    with pytest.raises(PomonaError, match=r"2024-08-30: found no row.mp4, expected one in the folder of each visit"):
+        run_row_demo(two_visits, tmp_path / "out")
+    with pytest.raises(PomonaError, match="found 0 folders, expected one for each of two visits or more"):
+        run_row_demo(tmp_path / "nowhere", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_map_of_somebody_else_is_not_destroyed(two_visits: Path, tmp_path: Path, made: Demo) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "orchard.gpkg").write_bytes(b"somebody's")
+    with pytest.raises(PomonaError, match="is not the map of a demo"):
+        run_row_demo(two_visits, out)
+    assert (out / "orchard.gpkg").read_bytes() == b"somebody's"

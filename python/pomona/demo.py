@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
 
+__all__ = ["Demo", "growth_mm", "remove_own", "run_demo"]
+
 # Three weeks apart: a third hidden on each visit, branches 3 cm lower, fruits 12 mm thicker, nobody knows the poses.
 DEMO_CELL = Cell("demo", hidden=0.30, false_rate=0.05, noise_m=0.02, sag_m=0.03, upright=True, sizes=True)
 
@@ -71,7 +73,7 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
     """
     folder.mkdir(parents=True, exist_ok=True)
     orchard, pairs, picture = folder / "orchard.gpkg", folder / "pairs.csv", folder / "match.png"
-    _remove_own(orchard)
+    remove_own(orchard)
 
     scene = scene_pair(DEMO_CELL, DEMO_SEED)
     tell(f"drew a row of five trees as two visits saw it: {len(scene.map)} fruits, then {len(scene.query)}")
@@ -95,14 +97,15 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
         picture=picture,
         match=second.match,
         n_identities=len(OrchardMap(orchard).fruits()),
-        growth_mm=_growth_mm(second.match, scene.query, known),
+        growth_mm=growth_mm(second.match, scene.query, known),
         score=score_pairs(
             second.match.pairs.tolist(), scene.query.ids or (), tuple(truth_of[name] for name in known.ids or ())
         ),
     )
 
 
-def _remove_own(orchard: Path) -> None:
+def remove_own(orchard: Path) -> None:
+    """Remove the map that a demo made; refuse any other."""
     if orchard.exists() and not is_of_demo(orchard):
         raise PomonaError(f"{orchard}: is not the map of a demo: take another folder")
     orchard.unlink(missing_ok=True)
@@ -114,7 +117,7 @@ def _write_visit(folder: Path, date: str, cloud: FruitCloud) -> Path:
     return path
 
 
-def _growth_mm(match: Match, query: FruitCloud, map: FruitCloud) -> float:
+def growth_mm(match: Match, query: FruitCloud, map: FruitCloud) -> float:
     """Median difference of the diameters over the pairs."""
     assert query.diameters_m is not None
     assert map.diameters_m is not None

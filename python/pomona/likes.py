@@ -15,6 +15,7 @@ __all__ = [
     "BOXES_DRAWN",
     "DEMO",
     "DEMO_DATES",
+    "DEMO_NAME",
     "DEMO_RECORDING",
     "DEMO_SEED",
     "DRAWN_BOXES",
@@ -68,6 +69,9 @@ SEASON_KEYS = {"season", "seed", "visits"}
 DEMO_SEED = 1
 DEMO_DATES = ("2024-08-09", "2024-08-28")
 DEMO_RECORDING = f"synthetic, seed {DEMO_SEED}"
+DEMO_NAME = "demo "
+"""Begins the names of the sessions that the demo scans."""
+
 """Of the visits of `pomona demo`, and in their tables."""
 
 Database = Literal["session", "map", "other"]
@@ -219,17 +223,19 @@ def is_of_demo(path: Path) -> bool:
 
     try:
         with snapshot(path) as (connection, _):
-            (recordings,) = columns_of(connection, "sessions", ("recording",))
+            recordings, names = columns_of(connection, "sessions", ("recording", "name"))
     except PomonaError:
         return False
-    return set(recordings) <= {DEMO_RECORDING}
+    visits = zip(recordings, names, strict=True)
+    return all(recording == DEMO_RECORDING or name.startswith(DEMO_NAME) for recording, name in visits)
 
 
 def _is_demo(folder: Path) -> bool:
     """Tell a folder in which every file with one of the demo's names is of its kind."""
-    tells = {"orchard.gpkg": is_of_demo, "pairs.csv": PAIRS.tells, "match.png": PICTURE.tells}
-    tells |= {f"{date}.gpkg": is_of_demo for date in DEMO_DATES}
-    return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
+    tells: dict[str, Callable[[Path], bool]] = {"orchard.gpkg": is_of_demo, "????-??-??.gpkg": is_of_demo}
+    tells |= {f"pairs{dated}.csv": PAIRS.tells for dated in ("", "_????-??-??")}
+    tells |= {f"match{dated}.png": PICTURE.tells for dated in ("", "_????-??-??")}
+    return all(is_kind(path) for name, is_kind in tells.items() for path in folder.glob(name))
 
 
 def _is_truth(path: Path) -> bool:
