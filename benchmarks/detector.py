@@ -1,6 +1,6 @@
 """The shipped fruit detector on photographs and rendered pictures that it was not trained on, each set apart.
 
-Fruits of rows behind have no boxes in the photographs: boxes smaller than 0.6 times a small labelled fruit of their
+Fruits of rows behind have no boxes in the photographs: boxes smaller than 0.6 times the usual labelled fruit of their
 picture that match none are neither right nor wrong; one column counts them as wrong. Prints AP50, the recall where the
 precision is .90 and .95, precision and recall at the default threshold, and the time for one picture of 640x360 on one
 thread. Writes detector.md; with `--draw FOLDER` the boxes too, to look at.

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pomona import _core
 from pomona.render.scene_view import RenderedPair, Weather
+from pomona.threads import cores
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +22,8 @@ if TYPE_CHECKING:
     from pomona.synth.row_geometry import RowGeometry
 
 __all__ = ["RasterRenderer"]
+
+_Arrays = tuple[Any, Any, Any, Any]
 
 
 class RasterRenderer:
@@ -35,8 +41,15 @@ class RasterRenderer:
         *,
         first: int = 0,
     ) -> Iterator[RenderedPair]:
-        """Give the pair of each pose, (N, 4, 4), in turn, from number `first` on."""
+        """Give the pair of each pose, (N, 4, 4), in turn, from number `first` on; as many at once as cores."""
         scene = _core.RowScene(geometry, camera, session_from_camera, weather, seed=seed)
-        for frame in range(first, len(session_from_camera)):
-            left, right, depth_m, ids = scene.pair(session_from_camera[frame], frame)
-            yield RenderedPair(left, right, depth_m, ids)
+        frames = iter(range(first, len(session_from_camera)))
+        with ThreadPoolExecutor(cores(), "pomona-render") as pool:
+
+            def begin(frame: int) -> Future[_Arrays]:
+                return pool.submit(scene.pair, session_from_camera[frame], frame)
+
+            begun = deque(map(begin, islice(frames, cores())))
+            while begun:
+                yield RenderedPair(*begun.popleft().result())
+                begun.extend(map(begin, islice(frames, 1)))
