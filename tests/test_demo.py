@@ -87,6 +87,7 @@ def test_recordings_go_in_and_fruits_found_again_come_out(two_visits: Path, tmp_
     # The apples of the model grow by 4 to 5 mm in these 15 days.
     assert second.growth_mm == pytest.approx(4.5, abs=2.0)
     assert made.n_identities == first.n_fruits + second.n_fruits - len(second.match.pairs)
+    assert made.same_fruits.stat().st_size > 100_000
     assert second.picture is not None
     assert second.picture.stat().st_size > 10_000
 

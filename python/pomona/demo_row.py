@@ -17,10 +17,14 @@ from pomona.likes import DEMO_NAME
 from pomona.orchard import OrchardMap, add_session, load_session
 from pomona.pairs import write_pairs
 from pomona.plot import draw_match, save_picture
+from pomona.recording import open_recording
 from pomona.scanning import scan
+from pomona.survey.same_fruits import Seen, draw_same_fruits
 from pomona.truth import WITHIN_M, aligned, true_fruits
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from pomona.matching import Match
 
 __all__ = ["DemoVisit", "RowDemo", "run_row_demo"]
@@ -36,6 +40,8 @@ class DemoVisit:
     ----------
     session : Path
     n_fruits : int
+    fruit_ids : (N,) int64
+        Their identities in the map.
     diameter_mm : float
         Median.
     match : Match or None
@@ -50,6 +56,7 @@ class DemoVisit:
 
     session: Path
     n_fruits: int
+    fruit_ids: NDArray[np.int64]
     diameter_mm: float
     match: Match | None = None
     picture: Path | None = None
@@ -68,11 +75,14 @@ class RowDemo:
     visits : list of DemoVisit
     n_identities : int
         Fruits in the map.
+    same_fruits : Path
+        Pictures of the last two visits with the fruits that both show.
     """
 
     orchard: Path
     visits: list[DemoVisit]
     n_identities: int
+    same_fruits: Path
 
 
 def run_row_demo(row: Path, folder: Path, tell: Callable[[str], None] = lambda _: None) -> RowDemo:
@@ -97,12 +107,16 @@ def run_row_demo(row: Path, folder: Path, tell: Callable[[str], None] = lambda _
     orchard = folder / "orchard.gpkg"
     remove_own(orchard)
     made: list[DemoVisit] = []
+    seen: list[Seen] = []
     for number, visit in enumerate(visits):
-        session = folder / f"{visit.name}.gpkg"
-        scan(visit / VIDEO, output=session, name=f"{DEMO_NAME}{visit.name}", date=visit.name)
+        session, recording = folder / f"{visit.name}.gpkg", open_recording(visit / VIDEO)
+        survey = scan(recording, output=session, name=f"{DEMO_NAME}{visit.name}", date=visit.name)
         made.append(_added(orchard, session, visits[: number + 1], folder))
+        seen.append(Seen(recording, survey.parts[survey.longest].boxes, made[-1].fruit_ids))
         tell(_line(made[-1], visit.name))
-    return RowDemo(orchard, made, len(OrchardMap(orchard).fruits()))
+    same = folder / "same_fruits.png"
+    draw_same_fruits(same, *seen[-2:])
+    return RowDemo(orchard, made, len(OrchardMap(orchard).fruits()), same)
 
 
 def _visits_in(row: Path) -> list[Path]:
@@ -123,14 +137,14 @@ def _added(orchard: Path, session: Path, visits: list[Path], folder: Path) -> De
     known = OrchardMap(orchard).fruits() if orchard.exists() else None
     added = add_session(orchard, loaded)
     if known is None or added.match is None or not added.is_added:
-        return DemoVisit(session, len(cloud), sizes_mm, added.match)
+        return DemoVisit(session, len(cloud), added.fruit_ids, sizes_mm, added.match)
     day = visits[-1].name
     picture, pairs = folder / f"match_{day}.png", folder / f"pairs_{day}.csv"
     write_pairs(pairs, added.match, cloud, known)
     save_picture(draw_match(cloud, known, added.match), picture)
     score = _score(added.match, (cloud, known), (visits[-1] / TRUTH, visits[-2] / TRUTH))
     grown_mm = growth_mm(added.match, cloud, known)
-    return DemoVisit(session, len(cloud), sizes_mm, added.match, picture, pairs, grown_mm, score)
+    return DemoVisit(session, len(cloud), added.fruit_ids, sizes_mm, added.match, picture, pairs, grown_mm, score)
 
 
 def _score(match: Match, clouds: tuple[FruitCloud, FruitCloud], truth: tuple[Path, Path]) -> PairScore:

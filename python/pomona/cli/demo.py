@@ -73,6 +73,7 @@ def _lines_of_row(made: RowDemo) -> list[str]:
         f"{len(made.visits)} visits, {made.n_identities} identities in the map",
         *found_again,
         "look at",
+        f"  {made.same_fruits}  the same fruits on the last two dates",
         *pictures,
         f"  {made.orchard}  the map; opens in QGIS",
         "go on with",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -17,6 +16,7 @@ from pomona.errors import PomonaError
 from pomona.likes import VIDEO_MARK
 from pomona.recording import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
+from pomona.survey.lettering import colour_of, lettering, write_on
 from pomona.survey.part import Part
 from pomona.survey.prefetch import prefetched
 from pomona.survey.story import Survey
@@ -28,14 +28,8 @@ Picture = NDArray[np.uint8]
 RATE_HZ = 10
 """Of a recording that tells no times."""
 
-GOLDEN = 0.618034
-"""Step of the hue from one fruit to the next: neighbours in number never look alike."""
-
 LEGIBLE_PX = 1280
 """Smaller pictures are drawn on enlarged, to this width or more."""
-
-LETTERS_FIT_PX, LEAST_LETTERING = 600, 0.9
-"""Height of the picture for which letters are 9 px high; they grow with it, and below stay what the font can show."""
 
 GREY = (160, 160, 160)
 """Boxes that became no fruit."""
@@ -134,12 +128,12 @@ def _drawn(picture: Picture, frame: int, part: Part, times: int) -> Picture:
     for row in rows:
         low, high = (np.round(times * corner).astype(int) for corner in np.split(part.boxes.boxes_px[row], 2))
         fruit = int(part.boxes.fruits[row])
-        colour = GREY if fruit < 0 else _colour(fruit)
+        colour = GREY if fruit < 0 else colour_of(fruit)
         cv2.rectangle(drawn, low.tolist(), high.tolist(), colour, max(1, round(size)), cv2.LINE_AA)
         if fruit >= 0:
-            _write(drawn, (low[0], low[1] - 4 * size), _label(part, fruit), colour, size)
-            _write(drawn, (low[0], high[1] + 13 * size), f"{depths_m[fruit]:.2f} m", colour, size)
-    _write(drawn, (8 * size, 18 * size), f"frame {frame}", (255, 255, 255), size)
+            write_on(drawn, (low[0], low[1] - 4 * size), _label(part, fruit), colour, size)
+            write_on(drawn, (low[0], high[1] + 13 * size), f"{depths_m[fruit]:.2f} m", colour, size)
+    write_on(drawn, (8 * size, 18 * size), f"frame {frame}", (255, 255, 255), size)
     return drawn
 
 
@@ -153,24 +147,3 @@ def _depths(part: Part, frame: int) -> NDArray[np.float64]:
 def _label(part: Part, fruit: int) -> str:
     name = part.cloud.label(fruit)
     return name if part.cloud.diameters_m is None else f"{name}: {1000 * part.cloud.diameters_m[fruit]:.0f} mm"
-
-
-def lettering(height_px: int) -> float:
-    """Size of letters and lines: on a screen a picture is seen as high as the screen, whatever its pixels."""
-    return max(height_px / LETTERS_FIT_PX, LEAST_LETTERING)
-
-
-def _write(picture: Picture, place: tuple[float, float], text: str, colour: tuple[int, int, int], size: float) -> None:
-    """Write with a dark rim, legible on leaves and sky."""
-    import cv2
-
-    x, y, rim = round(float(place[0])), round(float(place[1])), max(1, round(size))
-    # Thicker letters are also wider, so the rim is the same letters moved.
-    around = [(x + right, y + down) for right in (-rim, 0, rim) for down in (-rim, 0, rim)]
-    for at, ink in (*((each, (0, 0, 0)) for each in around), ((x, y), colour)):
-        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.38 * size, ink, rim, cv2.LINE_AA)
-
-
-def _colour(fruit: int) -> tuple[int, int, int]:
-    red, green, blue = colorsys.hsv_to_rgb(fruit * GOLDEN % 1.0, 0.55, 1.0)
-    return int(255 * blue), int(255 * green), int(255 * red)
