@@ -13,12 +13,14 @@ from typing import Literal
 __all__ = [
     "BOXES",
     "BOXES_DRAWN",
+    "CALIPER_PAIRS",
     "DEMO",
     "DEMO_DATES",
     "DEMO_RECORDING",
     "DEMO_SEED",
     "DRAWN_BOXES",
     "EXPORTS",
+    "GROWN",
     "KEPT",
     "MODEL",
     "PAIRS",
@@ -26,6 +28,7 @@ __all__ = [
     "RENDERED",
     "SCANNED",
     "SEASON",
+    "THINNING",
     "VIDEO",
     "VISITS",
     "Database",
@@ -69,6 +72,16 @@ DEMO_SEED = 1
 DEMO_DATES = ("2024-08-09", "2024-08-28")
 DEMO_RECORDING = f"synthetic, seed {DEMO_SEED}"
 """Of the visits of `pomona demo`, and in their tables."""
+
+GROWN_COLUMNS = {
+    "series.csv": "fruit_id,date,diameter_mm,sigma_mm",
+    "curves.csv": "fruit_id,date,diameter_mm,low_mm,high_mm",
+    "fruits.csv": "fruit_id,n_dates,rate_mm_per_day,forecast_mm,outlier",
+    "blocks.csv": "block,n_fruits,mean_mm,rate_mm_per_day,forecast_mm",
+    "classes.csv": "date,from_mm,below_mm,n_fruits,kg,packs",
+}
+GROWN_PICTURES = ("curves.png", "sizes.png", "variability.png")
+"""What `pomona growth` writes, and the columns by which its tables are told."""
 
 Database = Literal["session", "map", "other"]
 
@@ -232,6 +245,13 @@ def _is_demo(folder: Path) -> bool:
     return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
 
 
+def _is_grown(folder: Path) -> bool:
+    """Tell a folder in which every file with one of growth's names is of its kind."""
+    tells = {name: _has_columns(*columns.split(",")) for name, columns in GROWN_COLUMNS.items()}
+    tells |= dict.fromkeys(GROWN_PICTURES, _is_picture)
+    return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
+
+
 def _is_truth(path: Path) -> bool:
     found = json.loads(path.read_text(encoding="utf-8"))
     return isinstance(found, dict) and found.keys() >= TRUTH_KEYS
@@ -248,6 +268,9 @@ KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
 SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
+CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
+THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
+GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),

@@ -29,6 +29,9 @@ _DRAWS, _TAILS = 400, 5.0
 _MOST_FRUITS = 2000
 """That a shape is fitted to; seven numbers need no more."""
 
+_GRADIENT = 0.05
+"""At which the climb ends: the draws are weighted, so their middle need not be the mode to the last digit."""
+
 _STEP = 0.05
 """Of the finite differences, in standard deviations of the prior."""
 
@@ -81,7 +84,10 @@ class _Posterior:
 
     def __call__(self, z: Numbers) -> float:
         likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
-        return likelihood - 0.5 * float(z @ z) - 0.5 * len(z) * np.log(2.0 * np.pi)
+        return likelihood - 0.5 * float(z @ z) - 0.5 * len(z) * float(np.log(2.0 * np.pi))
+
+    def cost(self, z: Numbers) -> float:
+        return -self(z)
 
 
 def fit_shape(table: SizeTable, family: CurveFamily, rng: np.random.Generator) -> FittedShape:
@@ -96,7 +102,7 @@ def fit_shape(table: SizeTable, family: CurveFamily, rng: np.random.Generator) -
         Where chance comes from.
     """
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    found = minimize(lambda z: -posterior(z), np.zeros(7), method="BFGS", options={"gtol": 0.05, "maxiter": 60})
+    found = minimize(posterior.cost, np.zeros(7), method="BFGS", tol=_GRADIENT)
     mode: Numbers = found.x
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
     # Where the differences see no bend, the prior's own is there.

@@ -5,9 +5,9 @@ Of fruit $i$ on tree $t$ at visit $s$, time $\tau_s$, the logarithm of the diame
 $$ y_{is} = \mu + m_s + b_t + a_i + o_i g_s + c_s + e_{is}, \qquad m_s = h(x_s) - h(x_\mathrm{mid}), \quad
    g_s = -k h'(x_s), \quad x_s = k (\tau_s - t_0) $$
 
-with $a_i$ its own size and $o_i$ its own onset, in which the curve is linear to 0.1 mm; $c_s$ is the error that all sizes
-of a visit share. All of them are Gaussian given `Shape`, so they are integrated out exactly: first each fruit's two
-numbers, then each tree's one, then the visits' and the mean together. docs/growth.md has the derivation.
+with $a_i$ its own size and $o_i$ its own onset, in which the curve is linear to 0.1 mm; $c_s$ is the error that all
+sizes of a visit share. All of them are Gaussian given `Shape`, so they are integrated out exactly: first each fruit's
+two numbers, then each tree's one, then the visits' and the mean together. docs/growth.md has the derivation.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Hierarchy:
         told = np.einsum("nks,ns->nk", rows, residuals)
         information = weights * residuals - np.einsum("nks,nk->ns", rows, told)
         self._fit = float((weights * residuals**2).sum() - (told**2).sum())
-        shared = np.einsum("nks,nkr->nsr", rows, rows)
+        shared = rows.transpose(0, 2, 1) @ rows
         self._precision = -np.add.reduceat(shared, self._starts)
         diagonal = np.einsum("tss->ts", self._precision)
         diagonal += np.add.reduceat(weights, self._starts)

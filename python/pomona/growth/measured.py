@@ -19,7 +19,7 @@ __all__ = ["MeasuredFruits", "measured_fruits", "require_two_days"]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFruits:
-    """Diameters of N fruits on S visits.
+    """Diameters of N fruits on S visits, in order of trees and ids.
 
     Attributes
     ----------
@@ -86,12 +86,14 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
     known = ~np.isnan(diameters_mm)
     if not known.any():
         raise PomonaError(f"{path}: found no diameters, expected sessions that measured them")
+    trees = bearing_trees(cloud)
     fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    fruits = fruits[np.argsort(trees.numbers[fruits], kind="stable")]
     return MeasuredFruits(
         path=Path(path),
         cloud=cloud.select(fruits),
         ids=ids[fruits],
-        trees=bearing_trees(cloud).select(fruits),
+        trees=trees.select(fruits),
         sessions=tuple(names[column] for column in columns),
         moments=tuple(datetime.fromisoformat(visits[column].date) for column in columns),
         diameters_mm=diameters_mm[np.ix_(fruits, columns)],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["SizeTable"]
 
@@ -66,6 +66,7 @@ class SizeTable:
         keep = rank < np.ceil(sizes * most / len(self.logs))[self.trees]
         return self._kept(keep, self.logs.shape[1])
 
-    def _kept(self, fruits: NDArray[np.bool_], count: int) -> SizeTable:
+    def _kept(self, fruits: ArrayLike, count: int) -> SizeTable:
+        fruits = np.asarray(fruits)
         trees = np.unique(self.trees[fruits], return_inverse=True)[1].astype(np.int64)
         return SizeTable(self.logs[fruits, :count], trees, self.times[:count], self.typical_mm[:count])
