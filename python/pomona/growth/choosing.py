@@ -20,7 +20,6 @@ from pomona.growth.size_table import SizeTable
 
 __all__ = ["ChosenCurve", "choose_curve"]
 
-_SEED = 20
 _ODDS = {"expolinear": 0.0, "logistic": -3.0, "gompertz": -3.0}
 """Logarithms of the odds before any visit. Apples are expolinear (Lakso and others 1995); the others bend more than
 they do until late in the season, so they are taken when visits speak for them by twenty to one."""
@@ -70,10 +69,10 @@ def choose_curve(
     for clock in clocks:
         table = SizeTable.of(diameters_mm, trees, clock.times(moments))
         for name, family in FAMILIES.items():
-            fitted = fit_shape(table, family, np.random.default_rng(_SEED))
+            fitted = fit_shape(table, family)
             gain = 0.0
             if n_first < len(moments):
-                first = fit_shape(table.first_visits(n_first), family, np.random.default_rng(_SEED))
+                first = fit_shape(table.first_visits(n_first), family)
                 gain = fitted.log_evidence - first.log_evidence
             held_out[f"{name} over {clock.name}"] = gain
             tried.append((gain + _ODDS[name], ChosenCurve(fitted, clock, table, held_out)))

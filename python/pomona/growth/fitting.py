@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from pomona.growth.curve_families import CurveFamily
 from pomona.growth.hierarchy import Hierarchy, Shape
@@ -23,8 +23,11 @@ __all__ = ["FittedShape", "fit_shape"]
 
 Numbers = NDArray[np.float64]
 
-_DRAWS, _TAILS = 400, 5.0
-"""Draws of the shape, and degrees of freedom of their t: tails that reach beyond the posterior's."""
+_PROPOSED, _DRAWS = 1500, 300
+"""Shapes that are proposed, and those that are kept, by weight: about one in three proposals counts."""
+
+_TAILS = 5.0
+"""Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
 
 _MOST_FRUITS = 2000
 """That a shape is fitted to; seven numbers need no more."""
@@ -45,27 +48,6 @@ _SPREADS = (
     (0.02, 0.5),  # of a visit's scale
     (2.0, 0.6),  # of a diameter, mm
 )
-
-
-@dataclass(frozen=True, eq=False)
-class FittedShape:
-    """What the measurements say of the shape.
-
-    Attributes
-    ----------
-    family : CurveFamily
-    likeliest : Shape
-        At the mode.
-    draws : tuple of Shape
-        Equally likely draws.
-    log_evidence : float
-        Logarithm of the density of the measurements, the shape integrated out.
-    """
-
-    family: CurveFamily
-    likeliest: Shape
-    draws: tuple[Shape, ...]
-    log_evidence: float
 
 
 class _Posterior:
@@ -90,30 +72,43 @@ class _Posterior:
         return -self(z)
 
 
-def fit_shape(table: SizeTable, family: CurveFamily, rng: np.random.Generator) -> FittedShape:
-    """Fit the shape of one family.
+@dataclass(frozen=True, eq=False)
+class FittedShape:
+    """What the measurements say of the shape.
 
-    Parameters
+    Attributes
     ----------
-    table : SizeTable
-        At least two visits at different times.
     family : CurveFamily
-    rng : numpy.random.Generator
-        Where chance comes from.
+    likeliest : Shape
+        At the mode.
+    log_evidence : float
+        Logarithm of the density of the measurements, the shape integrated out by the curvature at the mode (Laplace).
     """
+
+    family: CurveFamily
+    likeliest: Shape
+    log_evidence: float
+    _posterior: _Posterior
+    _mode: Numbers
+    _root: Numbers
+
+    def draws(self, rng: np.random.Generator) -> tuple[Shape, ...]:
+        """Draw equally likely shapes, by the exact posterior and not by its curvature."""
+        drawn, log_density = _student(rng, self._root, self._mode)
+        log_weights = np.array([self._posterior(z) for z in drawn]) - log_density
+        chosen = _resampled(rng, np.exp(log_weights - log_weights.max()))
+        return tuple(self._posterior.shape(drawn[row]) for row in chosen)
+
+
+def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
+    """Fit the shape of one family to a table of at least two visits at different times."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    found = minimize(posterior.cost, np.zeros(7), method="BFGS", tol=_GRADIENT)
-    mode: Numbers = found.x
+    mode: Numbers = minimize(posterior.cost, np.zeros(7), method="BFGS", tol=_GRADIENT).x
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
     # Where the differences see no bend, the prior's own is there.
-    root = axes / np.sqrt(np.maximum(values, 1.0))
-    drawn, log_density = _student(rng, root, mode)
-    log_weights = np.array([posterior(z) for z in drawn]) - log_density
-    log_evidence = float(logsumexp(log_weights) - np.log(_DRAWS))
-    chosen = _resampled(rng, np.exp(log_weights - log_weights.max()))
-    return FittedShape(
-        family, posterior.shape(mode), tuple(posterior.shape(drawn[row]) for row in chosen), log_evidence
-    )
+    root = np.asarray(axes / np.sqrt(np.maximum(values, 1.0)))
+    volume = 0.5 * len(mode) * np.log(2.0 * np.pi) + np.linalg.slogdet(root)[1]
+    return FittedShape(family, posterior.shape(mode), posterior(mode) + float(volume), posterior, mode, root)
 
 
 def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
@@ -131,8 +126,8 @@ def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
 def _student(rng: np.random.Generator, root: Numbers, mode: Numbers) -> tuple[Numbers, Numbers]:
     """Draw from a multivariate t, and give the logarithms of its density there."""
     n = len(mode)
-    normal = rng.normal(size=(_DRAWS, n))
-    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, _DRAWS))
+    normal = rng.normal(size=(_PROPOSED, n))
+    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, _PROPOSED))
     drawn = mode + (normal * stretch[:, None]) @ root.T
     squares = ((normal * stretch[:, None]) ** 2).sum(axis=1)
     constant = gammaln((_TAILS + n) / 2) - gammaln(_TAILS / 2) - n / 2 * np.log(_TAILS * np.pi)
@@ -141,6 +136,6 @@ def _student(rng: np.random.Generator, root: Numbers, mode: Numbers) -> tuple[Nu
 
 
 def _resampled(rng: np.random.Generator, weights: Numbers) -> NDArray[np.int64]:
-    """Rows drawn by weight, systematically: as many as there are."""
+    """Rows drawn by weight, systematically: those that are kept."""
     ends = np.cumsum(weights) / weights.sum()
-    return np.minimum(np.searchsorted(ends, (np.arange(_DRAWS) + rng.random()) / _DRAWS), _DRAWS - 1)
+    return np.minimum(np.searchsorted(ends, (np.arange(_DRAWS) + rng.random()) / _DRAWS), _PROPOSED - 1)

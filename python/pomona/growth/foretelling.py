@@ -92,7 +92,7 @@ def _draws(curve: ChosenCurve, times: Numbers) -> Iterator[tuple[Numbers, Number
     """Give log sizes (N, Q), relative rates (N,) at the last visit and errors of visits (S,), draw by draw."""
     rng = np.random.default_rng(_SEED)
     table, family = curve.table, curve.fitted.family
-    for shape in curve.fitted.draws:
+    for shape in curve.fitted.draws(rng):
         model = Hierarchy(table, family, shape)
         effects = model.draw(rng)
         own = effects.mean + effects.trees[table.trees] + effects.sizes

@@ -19,15 +19,13 @@ _SURPRISE = 4.0
 _ODD_FRUIT = 0.001
 """Chance of a fruit as far from the others in size and onset as one that is called odd."""
 
-_SEED = 21
-
 
 def odd_measurements(table: SizeTable) -> NDArray[np.bool_]:
     """Tell sizes, (N, S), that the rest of the table does not believe; of a fruit the worst, of a visit never all.
 
     A fruit taken for another, half of one behind a leaf, a starving one that stopped growing.
     """
-    fitted = fit_shape(table, FAMILIES["expolinear"], np.random.default_rng(_SEED))
+    fitted = fit_shape(table, FAMILIES["expolinear"])
     surprise = np.abs(Hierarchy(table, fitted.family, fitted.likeliest).surprise())
     surprise = np.where(np.isnan(surprise), 0.0, surprise)
     odd = (surprise > _SURPRISE) & (surprise == surprise.max(axis=1, keepdims=True))
