@@ -24,6 +24,7 @@ __all__ = [
     "KEPT",
     "MODEL",
     "PAIRS",
+    "PARQUET_MARK",
     "PICTURE",
     "RENDERED",
     "SCANNED",
@@ -55,6 +56,9 @@ PLY_MARK = "comment fruits written by pomona, metres"
 
 MODEL_MARK = b"pomona_training"
 """Key in the metadata of the models that are trained here."""
+
+PARQUET_MARK = b"fruits written by pomona"
+"""In the footer of the Parquet files that are written here."""
 
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
@@ -167,6 +171,15 @@ def _is_geojson(path: Path) -> bool:
     return _head(path).startswith(b'{"type": "FeatureCollection"') and b"LOCAL_CS" in _head(path)
 
 
+def _is_shapefile(path: Path) -> bool:
+    """Tell any of the files of a Shapefile by the one that says where it lies: nowhere on Earth, as ours do."""
+    return b"LOCAL_CS" in _head(path.with_suffix(".prj"))
+
+
+def _is_parquet(path: Path) -> bool:
+    return _head(path).startswith(b"PAR1") and PARQUET_MARK in _tail(path)
+
+
 def _is_session(path: Path) -> bool:
     return database_of(path) == "session"
 
@@ -276,4 +289,6 @@ EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),
     "ply": Like("a PLY of fruits", _is_ply),
     "geojson": Like("a GeoJSON of fruits", _is_geojson),
+    "shp": Like("a Shapefile of fruits", _is_shapefile),
+    "parquet": Like("a GeoParquet of fruits", _is_parquet),
 }

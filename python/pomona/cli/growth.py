@@ -12,7 +12,6 @@ from pomona.cli.verbs import Writes
 from pomona.likes import GROWN
 
 if TYPE_CHECKING:
-    from datetime import date
     from typing import Any
 
     from pomona.growth import SeasonGrowth
@@ -36,28 +35,18 @@ def growth(
     """Tell how every fruit grows, with 90 % intervals: tables and pictures of fruits, trees and size classes."""
     from pomona.growth.growth_pictures import write_pictures
     from pomona.growth.growth_tables import write_tables
+    from pomona.growth.harvest_day import harvest_day
     from pomona.growth.season_growth import grow_season
     from pomona.growth.size_classes import FIVE_MM, parsed_classes
 
     limits_mm = FIVE_MM if classes is None else parsed_classes(classes)
-    grown = grow_season(orchard, harvest=_day(harvest), temperature=temperature, limits_mm=limits_mm)
+    grown = grow_season(orchard, harvest=harvest_day(harvest), temperature=temperature, limits_mm=limits_mm)
     output.mkdir(parents=True, exist_ok=True)
     written = (*write_tables(output, grown, pack_kg=pack_kg), *write_pictures(output, grown))
     if json:
         say_json({"output": [str(path) for path in written], **_summary(grown)})
     else:
         say(*_as_lines(output, grown))
-
-
-def _day(text: str | None) -> date | None:
-    from datetime import date
-
-    from pomona.errors import PomonaError
-
-    try:
-        return None if text is None else date.fromisoformat(text)
-    except ValueError:
-        raise PomonaError(f"--harvest: found {text!r}, expected a day as 2024-09-10") from None
 
 
 def _summary(grown: SeasonGrowth) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pomona.growth.caliper_pairs import CaliperPair
+from pomona.growth.drawn_names import drawn_name
 from pomona.plot.sheet import FAINT, INK
 
 if TYPE_CHECKING:
@@ -55,12 +56,17 @@ def agreement_of(pairs: Sequence[CaliperPair]) -> Agreement:
 
 def agreement_by_date(pairs: Sequence[CaliperPair]) -> dict[str, Agreement]:
     """Compare visit by visit, in order of date; visits of one day go by their names too."""
+    return {name: agreement_of(of_visit) for name, of_visit in _by_visit(pairs).items()}
+
+
+def _by_visit(pairs: Sequence[CaliperPair]) -> dict[str, list[CaliperPair]]:
+    """Take the pairs apart by visit, each called by its day, and by its session where the day had several."""
     visits = sorted({(pair.day, pair.session) for pair in pairs})
     days = [day for day, _ in visits]
     return {
-        day.isoformat() if days.count(day) == 1 else f"{day} {session}": agreement_of(
-            [pair for pair in pairs if (pair.day, pair.session) == (day, session)]
-        )
+        day.isoformat() if days.count(day) == 1 else f"{day} {session}": [
+            pair for pair in pairs if (pair.day, pair.session) == (day, session)
+        ]
         for day, session in visits
     }
 
@@ -71,13 +77,12 @@ def draw_agreement(pairs: Sequence[CaliperPair]) -> Figure:
 
     figure = Figure(figsize=(8.0, 4.6), dpi=110, layout="constrained")
     axes = figure.subplots()
-    visits = sorted({(pair.day, pair.session) for pair in pairs})
-    for number, visit in enumerate(visits):
-        of_visit = [pair for pair in pairs if (pair.day, pair.session) == visit]
+    visits = _by_visit(pairs)
+    for number, (name, of_visit) in enumerate(visits.items()):
         means = [(pair.measured_mm + pair.caliper_mm) / 2 for pair in of_visit]
-        colour = _COLOURS[number % len(_COLOURS)]
         differences = [pair.measured_mm - pair.caliper_mm for pair in of_visit]
-        axes.plot(means, differences, "o", color=colour, markersize=4, alpha=0.8, label=visit[0].isoformat())
+        colour = _COLOURS[number % len(_COLOURS)]
+        axes.plot(means, differences, "o", color=colour, markersize=4, alpha=0.8, label=drawn_name(name))
     found = agreement_of(pairs)
     lines = (("bias", found.bias_mm, "-"), ("lower limit", found.low_mm, "--"), ("upper limit", found.high_mm, "--"))
     for name, value, style in lines:
@@ -90,5 +95,5 @@ def draw_agreement(pairs: Sequence[CaliperPair]) -> Figure:
     axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(f"{found.n} diameters against calipers", x=0.02, ha="left", fontsize="x-large", fontweight="bold")
     if len(visits) <= len(_COLOURS):
-        figure.legend(loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure

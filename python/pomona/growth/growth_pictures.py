@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.growth.drawn_names import drawn_name
 from pomona.growth.foretelling import NINETY
 from pomona.growth.growth_tables import used_classes
 from pomona.growth.season_growth import SeasonGrowth
@@ -137,8 +138,8 @@ def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
     if len(trees) <= _MOST_TREE_NAMES:
         for place, row in zip(x, trees, strict=True):
             name = growth.blocks[row].name
-            text = f"tree {name[:12]}" if name else "all"
-            axes.text(place, 0.02, text, transform=axes.get_xaxis_transform(), ha="center", color=INK, parse_math=False)
+            text = f"tree {drawn_name(name)}" if name else "all"
+            axes.text(place, 0.02, text, transform=axes.get_xaxis_transform(), ha="center", color=INK)
     axes.margins(y=0.25)
     axes.legend(frameon=False, labelcolor=INK, ncols=2)
 
