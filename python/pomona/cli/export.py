@@ -55,7 +55,7 @@ def export(
     growth: bool = typer.Option(
         False,
         "--growth",
-        help="Of a map: with each fruit's tree, rate of growth, and forecast where --harvest is given.",
+        help="Of a map: with each fruit's tree, rate of growth, and forecast for --harvest.",
     ),
     harvest: str | None = typer.Option(None, metavar="DATE", help="With --growth: day to foretell, as 2024-09-10."),
     unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),

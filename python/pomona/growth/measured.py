@@ -77,11 +77,11 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         When the file is no map or session, or knows no diameter at all.
     """
     orchard = OrchardMap(path)
+    if orchard.kind != "map":
+        raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
     cloud, seen, visits = orchard.fruits(), orchard.observations(), orchard.visits()
     names = tuple(visit.name for visit in visits)
     ids = np.array(list(map(int, cloud.ids or ())), dtype=np.int64)
-    if orchard.kind != "map":
-        raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
     diameters_mm, labels = _table(ids, names, seen)
     known = ~np.isnan(diameters_mm)
     if not known.any():
