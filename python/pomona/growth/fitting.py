@@ -29,7 +29,7 @@ _PROPOSED, _DRAWS = 1500, 300
 _TAILS = 5.0
 """Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
 
-_MOST_FRUITS = 2000
+_MOST_FRUITS = 1000
 """That a shape is fitted to; seven numbers need no more."""
 
 _GRADIENT = 0.05

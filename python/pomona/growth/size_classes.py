@@ -15,7 +15,7 @@ FIVE_MM = np.arange(40.0, 101.0, 5.0)
 """Limits of the usual classes, mm."""
 
 KG_PER_M3 = 900.0
-"""Mass of an apple against the ball of its widest diameter: 0.90 g/cm3 over 25 weighed Fuji."""
+"""Mass of an apple against the ball of its widest diameter: 0.90 g/cm3 over 26 weighed Fuji."""
 
 
 def parsed_classes(text: str) -> NDArray[np.float64]:
