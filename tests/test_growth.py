@@ -14,6 +14,7 @@ import pytest
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.growth import SeasonGrowth, grow_season
+from pomona.growth.blocks import blocks_of
 from pomona.growth.curve_families import FAMILIES
 from pomona.growth.fitting import fit_shape
 from pomona.growth.hierarchy import Hierarchy, Shape
@@ -229,6 +230,34 @@ def test_a_session_and_sizes_that_are_none_are_refused(pomona: Pomona, here: Pat
         code, _, told = pomona("growth", "bad.gpkg", "-o", "g")
         assert (code, told.count("\n")) == (2, 1)
         assert "diameter_m" in told
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_few_fruits_and_no_growth_have_curves_too(grown: SeasonGrowth, n: int) -> None:
+    """Priors carry what two sizes cannot; equal sizes are no division by nothing."""
+    few = grown.fruits
+    some = replace(
+        few,
+        cloud=few.cloud.select(np.arange(n)),
+        ids=few.ids[:n],
+        trees=few.trees.select(np.arange(n)),
+        diameters_mm=np.full((n, 4), 60.0),
+        labels=few.labels[:n],
+    )
+    found = growth_of(some, harvest=HARVEST)
+    assert np.isfinite(found.foretold.sizes_mm).all()
+    assert (found.foretold.lows_mm < found.foretold.highs_mm).all()
+    np.testing.assert_allclose(found.foretold.sizes_mm[:, 3], 60.0, atol=6.0)
+
+
+def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
+    fruits = grown.fruits
+    states = tuple("gone" if row < 40 else "seen" for row in range(90))
+    cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": states})
+    found = blocks_of(replace(fruits, cloud=cloud))
+    assert [int(block.members.sum()) for block in found] == [50, 20, 30]
+    over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
+    assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
 
 
 def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:

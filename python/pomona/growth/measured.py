@@ -17,6 +17,10 @@ from pomona.orchard import Observations, OrchardMap
 __all__ = ["MeasuredFruits", "measured_fruits", "require_two_days"]
 
 
+SIZES_MM = (1.0, 1000.0)
+"""No fruit is smaller or larger: what says so is no measurement."""
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredFruits:
     """Diameters of N fruits on S visits, in order of trees and ids.
@@ -56,9 +60,10 @@ class MeasuredFruits:
 
     @property
     def hanging(self) -> NDArray[np.bool_]:
-        """Which fruits hang for all that the map knows, (N,)."""
+        """Which fruits hang for all that the map knows, (N,); all, once none does: the season is looked back at."""
         states = self.cloud.extras.get("state", ("seen",) * len(self.ids))
-        return np.array([state != "gone" for state in states], dtype=bool)
+        hanging = np.array([state != "gone" for state in states], dtype=bool)
+        return hanging if hanging.any() else np.ones(len(self.ids), dtype=bool)
 
     @property
     def n_days(self) -> NDArray[np.int64]:
@@ -111,7 +116,10 @@ def _table(
     columns = [column_of[name] for name in seen.sessions]
     diameters_mm = np.full((len(ids), len(names)), np.nan)
     labels = np.full((len(ids), len(names)), None, dtype=object)
-    diameters_mm[rows, columns] = 1000.0 * seen.diameters_m
+    low, high = SIZES_MM
+    sizes_mm = 1000.0 * seen.diameters_m
+    # Comparisons with NaN are false, so what is unknown stays so.
+    diameters_mm[rows, columns] = np.where((sizes_mm >= low) & (sizes_mm <= high), sizes_mm, np.nan)
     labels[rows, columns] = seen.labels
     return diameters_mm, labels
 
