@@ -256,6 +256,10 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
     cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": states})
     found = blocks_of(replace(fruits, cloud=cloud))
     assert [int(block.members.sum()) for block in found] == [50, 20, 30]
+    in_rows = replace(fruits.cloud, extras={"row": ("east",) * 30 + ("west",) * 59 + ("",)})
+    of_rows = [block for block in blocks_of(replace(fruits, cloud=in_rows)) if block.kind == "row"]
+    rows = [(block.name, int(block.members.sum())) for block in of_rows]
+    assert rows == [("east", 30), ("west", 59)]
     over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
     assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
 

@@ -59,7 +59,7 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
     blocks = [
         {
             "block": block.kind,
-            "tree": block.name or None,
+            "name": block.name or None,
             "n_fruits": int(block.members.sum()),
             "mean_mm": float(mean[row, now]),
             "rate_mm_per_day": float(mean[row, -1]),
@@ -94,12 +94,13 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
     if found["n_outliers"]:
         lines.append(f"  {found['n_outliers']} fruits are outliers, see fruits.csv")
     forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
-    lines.append(f"  {'tree':>12} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
+    lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
     return lines + [_line_of_block(block) for block in found["blocks"]]
 
 
 def _line_of_block(block: dict[str, Any]) -> str:
-    line = f"  {(block['tree'] or 'all')[:12]:>12} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
+    name = " ".join(filter(None, (block["block"], block["name"])))
+    line = f"  {name[:18]:>18} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
     line += f"{block['rate_mm_per_day']:>9.2f}"
     if block["forecast_mm"] is None:
         return line

@@ -1,4 +1,4 @@
-"""Whole blocks: each tree and the orchard, how many fruits, how big on average, how fast."""
+"""Whole blocks: the orchard, each row and each tree, how many fruits, how big on average, how fast."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ ALL = "all"
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The fruits that are counted together: the hanging ones of a tree, or all.
+    """The fruits that are counted together: the hanging ones of a tree, of a row, or all.
 
     Attributes
     ----------
-    kind : {"all", "tree"}
+    kind : {"all", "row", "tree"}
     name : str
-        Of the tree.
+        Of the row or the tree.
     members : (N,) bool
     """
 
@@ -34,12 +34,13 @@ class Block:
 
 
 def blocks_of(fruits: MeasuredFruits) -> tuple[Block, ...]:
-    """All hanging fruits, then those of each tree where trees are known."""
-    hanging = fruits.hanging
-    trees = fruits.trees
+    """All hanging fruits, then those of each row where the map has a column ``row``, then those of each tree."""
+    hanging, trees = fruits.hanging, fruits.trees
+    rows = np.array(fruits.cloud.extras.get("row", ("",) * len(hanging)))
+    of_rows = [Block("row", name, hanging & (rows == name)) for name in sorted(set(rows.tolist()) - {""})]
     named = [(number, name) for number, name in enumerate(trees.names) if name]
-    of_trees = (Block("tree", name, hanging & (trees.numbers == number)) for number, name in named)
-    return (Block(ALL, "", hanging), *(block for block in of_trees if block.members.any()))
+    of_trees = [Block("tree", name, hanging & (trees.numbers == number)) for number, name in named]
+    return (Block(ALL, "", hanging), *(block for block in (*of_rows, *of_trees) if block.members.any()))
 
 
 def block_means(blocks: tuple[Block, ...]) -> Summary:

@@ -31,7 +31,7 @@ FRUIT_COLUMNS = (
     *("forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier"),
 )
 BLOCK_COLUMNS = (
-    *("block", "tree", "n_fruits", "x", "y", "z", "date", "mean_mm", "mean_low_mm", "mean_high_mm", "spread_mm"),
+    *("block", "name", "n_fruits", "x", "y", "z", "date", "mean_mm", "mean_low_mm", "mean_high_mm", "spread_mm"),
     *("rate_mm_per_day", "rate_sigma_mm_per_day"),
     *("forecast_date", "forecast_mm", "forecast_low_mm", "forecast_high_mm"),
 )
