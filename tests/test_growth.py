@@ -13,13 +13,12 @@ import pytest
 
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.growth import SeasonGrowth, grow_season
 from pomona.growth.blocks import blocks_of
 from pomona.growth.curve_families import FAMILIES
 from pomona.growth.fitting import fit_shape
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.season_clock import DegreeDays, read_temperatures
-from pomona.growth.season_growth import growth_of
+from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
 from pomona.growth.size_classes import class_counts, parsed_classes
 from pomona.growth.size_table import SizeTable
 from pomona.orchard import OrchardMap, Session, add_session

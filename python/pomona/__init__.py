@@ -8,7 +8,7 @@ from pomona.errors import PomonaError, PomonaWarning
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
-    from pomona.growth import SeasonGrowth, grow_season
+    from pomona.growth.season_growth import SeasonGrowth, grow_season
     from pomona.matching import Index, Match, Verdict, default_config, match
     from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
     from pomona.plot import draw_match, save_picture
@@ -33,7 +33,7 @@ _MODULE_OF = {
     "OrchardMap": "pomona.orchard",
     "Recording": "pomona.recording",
     "Refined": "pomona.survey.refinement",
-    "SeasonGrowth": "pomona.growth",
+    "SeasonGrowth": "pomona.growth.season_growth",
     "SeenFruits": "pomona.survey.refinement",
     "Session": "pomona.orchard",
     "Survey": "pomona.survey",
@@ -45,7 +45,7 @@ _MODULE_OF = {
     "add_session": "pomona.orchard",
     "default_config": "pomona.matching",
     "draw_match": "pomona.plot",
-    "grow_season": "pomona.growth",
+    "grow_season": "pomona.growth.season_growth",
     "lift": "pomona.survey.depth",
     "load_session": "pomona.orchard",
     "match": "pomona.matching",

@@ -74,9 +74,9 @@ def export(
 
 def _grown(source: Path, harvest: str | None, *, plain: bool) -> FruitCloud:
     from pomona.errors import PomonaError
-    from pomona.growth import grow_season
     from pomona.growth.grown_cloud import grown_cloud
     from pomona.growth.harvest_day import harvest_day
+    from pomona.growth.season_growth import grow_season
 
     if plain:
         raise PomonaError("--growth: found it with --observations, or --harvest without it, expected it alone or both")

@@ -14,7 +14,7 @@ from pomona.likes import GROWN
 if TYPE_CHECKING:
     from typing import Any
 
-    from pomona.growth import SeasonGrowth
+    from pomona.growth.season_growth import SeasonGrowth
 
 
 def growth(

@@ -14,7 +14,7 @@ from pomona.likes import THINNING
 if TYPE_CHECKING:
     from typing import Any
 
-    from pomona.growth import SeasonGrowth
+    from pomona.growth.season_growth import SeasonGrowth
     from pomona.growth.thinning_plan import ThinningPlan
 
 
@@ -31,7 +31,7 @@ def thinning(
     Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop. What a
     tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first.
     """
-    from pomona.growth import grow_season
+    from pomona.growth.season_growth import grow_season
     from pomona.growth.thinning_plan import plan_thinning
 
     grown = grow_season(orchard)
