@@ -15,6 +15,7 @@ from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.growth.blocks import blocks_of
 from pomona.growth.curve_families import FAMILIES
+from pomona.growth.drawn_names import drawn_name
 from pomona.growth.fitting import fit_shape
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.season_clock import DegreeDays, read_temperatures
@@ -282,6 +283,11 @@ def test_names_of_strangers_are_drawn_as_text(pomona: Pomona, tmp_path: Path) ->
     code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g")
     assert (code, told) == (0, "")
     assert "\x1b" not in printed
+
+
+def test_long_names_lose_their_middle() -> None:
+    assert drawn_name("a$b\x1b林") == "a?b??"
+    assert drawn_name("first " + 100 * "x" + " last") == "first " + 10 * "x" + "..." + 11 * "x" + " last"
 
 
 def test_sizes_classes_take_their_minimum_and_leave_their_maximum() -> None:
