@@ -17,6 +17,7 @@ NAMES = (
     "diameters",
     "kinect",
     "season",
+    "growth",
     "clouds",
     "odometry",
     "tracking",

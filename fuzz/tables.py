@@ -1,8 +1,9 @@
-"""Texts beside the pictures: settings in TOML, pairs of a match, boxes of every kind."""
+"""Texts beside the pictures: settings in TOML, pairs of a match, boxes of every kind, calipers, temperatures."""
 
 from __future__ import annotations
 
 import json
+from datetime import date
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from fuzz.bundle import packed, unpacked
 from pomona import FruitCloud
 from pomona.detect.from_file import FileDetector
 from pomona.detect.picture_boxes import boxes_within, read_boxes
+from pomona.growth.caliper_file import read_calipers
+from pomona.growth.season_clock import read_temperatures
 from pomona.pairs import read_pairs
 from pomona.recording import Calibration
 from pomona.settings import Settings
@@ -21,6 +24,14 @@ TOML = b'[match]\nmethod = "verified"\nup = [[0, 0, 1], [0.0, -1, 0]]\nnoise_m =
 BOXES = b"frame,xmin,ymin,xmax,ymax,score,id\n0,10,10,20.5,30,0.9,a\n1,11,10,21,30,0.8,a\n1,50,10,61,30,0.5,b\n"
 MOT = b"1,1,10,10,20,20,0.9,-1,-1,-1\n2,1,11,10,20,20,0.9,-1,-1,-1\n"
 NAMED = b"image,xmin,ymin,xmax,ymax,score\na.png,10,10,20.5,30,0.9\nb.png,-1,10,21,3e1,0.8\n"
+CALIPERS = (
+    b"label,date,diameter_mm\na,2024-06-14,30.5\nb,2024-06-14,31\n",
+    b"id,2024-06-14,2024-07-01\na,30.5,\nb,,41\n",
+)
+TEMPERATURES = (
+    b"date,mean_c\n2024-06-14,20.5\n2024-06-15,21\n",
+    b"date,min_c,max_c\n2024-06-14,9,20\n2024-06-15,8,21\n",
+)
 PAIRS = b"query,map,probability,distance_m\na,b,0.9,0.01\nb,c,0.8,0.02\n"
 
 
@@ -40,7 +51,10 @@ def seeds() -> list[bytes]:
     answer = {"status": "Found", "matches": [{"query": "a", "map": "b", "probability": 0.9}]}
     boxes = [packed("boxes", {"boxes": each}) for each in (BOXES, MOT, *_dumped(coco, results))]
     pairs = [packed("pairs", {"pairs": each}) for each in (PAIRS, *_dumped(answer))]
-    return [packed("settings", {"settings.toml": TOML}), packed("named", {"named": NAMED}), *boxes, *pairs]
+    by_hand = [packed("calipers", {"calipers": each}) for each in CALIPERS]
+    weather = [packed("temperatures", {"temperatures": each}) for each in TEMPERATURES]
+    single = [packed("settings", {"settings.toml": TOML}), packed("named", {"named": NAMED})]
+    return [*single, *boxes, *pairs, *by_hand, *weather]
 
 
 def _dumped(*contents: object) -> list[bytes]:
@@ -59,3 +73,7 @@ def target(content: bytes) -> None:
                 boxes_within(folder / "named", rows, (640, 480))
         if (folder / "pairs").is_file():
             read_pairs(folder / "pairs", CLOUD, CLOUD)
+        if (folder / "calipers").is_file():
+            read_calipers(folder / "calipers")
+        if (folder / "temperatures").is_file():
+            read_temperatures(folder / "temperatures", [date(2024, 6, 14), date(2024, 6, 15)])

@@ -6,12 +6,14 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
 import numpy as np
 import pyogrio
 import pytest
 from pyogrio.raw import read as read_layer
 from typer.testing import CliRunner
 
+from growth_maker import grow_row
 from pomona import FruitCloud, PomonaError
 from pomona.cli import app
 from pomona.export import export_cloud
@@ -83,8 +85,8 @@ def test_rows_without_ids_go_by_their_number(tmp_path: Path) -> None:
 
 def test_an_unknown_format_and_a_missing_folder_are_refused(tmp_path: Path) -> None:
     cloud = FruitCloud(np.zeros((1, 3)))
-    with pytest.raises(PomonaError, match="found 'shp', expected one of csv, ply, geojson"):
-        export_cloud(cloud, tmp_path / "a.shp", "shp")  # type: ignore[arg-type]
+    with pytest.raises(PomonaError, match="found 'dxf', expected one of csv, ply, geojson, shp, parquet"):
+        export_cloud(cloud, tmp_path / "a.dxf", "dxf")  # type: ignore[arg-type]
     with pytest.raises(PomonaError, match=r"absent/a\.csv: cannot be written: No such file or directory"):
         export_cloud(cloud, tmp_path / "absent" / "a.csv", "csv")
 
@@ -162,10 +164,110 @@ def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, sess
     assert json.loads(output.read_text())["type"] == "FeatureCollection"
     for name, flags, said in (
         ("a.geojson", ["--to", "csv"], "found suffix '.geojson' and --to csv, expected the same or one of them"),
-        ("a.shp", [], "found suffix '.shp', expected .csv, .ply, .geojson, .json, or --to FORMAT"),
+        ("a.dxf", [], "found suffix '.dxf', expected .csv, .ply, .geojson, .json, .shp, .parquet, or --to FORMAT"),
+        ("a.txt", ["--to", "shp"], "a Shapefile is five files, expected a name that ends in .shp"),
     ):
         code, out, err = pomona("export", session_file, "-o", session_file.with_name(name), *flags)
         assert (code, out) == (2, "")
         assert said in err
         assert not session_file.with_name(name).exists()
     assert pomona("export", session_file, "--to", "csv", "-o", session_file.with_name("fruits.txt"))[0] == 0
+
+
+def mixed_cloud(n: int) -> FruitCloud:
+    """Text of all kinds, numbers, blanks, and names that a table of dBASE must cut."""
+    rng = np.random.default_rng(n)
+    return FruitCloud(
+        rng.normal(size=(n, 3)),
+        ids=tuple(map(str, range(5, 5 + n))),
+        diameters_m=np.where(np.arange(n) % 3 == 0, np.nan, 0.07),
+        covariances=np.tile(np.eye(3) * 1e-4, (n, 1, 1)),
+        extras={
+            "tree": tuple("ä林檎" if row % 2 else "<b>$x'\\x1b" for row in range(n)),
+            "whole": tuple(str(row) if row % 4 else "" for row in range(n)),
+            "a_very_long_name": ("x" * 300,) * n,
+            "a_very_long_name_2": ("1.25",) * n,
+            "geometry": ("mine",) * n,
+        },
+    )
+
+
+def test_gdal_reads_the_shapefile(pomona: Pomona, tmp_path: Path) -> None:
+    cloud = mixed_cloud(20)
+    export_cloud(cloud, tmp_path / "a.shp", "shp")
+    about, _, points, columns = pyogrio.raw.read(tmp_path / "a.shp")
+    fields = dict(zip(about["fields"].tolist(), columns, strict=True))
+    assert about["geometry_type"] == "Point Z"
+    assert "LOCAL_CS" in about["crs"]
+    assert fields["id"].tolist() == list(range(5, 25))
+    assert fields["tree"].tolist() == list(cloud.extras["tree"])
+    assert fields["whole"][1:4].tolist() == [1, 2, 3]
+    assert np.isnan(fields["whole"][0])
+    np.testing.assert_allclose(fields["diameter_m"], cloud.diameters_m)
+    assert {"a_very_lon", "a_very_lo2"} <= fields.keys()
+    assert fields["a_very_lon"][0] == "x" * 254
+    assert fields["cxx"][0] == pytest.approx(1e-4)
+    read = np.array([np.frombuffer(point[5:], "<f8") for point in points])
+    np.testing.assert_array_equal(read, cloud.positions)
+
+
+@pytest.mark.parametrize("n", [0, 2, 20])
+def test_duckdb_reads_the_geoparquet(tmp_path: Path, n: int) -> None:
+    cloud = mixed_cloud(n)
+    export_cloud(cloud, tmp_path / "a.parquet", "parquet")
+    file = str(tmp_path / "a.parquet")
+    (geo,) = duckdb.execute("SELECT value FROM parquet_kv_metadata(?) WHERE key = 'geo'", [file]).fetchone()
+    about = json.loads(bytes(geo))
+    assert about["primary_column"] == "geometry"
+    assert about["columns"]["geometry"]["geometry_types"] == ["Point Z"]
+    named = "id, diameter_m, tree, whole, a_very_long_name, geometry_, cyy"
+    rows = duckdb.execute(f"SELECT {named}, CAST(geometry AS VARCHAR) FROM read_parquet(?)", [file]).fetchall()
+    assert len(rows) == n
+    for row, (name, diameter_m, tree, whole, text, mine, variance, point) in enumerate(rows):
+        assert name == row + 5
+        assert diameter_m == (None if row % 3 == 0 else 0.07)
+        assert (tree, text, mine) == (cloud.extras["tree"][row], "x" * 300, "mine")
+        assert whole == (row if row % 4 else None)
+        assert variance == pytest.approx(1e-4)
+        numbers = point.removeprefix("POINT Z (").removesuffix(")").split()
+        np.testing.assert_allclose(list(map(float, numbers)), cloud.positions[row], rtol=1e-12)
+
+
+def test_parquet_has_as_many_groups_of_rows_as_it_needs(tmp_path: Path) -> None:
+    n = (1 << 17) + 3
+    cloud = FruitCloud(np.arange(3.0 * n).reshape(n, 3))
+    export_cloud(cloud, tmp_path / "a.parquet", "parquet")
+    file = str(tmp_path / "a.parquet")
+    assert duckdb.execute("SELECT count(*), sum(id) FROM read_parquet(?)", [file]).fetchone() == (n, n * (n - 1) // 2)
+    assert duckdb.execute("SELECT max(row_group_id) FROM parquet_metadata(?)", [file]).fetchone() == (1,)
+
+
+def test_a_shapefile_is_taken_again_and_a_strangers_is_not(pomona: Pomona, session_file: Path) -> None:
+    output = session_file.with_name("fruits.shp")
+    assert pomona("export", session_file, "-o", output)[0] == 0
+    assert pomona("export", session_file, "-o", output)[0] == 0
+    output.with_suffix(".prj").write_text('GEOGCS["WGS 84"]')
+    before = output.read_bytes()
+    code, _, told = pomona("export", session_file, "-o", output)
+    assert (code, told.count("\n")) == (2, 1)
+    assert "is not a Shapefile of fruits" in told
+    assert output.read_bytes() == before
+    session_file.with_name("roads.dbf").write_bytes(b"of another program")
+    code, _, told = pomona("export", session_file, "-o", session_file.with_name("roads.shp"))
+    assert code == 2
+    assert "roads.dbf: is there already" in told
+
+
+def test_growth_is_exported_as_columns(pomona: Pomona, tmp_path: Path) -> None:
+    row = grow_row(tmp_path / "orchard.gpkg", days=(50, 65), n_trees=1)
+    output = tmp_path / "grown.shp"
+    assert pomona("export", row.path, "--growth", "--harvest", "2024-09-07", "-o", output)[0] == 0
+    about, _, _, columns = pyogrio.raw.read(output)
+    fields = dict(zip(about["fields"].tolist(), columns, strict=True))
+    assert fields["id"].tolist() == list(range(1, 31))
+    assert (fields["forecast_m"] > fields["size_mm"]).all()
+    assert (fields["rate_mm_pe"] > 0.2).all()
+    for flags in (["--harvest", "2024-09-07"], ["--growth", "--observations"]):
+        code, _, told = pomona("export", row.path, *flags, "-o", output)
+        assert (code, told.count("\n")) == (2, 1)
+        assert "--growth: found it with --observations, or --harvest without it" in told

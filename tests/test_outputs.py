@@ -41,6 +41,8 @@ WRITERS = (
     "export map.csv --to csv -o",
     "export map.csv --to ply -o",
     "export map.csv --to geojson -o",
+    "export map.csv --to shp -o",
+    "export map.csv --to parquet -o",
 )
 
 

@@ -8,6 +8,7 @@ from pomona.errors import PomonaError, PomonaWarning
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
+    from pomona.growth.season_growth import SeasonGrowth, grow_season
     from pomona.matching import Index, Match, Verdict, default_config, match
     from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
     from pomona.plot import draw_match, save_picture
@@ -32,6 +33,7 @@ _MODULE_OF = {
     "OrchardMap": "pomona.orchard",
     "Recording": "pomona.recording",
     "Refined": "pomona.survey.refinement",
+    "SeasonGrowth": "pomona.growth.season_growth",
     "SeenFruits": "pomona.survey.refinement",
     "Session": "pomona.orchard",
     "Survey": "pomona.survey",
@@ -43,6 +45,7 @@ _MODULE_OF = {
     "add_session": "pomona.orchard",
     "default_config": "pomona.matching",
     "draw_match": "pomona.plot",
+    "grow_season": "pomona.growth.season_growth",
     "lift": "pomona.survey.depth",
     "load_session": "pomona.orchard",
     "match": "pomona.matching",
@@ -68,6 +71,7 @@ __all__ = [
     "PomonaWarning",
     "Recording",
     "Refined",
+    "SeasonGrowth",
     "SeenFruits",
     "Session",
     "Survey",
@@ -80,6 +84,7 @@ __all__ = [
     "add_session",
     "default_config",
     "draw_match",
+    "grow_season",
     "lift",
     "load_session",
     "match",

@@ -10,15 +10,24 @@ import numpy as np
 
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud, csv_file, ply_file
-from pomona.cloud.columns import COVARIANCE, POSITION, typed_columns
+from pomona.cloud.columns import COVARIANCE, COVARIANCE_CELLS, POSITION, typed_columns
 from pomona.errors import PomonaError
 from pomona.geopackage import LOCAL_METRES
+from pomona.geoparquet import write_geoparquet
+from pomona.shapefile import write_shapefile
 
 __all__ = ["SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
 
-ExportFormat = Literal["csv", "ply", "geojson"]
+ExportFormat = Literal["csv", "ply", "geojson", "shp", "parquet"]
 
-SUFFIXES: dict[str, ExportFormat] = {".csv": "csv", ".ply": "ply", ".geojson": "geojson", ".json": "geojson"}
+SUFFIXES: dict[str, ExportFormat] = {
+    ".csv": "csv",
+    ".ply": "ply",
+    ".geojson": "geojson",
+    ".json": "geojson",
+    ".shp": "shp",
+    ".parquet": "parquet",
+}
 """What the name of a file says of its format."""
 
 
@@ -31,8 +40,8 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
         The fruits, for example ``FruitCloud.read("orchard.gpkg")``.
     path : str or Path
         The file to write; its suffix is yours to choose.
-    to : {"csv", "ply", "geojson"}
-        Its format. Rows without ids get their row numbers in GeoJSON, which wants an id for every feature.
+    to : {"csv", "ply", "geojson", "shp", "parquet"}
+        Its format. Rows without ids get their row numbers in the last three.
     """
     path = Path(path)
     if to == "csv":
@@ -41,6 +50,10 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
         ply_file.write(path, cloud)
     elif to == "geojson":
         _write_geojson(path, cloud)
+    elif to == "shp":
+        write_shapefile(path, cloud.positions, _plain_columns(cloud))
+    elif to == "parquet":
+        write_geoparquet(path, cloud.positions, _plain_columns(cloud))
     else:
         raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(ExportFormat))}")
 
@@ -70,8 +83,25 @@ def _write_geojson(path: Path, cloud: FruitCloud) -> None:
         file.write("\n]}\n")
 
 
+def _plain_columns(cloud: FruitCloud) -> dict[str, list[Any]]:
+    """Give the columns besides the place, one cell a fruit and column."""
+    columns = _columns(cloud)
+    if cloud.covariances is not None:
+        for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
+            columns[name] = cloud.covariances[:, i, j].tolist()
+    return columns
+
+
 def _properties(cloud: FruitCloud) -> dict[str, list[Any]]:
-    """Give the columns besides the place, numbers as numbers; None is unknown."""
+    """Give the columns besides the place as GeoJSON has them: the covariance is one of them."""
+    columns = _columns(cloud)
+    if cloud.covariances is not None:
+        columns["covariance_m2"] = cloud.covariances.tolist()
+    return columns
+
+
+def _columns(cloud: FruitCloud) -> dict[str, list[Any]]:
+    """Give the columns besides the place and the covariance, numbers as numbers; None is unknown."""
     columns = typed_columns(cloud)
     lists = {
         name: [None if value != value else value for value in np.asarray(column).tolist()]  # nan is not itself
@@ -80,8 +110,6 @@ def _properties(cloud: FruitCloud) -> dict[str, list[Any]]:
         for name, column in columns.items()
         if name not in (*POSITION, *COVARIANCE)
     }
-    if cloud.covariances is not None:
-        lists["covariance_m2"] = cloud.covariances.tolist()
     return {"id": list(range(len(cloud))), **lists}
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 __all__ = [
     "BOXES",
     "BOXES_DRAWN",
+    "CALIPER_PAIRS",
     "DEMO",
     "DEMO_DATES",
     "DEMO_NAME",
@@ -20,13 +21,16 @@ __all__ = [
     "DEMO_SEED",
     "DRAWN_BOXES",
     "EXPORTS",
+    "GROWN",
     "KEPT",
     "MODEL",
     "PAIRS",
+    "PARQUET_MARK",
     "PICTURE",
     "RENDERED",
     "SCANNED",
     "SEASON",
+    "THINNING",
     "VIDEO",
     "VISITS",
     "Database",
@@ -54,6 +58,9 @@ PLY_MARK = "comment fruits written by pomona, metres"
 MODEL_MARK = b"pomona_training"
 """Key in the metadata of the models that are trained here."""
 
+PARQUET_MARK = b"fruits written by pomona"
+"""In the footer of the Parquet files that are written here."""
+
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
 
@@ -73,6 +80,16 @@ DEMO_NAME = "demo "
 """Begins the names of the sessions that the demo scans."""
 
 """Of the visits of `pomona demo`, and in their tables."""
+
+GROWN_COLUMNS = {
+    "series.csv": "fruit_id,date,diameter_mm,sigma_mm",
+    "curves.csv": "fruit_id,date,diameter_mm,low_mm,high_mm",
+    "fruits.csv": "fruit_id,n_dates,rate_mm_per_day,forecast_mm,outlier",
+    "blocks.csv": "block,n_fruits,mean_mm,rate_mm_per_day,forecast_mm",
+    "classes.csv": "date,from_mm,below_mm,n_fruits,kg,packs",
+}
+GROWN_PICTURES = ("curves.png", "sizes.png", "variability.png")
+"""What `pomona growth` writes, and the columns by which its tables are told."""
 
 Database = Literal["session", "map", "other"]
 
@@ -158,6 +175,15 @@ def _is_geojson(path: Path) -> bool:
     return _head(path).startswith(b'{"type": "FeatureCollection"') and b"LOCAL_CS" in _head(path)
 
 
+def _is_shapefile(path: Path) -> bool:
+    """Tell any of the files of a Shapefile by the one that says where it lies: nowhere on Earth, as ours do."""
+    return b"LOCAL_CS" in _head(path.with_suffix(".prj"))
+
+
+def _is_parquet(path: Path) -> bool:
+    return _head(path).startswith(b"PAR1") and PARQUET_MARK in _tail(path)
+
+
 def _is_session(path: Path) -> bool:
     return database_of(path) == "session"
 
@@ -238,6 +264,13 @@ def _is_demo(folder: Path) -> bool:
     return all(is_kind(path) for name, is_kind in tells.items() for path in folder.glob(name))
 
 
+def _is_grown(folder: Path) -> bool:
+    """Tell a folder in which every file with one of growth's names is of its kind."""
+    tells = {name: _has_columns(*columns.split(",")) for name, columns in GROWN_COLUMNS.items()}
+    tells |= dict.fromkeys(GROWN_PICTURES, _is_picture)
+    return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
+
+
 def _is_truth(path: Path) -> bool:
     found = json.loads(path.read_text(encoding="utf-8"))
     return isinstance(found, dict) and found.keys() >= TRUTH_KEYS
@@ -254,9 +287,14 @@ KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
 SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
+CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
+THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
+GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),
     "ply": Like("a PLY of fruits", _is_ply),
     "geojson": Like("a GeoJSON of fruits", _is_geojson),
+    "shp": Like("a Shapefile of fruits", _is_shapefile),
+    "parquet": Like("a GeoParquet of fruits", _is_parquet),
 }

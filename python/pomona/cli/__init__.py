@@ -7,7 +7,23 @@ from typing import NoReturn
 import typer
 
 from pomona import __version__
-from pomona.cli import config, demo, detect, evaluate, export, import_, info, map, match, scan, synth, train
+from pomona.cli import (
+    config,
+    demo,
+    detect,
+    evaluate,
+    export,
+    growth,
+    import_,
+    info,
+    map,
+    match,
+    scan,
+    synth,
+    thinning,
+    train,
+    validate,
+)
 from pomona.cli.terminal import say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
@@ -46,6 +62,9 @@ app.command()(train.train)
 app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
+app.command()(growth.growth)
+app.command()(thinning.thinning)
+app.command()(validate.validate)
 app.command()(export.export)
 app.command()(config.config)
 app.add_typer(evaluate.app, name="evaluate")

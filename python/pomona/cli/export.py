@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +24,8 @@ class Format(StrEnum):
     csv = "csv"
     ply = "ply"
     geojson = "geojson"
+    shp = "shp"
+    parquet = "parquet"
 
 
 def _like(given: Mapping[str, Any]) -> Like:
@@ -32,26 +34,53 @@ def _like(given: Mapping[str, Any]) -> Like:
     return EXPORTS[format_of(given["output"], given["to"])]
 
 
+def _parts(output: Path) -> Iterable[Path]:
+    """Give the other files of a Shapefile."""
+    from pomona.shapefile import parts_of
+
+    return (part for part in parts_of(output) if part != output) if output.suffix.lower() == ".shp" else ()
+
+
 def export(
     source: Path = typer.Argument(
         metavar="SESSION_OR_MAP", help="A session or a map (.gpkg), or a cloud (.csv, .ply)."
     ),
-    output: Annotated[Path, Writes(_like)] = typer.Option(
+    output: Annotated[Path, Writes(_like, also=_parts)] = typer.Option(
         ..., "-o", "--output", help="The file to write; - is the standard output."
     ),
     to: Format | None = typer.Option(None, help="Format of the file to write, where its suffix does not say it."),
     observations: bool = typer.Option(
         False, "--observations", help="Of a session or map: a row for each fruit and visit that saw it, with the date."
     ),
+    growth: bool = typer.Option(
+        False,
+        "--growth",
+        help="Of a map: with each fruit's tree, rate of growth, and forecast for --harvest.",
+    ),
+    harvest: str | None = typer.Option(None, metavar="DATE", help="With --growth: day to foretell, as 2024-09-10."),
     unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
 ) -> None:
     """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen."""
     from pomona.cloud import FruitCloud
     from pomona.export import export_cloud, format_of
 
-    cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
+    if growth or harvest is not None:
+        cloud = _grown(source, harvest, plain=not growth or observations)
+    else:
+        cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
     export_cloud(cloud, output, format_of(output, None if to is None else to.value))
     say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
+
+
+def _grown(source: Path, harvest: str | None, *, plain: bool) -> FruitCloud:
+    from pomona.errors import PomonaError
+    from pomona.growth.grown_cloud import grown_cloud
+    from pomona.growth.harvest_day import harvest_day
+    from pomona.growth.season_growth import grow_season
+
+    if plain:
+        raise PomonaError("--growth: found it with --observations, or --harvest without it, expected it alone or both")
+    return grown_cloud(grow_season(source, harvest=harvest_day(harvest)))
 
 
 def _observed(source: Path) -> FruitCloud:

@@ -1,0 +1,107 @@
+"""`pomona growth`: how every fruit grows, how big it will be, and how many of each size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Writes
+from pomona.likes import GROWN
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from pomona.growth.season_growth import SeasonGrowth
+
+
+def growth(
+    orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg), with visits on two days or more."),
+    output: Annotated[Path, Writes(GROWN)] = typer.Option(
+        ..., "-o", "--output", help="Folder for tables and pictures; made where it does not exist."
+    ),
+    harvest: str | None = typer.Option(None, metavar="DATE", help="Day to foretell sizes for, as 2024-09-10."),
+    temperature: Path | None = typer.Option(
+        None, metavar="CSV", help="Daily temperatures (date,mean_c or date,min_c,max_c): degree days are tried too."
+    ),
+    classes: str | None = typer.Option(
+        None, metavar="MM,MM,...", help="Limits of the size classes in mm, 60,65,70; else every 5 mm."
+    ),
+    pack_kg: float = typer.Option(13.0, min=0.001, metavar="KG", help="Kilograms that a pack holds."),
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Tell how every fruit grows, with 90 % intervals: tables and pictures of fruits, trees and size classes."""
+    from pomona.growth.growth_pictures import write_pictures
+    from pomona.growth.growth_tables import write_tables
+    from pomona.growth.harvest_day import harvest_day
+    from pomona.growth.season_growth import grow_season
+    from pomona.growth.size_classes import FIVE_MM, parsed_classes
+
+    limits_mm = FIVE_MM if classes is None else parsed_classes(classes)
+    grown = grow_season(orchard, harvest=harvest_day(harvest), temperature=temperature, limits_mm=limits_mm)
+    output.mkdir(parents=True, exist_ok=True)
+    written = (*write_tables(output, grown, pack_kg=pack_kg), *write_pictures(output, grown))
+    if json:
+        say_json({"output": [str(path) for path in written], **_summary(grown)})
+    else:
+        say(*_as_lines(output, grown))
+
+
+def _summary(grown: SeasonGrowth) -> dict[str, Any]:
+    """Put what was found in numbers: the curve, and all blocks."""
+    import numpy as np
+
+    drawn = grown.foretold.summaries["blocks"]
+    mean, (low, high) = drawn.mean(axis=0), np.quantile(drawn, (0.05, 0.95), axis=0)
+    now = len(grown.fruits.days) - 1
+    blocks = [
+        {
+            "block": block.kind,
+            "name": block.name or None,
+            "n_fruits": int(block.members.sum()),
+            "mean_mm": float(mean[row, now]),
+            "rate_mm_per_day": float(mean[row, -1]),
+            "forecast_mm": float(mean[row, -2]) if grown.harvest else None,
+            "forecast_low_mm": float(low[row, -2]) if grown.harvest else None,
+            "forecast_high_mm": float(high[row, -2]) if grown.harvest else None,
+        }
+        for row, block in enumerate(grown.blocks)
+    ]
+    shape = grown.curve.fitted.likeliest
+    return {
+        "curve": grown.curve.fitted.family.name,
+        "time": grown.curve.clock.name,
+        "held_out_log_likelihood": dict(grown.curve.held_out),
+        "noise_mm": shape.noise_mm,
+        "visit_scales": dict(zip(grown.fruits.sessions, grown.foretold.scales.tolist(), strict=True)),
+        "harvest": None if grown.harvest is None else grown.harvest.isoformat(),
+        "n_outliers": int(grown.odd.sum()),
+        "blocks": blocks,
+    }
+
+
+def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
+    found = _summary(grown)
+    scales = [abs(scale - 1.0) for scale in found["visit_scales"].values()]
+    lines = [
+        f"{output}: {len(grown.fruits.ids)} fruits on {len(grown.fruits.days)} visits, "
+        f"{grown.fruits.days[0]} to {grown.fruits.days[-1]}",
+        f"  curve: {found['curve']} over {found['time']}; a size is sure to {found['noise_mm']:.1f} mm, "
+        f"a visit's sizes are off together by up to {100 * max(scales):.1f} %",
+    ]
+    if found["n_outliers"]:
+        lines.append(f"  {found['n_outliers']} fruits are outliers, see fruits.csv")
+    forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
+    lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
+    return lines + [_line_of_block(block) for block in found["blocks"]]
+
+
+def _line_of_block(block: dict[str, Any]) -> str:
+    name = " ".join(filter(None, (block["block"], block["name"])))
+    line = f"  {name[:18]:>18} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
+    line += f"{block['rate_mm_per_day']:>9.2f}"
+    if block["forecast_mm"] is None:
+        return line
+    return f"{line}  {block['forecast_mm']:.1f} mm ({block['forecast_low_mm']:.1f} to {block['forecast_high_mm']:.1f})"

@@ -1,0 +1,104 @@
+"""`pomona thinning`: which fruits will drop, how many stay, which to thin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Writes
+from pomona.likes import THINNING
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from pomona.growth.season_growth import SeasonGrowth
+    from pomona.growth.thinning_plan import ThinningPlan
+
+
+def thinning(
+    orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg), with visits on two days or more."),
+    target: int | None = typer.Option(None, min=0, metavar="FRUITS", help="That each tree shall keep."),
+    output: Annotated[Path | None, Writes(THINNING)] = typer.Option(
+        None, "-o", "--output", help="CSV with a line for each hanging fruit: cluster, rate, probability, what to do."
+    ),
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Tell which fruits will drop by the growth-rate rule, and which to thin to come to a target load.
+
+    Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop. What a
+    tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first.
+    """
+    from pomona.growth.season_growth import grow_season
+    from pomona.growth.thinning_plan import plan_thinning
+
+    grown = grow_season(orchard)
+    plan = plan_thinning(grown, target)
+    if output is not None:
+        _write(output, grown, plan)
+    trees = _trees(grown, plan)
+    if json:
+        say_json({"fast_mm_per_day": plan.drop.fast_mm_per_day, "target": target, "trees": trees})
+        return
+    before, last = sorted(set(grown.fruits.days))[-2:]
+    say(f"{orchard}: from {before} to {last}, the fastest fruits grew {plan.drop.fast_mm_per_day:.2f} mm a day")
+    say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
+    for tree in trees:
+        counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"
+        say(f"  {(tree['tree'] or 'all')[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
+
+
+def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:
+    import numpy as np
+
+    numbers, actions = grown.fruits.trees.numbers[plan.rows], np.array(plan.actions)
+    found = []
+    for number, name in enumerate(grown.fruits.trees.names):
+        of_tree = numbers == number
+        thin = of_tree & (actions == "thin")
+        n_fruits, n_dropping = int(of_tree.sum()), int((of_tree & (actions == "drops")).sum())
+        found.append(
+            {
+                "tree": name or None,
+                "n_fruits": n_fruits,
+                "n_dropping": n_dropping,
+                "n_staying": n_fruits - n_dropping,
+                "n_to_thin": int(thin.sum()),
+                "n_clusters_to_thin": len(set(plan.clusters[thin].tolist())),
+            }
+        )
+    return found
+
+
+def _write(path: Path, grown: SeasonGrowth, plan: ThinningPlan) -> None:
+    import numpy as np
+
+    from pomona.growth.growth_tables import write_table
+
+    trees = grown.fruits.trees.of_fruits()
+    lines = [
+        (
+            grown.fruits.ids[row],
+            trees[row],
+            plan.clusters[i] + 1,
+            plan.cluster_sizes[i],
+            plan.sizes_mm[i],
+            plan.rates_mm_per_day[i],
+            plan.drop.probabilities[i],
+            plan.actions[i],
+        )
+        for i, row in enumerate(plan.rows.tolist())
+    ]
+    columns = (
+        "fruit_id",
+        "tree",
+        "cluster",
+        "n_in_cluster",
+        "diameter_mm",
+        "rate_mm_per_day",
+        "drop_probability",
+        "action",
+    )
+    write_table(path, columns, [lines[i] for i in np.argsort(grown.fruits.ids[plan.rows])])

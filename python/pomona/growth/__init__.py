@@ -1,0 +1,1 @@
+"""How the fruits of a map grow, and what to decide: forecasts, size classes, thinning, agreement with calipers."""

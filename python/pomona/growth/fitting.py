@@ -1,0 +1,141 @@
+r"""The nonlinear rest of the growth model: a prior, the mode, and draws weighted by the exact likelihood.
+
+The seven numbers of `Shape` are drawn around the mode of their posterior, from a multivariate t with the curvature
+there, and weighted by the ratio of the posterior to that density: importance sampling, so that neither the bend of the
+curve nor the skew of the spreads is lost, which a linearised fit loses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import gammaln
+
+from pomona.growth.curve_families import CurveFamily
+from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.size_table import SizeTable
+
+__all__ = ["FittedShape", "fit_shape"]
+
+Numbers = NDArray[np.float64]
+
+_PROPOSED, _DRAWS = 1500, 300
+"""Shapes that are proposed, and those that are kept, by weight: about one in three proposals counts."""
+
+_TAILS = 5.0
+"""Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
+
+_MOST_FRUITS = 1000
+"""That a shape is fitted to; seven numbers need no more."""
+
+_GRADIENT = 0.05
+"""At which the climb ends: the draws are weighted, so their middle need not be the mode to the last digit."""
+
+_STEP = 0.05
+"""Of the finite differences, in standard deviations of the prior."""
+
+# Medians and standard deviations: of the logarithms, but of the onset, in days against the first visit.
+_ONSET_DAYS = (-10.0, 35.0)
+_RATE_SPREAD = 0.30
+_SPREADS = (
+    (0.07, 0.5),  # of a fruit's size
+    (3.0, 0.5),  # of its onset, days
+    (0.02, 0.7),  # of a tree's size
+    (0.02, 0.5),  # of a visit's scale
+    (2.0, 0.6),  # of a diameter, mm
+)
+
+
+class _Posterior:
+    """The logarithm of the posterior over the shape, in standard deviations of the prior."""
+
+    def __init__(self, table: SizeTable, family: CurveFamily) -> None:
+        self.table, self.family = table, family
+        medians = (family.usual_rate_per_day, *(median for median, _ in _SPREADS))
+        self.middle = np.log(medians)
+        self.spread = np.array([_RATE_SPREAD, *(spread for _, spread in _SPREADS)])
+
+    def shape(self, z: Numbers) -> Shape:
+        onset = float(self.table.times[0] + _ONSET_DAYS[0] + _ONSET_DAYS[1] * z[0])
+        rate, *spreads = np.exp(self.middle + self.spread * z[1:]).tolist()
+        return Shape(rate, onset, *spreads)
+
+    def __call__(self, z: Numbers) -> float:
+        likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
+        return likelihood - 0.5 * float(z @ z) - 0.5 * len(z) * float(np.log(2.0 * np.pi))
+
+    def cost(self, z: Numbers) -> float:
+        return -self(z)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedShape:
+    """What the measurements say of the shape.
+
+    Attributes
+    ----------
+    family : CurveFamily
+    likeliest : Shape
+        At the mode.
+    log_evidence : float
+        Logarithm of the density of the measurements, the shape integrated out by the curvature at the mode (Laplace).
+    """
+
+    family: CurveFamily
+    likeliest: Shape
+    log_evidence: float
+    _posterior: _Posterior
+    _mode: Numbers
+    _root: Numbers
+
+    def draws(self, rng: np.random.Generator) -> tuple[Shape, ...]:
+        """Draw equally likely shapes, by the exact posterior and not by its curvature."""
+        drawn, log_density = _student(rng, self._root, self._mode)
+        log_weights = np.array([self._posterior(z) for z in drawn]) - log_density
+        chosen = _resampled(rng, np.exp(log_weights - log_weights.max()))
+        return tuple(self._posterior.shape(drawn[row]) for row in chosen)
+
+
+def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
+    """Fit the shape of one family to a table of at least two visits at different times."""
+    posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
+    mode: Numbers = minimize(posterior.cost, np.zeros(7), method="BFGS", tol=_GRADIENT).x
+    values, axes = np.linalg.eigh(_curvature(posterior, mode))
+    # Where the differences see no bend, the prior's own is there.
+    root = np.asarray(axes / np.sqrt(np.maximum(values, 1.0)))
+    volume = 0.5 * len(mode) * np.log(2.0 * np.pi) + np.linalg.slogdet(root)[1]
+    return FittedShape(family, posterior.shape(mode), posterior(mode) + float(volume), posterior, mode, root)
+
+
+def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
+    """Minus the second derivatives at the mode, by differences."""
+    steps = _STEP * np.eye(len(mode))
+    middle = posterior(mode)
+    ends = [(posterior(mode + step), posterior(mode - step)) for step in steps]
+    curvature = np.diag([2.0 * middle - above - below for above, below in ends])
+    for i, j in combinations(range(len(mode)), 2):
+        both = posterior(mode + steps[i] + steps[j]) + posterior(mode - steps[i] - steps[j])
+        curvature[i, j] = curvature[j, i] = 0.5 * (sum(ends[i]) + sum(ends[j]) - 2.0 * middle - both)
+    return np.asarray(curvature / _STEP**2)
+
+
+def _student(rng: np.random.Generator, root: Numbers, mode: Numbers) -> tuple[Numbers, Numbers]:
+    """Draw from a multivariate t, and give the logarithms of its density there."""
+    n = len(mode)
+    normal = rng.normal(size=(_PROPOSED, n))
+    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, _PROPOSED))
+    drawn = mode + (normal * stretch[:, None]) @ root.T
+    squares = ((normal * stretch[:, None]) ** 2).sum(axis=1)
+    constant = gammaln((_TAILS + n) / 2) - gammaln(_TAILS / 2) - n / 2 * np.log(_TAILS * np.pi)
+    constant -= np.linalg.slogdet(root)[1]
+    return drawn, np.asarray(constant - (_TAILS + n) / 2 * np.log1p(squares / _TAILS))
+
+
+def _resampled(rng: np.random.Generator, weights: Numbers) -> NDArray[np.int64]:
+    """Rows drawn by weight, systematically: those that are kept."""
+    ends = np.cumsum(weights) / weights.sum()
+    return np.minimum(np.searchsorted(ends, (np.arange(_DRAWS) + rng.random()) / _DRAWS), _PROPOSED - 1)

@@ -1,0 +1,35 @@
+"""Fruits with their growth as columns, for a GIS to colour."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.growth.season_growth import SeasonGrowth
+
+__all__ = ["grown_cloud"]
+
+
+def grown_cloud(growth: SeasonGrowth) -> FruitCloud:
+    """Give the fruits where they were last seen, with tree, size by the curve, rate, forecast and `outlier`."""
+    told, hanging = growth.foretold, growth.fruits.hanging
+    columns = {"size_mm": told.sizes_mm[:, len(growth.fruits.days) - 1]}
+    columns |= {"rate_mm_per_day": told.rates_mm_per_day, "rate_sigma_mm_per_day": told.rate_sigmas_mm_per_day}
+    if growth.harvest is not None:
+        columns |= {
+            "forecast_mm": np.where(hanging, told.sizes_mm[:, -1], np.nan),
+            "forecast_low_mm": np.where(hanging, told.lows_mm[:, -1], np.nan),
+            "forecast_high_mm": np.where(hanging, told.highs_mm[:, -1], np.nan),
+        }
+    extras = {name: _cells(column) for name, column in columns.items()}
+    extras |= {"tree": growth.fruits.trees.of_fruits(), "outlier": tuple(str(int(odd)) for odd in growth.odd)}
+    cloud = growth.fruits.cloud
+    found = replace(cloud, extras={**cloud.extras, **extras})
+    return found.select(np.argsort(growth.fruits.ids, kind="stable"))
+
+
+def _cells(column: NDArray[np.float64]) -> tuple[str, ...]:
+    return tuple("" if np.isnan(value) else f"{value:.4f}" for value in column)

@@ -1,0 +1,185 @@
+"""Growth as pictures: curves over the season, sizes now and at the harvest, and where along the row."""
+
+from __future__ import annotations
+
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.growth.drawn_names import drawn_name
+from pomona.growth.foretelling import NINETY
+from pomona.growth.growth_tables import used_classes
+from pomona.growth.season_growth import SeasonGrowth
+from pomona.plot.files import save_picture
+from pomona.plot.projections import side_and_plan
+from pomona.plot.sheet import FAINT, INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_curves", "draw_sizes", "draw_variability", "write_pictures"]
+
+BLUE, ORANGE, RED = "#0072b2", "#e69f00", "#d55e00"
+"""Of Okabe and Ito: told apart by all eyes."""
+
+_MOST_CURVES = 150
+"""Fruits that are drawn one by one; more are a grey mass."""
+
+_JITTER_S = 36_000.0
+"""Dots of a visit are drawn side by side, within a day."""
+
+_SPAN_BY = (0.02, 0.98)
+"""Quantiles of the rates that the colours span: one odd fruit does not bleach the others."""
+
+_MOST_TREE_NAMES = 40
+
+
+def write_pictures(folder: Path, growth: SeasonGrowth) -> tuple[Path, ...]:
+    """Write curves.png, sizes.png and variability.png."""
+    drawn = {"curves.png": draw_curves, "sizes.png": draw_sizes, "variability.png": draw_variability}
+    for name, draw in drawn.items():
+        save_picture(draw(growth), folder / name)
+    return tuple(folder / name for name in drawn)
+
+
+def draw_curves(growth: SeasonGrowth) -> Figure:
+    """Draw the sizes of fruits over the season, and the mean of all with its 90 % interval."""
+    figure, axes = _figure(8.0, 4.6)
+    at = _dates(growth.days)
+    told = growth.foretold
+    hanging = np.flatnonzero(growth.fruits.hanging)
+    some = hanging[:: max(1, len(hanging) // _MOST_CURVES)]
+    n_visits = len(growth.fruits.days)
+    axes.plot(at, told.sizes_mm[some].T, color=FAINT, linewidth=0.5, alpha=0.6, zorder=1)
+    jitter = np.linspace(-_JITTER_S, _JITTER_S, len(some)).astype("timedelta64[s]")
+    for column in range(n_visits):
+        axes.plot(
+            at[column] + jitter, growth.fruits.diameters_mm[some, column], ".", color=INK, markersize=2.5, zorder=2
+        )
+    means = growth.foretold.summaries["blocks"][:, 0, :-1]
+    low, high = np.quantile(means, NINETY, axis=0)
+    axes.fill_between(at, low, high, color=BLUE, alpha=0.25, linewidth=0, zorder=3)
+    axes.plot(at, means.mean(axis=0), color=BLUE, linewidth=2.0, marker="o", label="mean of all, with 90 %", zorder=4)
+    if growth.harvest is not None:
+        axes.axvline(at[n_visits - 1], color=FAINT, linestyle=":")
+        axes.text(
+            at[n_visits - 1], 0.02, " last visit", transform=axes.get_xaxis_transform(), color=INK, fontsize="small"
+        )
+    axes.plot([], [], ".", color=INK, label="sizes as measured")
+    axes.set(ylabel="diameter, mm")
+    _say(figure, f"{int(growth.fruits.hanging.sum())} fruits over {n_visits} visits", _about(growth))
+    axes.legend(frameon=False, labelcolor=INK, loc="upper left")
+    _days_below(axes)
+    return figure
+
+
+def draw_sizes(growth: SeasonGrowth) -> Figure:
+    """Draw how many fruits are in each size class, on the last visit and at the harvest."""
+    figure, axes = _figure(8.0, 4.2)
+    counts = growth.foretold.summaries["counts"]
+    now = len(growth.fruits.days) - 1
+    rows = used_classes(growth)
+    shown = [(now, BLUE)] + ([(now + 1, ORANGE)] if growth.harvest else [])
+    width = 0.8 / len(shown)
+    for place, (column, colour) in enumerate(shown):
+        of_day = counts[:, rows, column]
+        mean, (low, high) = of_day.mean(axis=0), np.quantile(of_day, NINETY, axis=0)
+        x = np.arange(len(rows)) + (place - (len(shown) - 1) / 2) * width
+        errors = np.maximum([mean - low, high - mean], 0.0)
+        axes.bar(x, mean, width, color=colour, label=f"{growth.days[column]}")
+        axes.errorbar(x, mean, errors, fmt="none", ecolor=INK, elinewidth=1, capsize=2)
+    limits = [f"{limit:g}" for limit in growth.limits_mm]
+    names = [f"< {limits[0]}", *map("-".join, pairwise(limits)), f"{limits[-1]} +"]
+    axes.set_xticks(np.arange(len(rows)), [names[row] for row in rows])
+    axes.set(xlabel="size class, mm", ylabel="fruits")
+    axes.legend(frameon=False, labelcolor=INK)
+    _say(figure, "Sizes now" + (" and at the harvest" if growth.harvest else ""), "bars: 90 % intervals of the counts")
+    return figure
+
+
+def draw_variability(growth: SeasonGrowth) -> Figure:
+    """Draw each fruit where it hangs, in the colour of its growth, and the mean size of each tree below."""
+    from matplotlib.figure import Figure
+
+    cloud, hanging = growth.fruits.cloud, growth.fruits.hanging
+    side = side_and_plan(cloud.positions)[0]
+    places, rates = side.project(cloud.positions)[hanging], growth.foretold.rates_mm_per_day[hanging]
+    length = float(np.ptp(places[:, 0])) if len(places) else 1.0
+    figure = Figure(figsize=(float(np.clip(1.2 * length, 8.0, 30.0)), 6.0), dpi=110, layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    low, high = np.quantile(rates, _SPAN_BY)
+    marks = above.scatter(*places.T, c=rates, cmap="viridis", vmin=low, vmax=high, s=16)
+    figure.colorbar(marks, ax=above, label="growth, mm a day", pad=0.01)
+    above.set(ylabel=f"{side.labels[1]}, m")
+    above.set_aspect("equal", adjustable="datalim")
+    _mean_of_trees(below, growth)
+    below.set(xlabel=f"{side.labels[0]}, m", ylabel="mean diameter, mm")
+    for axes in (above, below):
+        _quiet(axes)
+    _say(figure, "Where the fruits grow fast", f"{growth.days[len(growth.fruits.days) - 1]}, last visit")
+    return figure
+
+
+def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
+    drawn = growth.foretold.summaries["blocks"]
+    now = len(growth.fruits.days) - 1
+    trees = [row for row, block in enumerate(growth.blocks) if block.kind == "tree"] or [0]
+    x = np.array([growth.fruits.trees.along_m[growth.blocks[row].members].mean() for row in trees])
+    for column, colour in ((now, BLUE), (now + 1, ORANGE))[: 2 if growth.harvest else 1]:
+        of_day = drawn[:, trees, column]
+        mean, (low, high) = of_day.mean(axis=0), np.quantile(of_day, NINETY, axis=0)
+        errors = np.maximum([mean - low, high - mean], 0.0)
+        axes.errorbar(x, mean, errors, fmt="o", color=colour, capsize=3, label=f"{growth.days[column]}")
+    if len(trees) <= _MOST_TREE_NAMES:
+        for place, row in zip(x, trees, strict=True):
+            name = growth.blocks[row].name
+            text = f"tree {drawn_name(name)}" if name else "all"
+            axes.text(place, 0.02, text, transform=axes.get_xaxis_transform(), ha="center", color=INK)
+    axes.margins(y=0.25)
+    axes.legend(frameon=False, labelcolor=INK, ncols=2)
+
+
+def _figure(width_in: float, height_in: float) -> tuple[Figure, Axes]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    _quiet(axes)
+    return figure, axes
+
+
+def _quiet(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(FAINT)
+    axes.tick_params(colors=INK, color=FAINT, labelsize="small")
+
+
+def _say(figure: Figure, title: str, about: str) -> None:
+    figure.suptitle(title, x=0.02, ha="left", fontsize="x-large", fontweight="bold", color=INK)
+    figure.axes[0].set_title(about, loc="left", fontsize="medium", color=INK)
+
+
+def _about(growth: SeasonGrowth) -> str:
+    drawn = growth.foretold.summaries["blocks"][:, 0]
+    said = f"{growth.curve.fitted.family.name}; {drawn[:, -1].mean():.2f} mm a day at the last visit"
+    if growth.harvest is None:
+        return said
+    low, high = np.quantile(drawn[:, -2], NINETY)
+    return f"{said}; {drawn[:, -2].mean():.1f} mm on {growth.harvest} ({low:.1f} to {high:.1f})"
+
+
+def _dates(days: tuple[date, ...]) -> NDArray[np.datetime64]:
+    return np.array(days, dtype="datetime64[s]")
+
+
+def _days_below(axes: Axes) -> None:
+    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+    locator = AutoDateLocator(minticks=3, maxticks=9)  # type: ignore[no-untyped-call]
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]

@@ -1,0 +1,137 @@
+"""What a map knows of the sizes of its fruits: who was measured when, on which tree, in which state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.growth.bearing_trees import BearingTrees, bearing_trees
+from pomona.orchard import Observations, OrchardMap
+
+__all__ = ["MeasuredFruits", "measured_fruits", "require_two_days"]
+
+
+SIZES_MM = (1.0, 1000.0)
+"""No fruit is smaller or larger: what says so is no measurement."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFruits:
+    """Diameters of N fruits on S visits, in order of trees and ids.
+
+    Attributes
+    ----------
+    path : Path
+        The map.
+    cloud : FruitCloud
+        The N fruits, where they were last seen, with the map's ids.
+    ids : (N,) int64
+        The same ids as numbers.
+    trees : BearingTrees
+        Tree of each fruit.
+    sessions : tuple of S str
+    moments : tuple of S datetime
+        When each visit was, ascending.
+    diameters_mm : (N, S) float64
+        NaN where a visit did not measure the fruit.
+    labels : tuple of N tuples of S str or None
+        The sessions' own names of the fruits.
+    """
+
+    path: Path
+    cloud: FruitCloud
+    ids: NDArray[np.int64]
+    trees: BearingTrees
+    sessions: tuple[str, ...]
+    moments: tuple[datetime, ...]
+    diameters_mm: NDArray[np.float64]
+    labels: tuple[tuple[str | None, ...], ...]
+
+    @property
+    def days(self) -> tuple[date, ...]:
+        """Day of each visit, (S,)."""
+        return tuple(moment.date() for moment in self.moments)
+
+    @property
+    def hanging(self) -> NDArray[np.bool_]:
+        """Which fruits hang for all that the map knows, (N,); all, once none does: the season is looked back at."""
+        states = self.cloud.extras.get("state", ("seen",) * len(self.ids))
+        hanging = np.array([state != "gone" for state in states], dtype=bool)
+        return hanging if hanging.any() else np.ones(len(self.ids), dtype=bool)
+
+    @property
+    def n_days(self) -> NDArray[np.int64]:
+        """On how many days each fruit was measured, (N,)."""
+        days = np.unique(np.array([day.toordinal() for day in self.days]), return_inverse=True)[1]
+        counts = [len(set(days[seen].tolist())) for seen in ~np.isnan(self.diameters_mm)]
+        return np.array(counts, dtype=np.int64)
+
+
+def measured_fruits(path: str | Path) -> MeasuredFruits:
+    """Read the sizes of a map's fruits; visits and fruits without any diameter are left out.
+
+    Raises
+    ------
+    PomonaError
+        When the file is no map or session, or knows no diameter at all.
+    """
+    orchard = OrchardMap(path)
+    if orchard.kind != "map":
+        raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
+    cloud, seen, visits = orchard.fruits(), orchard.observations(), orchard.visits()
+    names = tuple(visit.name for visit in visits)
+    ids = np.array(list(map(int, cloud.ids or ())), dtype=np.int64)
+    diameters_mm, labels = _table(ids, names, seen)
+    known = ~np.isnan(diameters_mm)
+    if not known.any():
+        raise PomonaError(f"{path}: found no diameters, expected sessions that measured them")
+    trees = bearing_trees(cloud)
+    fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    fruits = fruits[np.argsort(trees.numbers[fruits], kind="stable")]
+    return MeasuredFruits(
+        path=Path(path),
+        cloud=cloud.select(fruits),
+        ids=ids[fruits],
+        trees=trees.select(fruits),
+        sessions=tuple(names[column] for column in columns),
+        moments=tuple(datetime.fromisoformat(visits[column].date) for column in columns),
+        diameters_mm=diameters_mm[np.ix_(fruits, columns)],
+        labels=tuple(tuple(labels[fruit, column] for column in columns) for fruit in fruits),
+    )
+
+
+def _table(
+    ids: NDArray[np.int64], names: tuple[str, ...], seen: Observations
+) -> tuple[NDArray[np.float64], NDArray[np.object_]]:
+    """Give diameters in mm and labels, (N, S), of a long table."""
+    row_of = {fruit_id: row for row, fruit_id in enumerate(ids.tolist())}
+    column_of = {name: column for column, name in enumerate(names)}
+    rows = [row_of[fruit_id] for fruit_id in seen.fruit_ids.tolist()]
+    columns = [column_of[name] for name in seen.sessions]
+    diameters_mm = np.full((len(ids), len(names)), np.nan)
+    labels = np.full((len(ids), len(names)), None, dtype=object)
+    low, high = SIZES_MM
+    sizes_mm = 1000.0 * seen.diameters_m
+    # Comparisons with NaN are false, so what is unknown stays so.
+    diameters_mm[rows, columns] = np.where((sizes_mm >= low) & (sizes_mm <= high), sizes_mm, np.nan)
+    labels[rows, columns] = seen.labels
+    return diameters_mm, labels
+
+
+def require_two_days(fruits: MeasuredFruits) -> None:
+    """Refuse sizes of a single day, of which no growth can be told.
+
+    Raises
+    ------
+    PomonaError
+    """
+    if len(set(fruits.days)) < 2:
+        raise PomonaError(
+            f"{fruits.path}: found diameters of one day, {fruits.days[0]}, expected two or more: add another visit"
+        )

@@ -1,0 +1,62 @@
+"""Size classes: the minimum belongs to a class, the maximum to the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.errors import PomonaError
+from pomona.growth.foretelling import Summary
+from pomona.reading import shown
+
+__all__ = ["FIVE_MM", "class_counts", "class_masses", "parsed_classes"]
+
+FIVE_MM = np.arange(40.0, 101.0, 5.0)
+"""Limits of the usual classes, mm."""
+
+KG_PER_M3 = 900.0
+"""Mass of an apple against the ball of its widest diameter: 0.90 g/cm3 over 26 weighed Fuji."""
+
+
+def parsed_classes(text: str) -> NDArray[np.float64]:
+    """Read the limits of own classes, mm: ``60,65,70`` is below 60, 60 to 65, 65 to 70, and 70 and above.
+
+    Raises
+    ------
+    PomonaError
+    """
+    try:
+        limits = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        limits = np.empty(0)
+    if not len(limits) or not np.isfinite(limits).all() or limits[0] <= 0 or (np.diff(limits) <= 0).any():
+        raise PomonaError(f"--classes: found {shown(text)}, expected rising limits in mm, for example 60,65,70,75")
+    return limits
+
+
+def class_counts(limits_mm: NDArray[np.float64], members: NDArray[np.bool_]) -> Summary:
+    """How many fruits are in each class at each time, (C, Q): one more class than limits, below the first and above."""
+
+    def summary(sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _sums(limits_mm, sizes_mm[members], np.ones_like(sizes_mm[members]))
+
+    return summary
+
+
+def class_masses(limits_mm: NDArray[np.float64], members: NDArray[np.bool_]) -> Summary:
+    """Kilograms in each class at each time, (C, Q)."""
+
+    def summary(sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        masses_kg = KG_PER_M3 * np.pi / 6.0 * (sizes_mm[members] / 1000.0) ** 3
+        return _sums(limits_mm, sizes_mm[members], masses_kg)
+
+    return summary
+
+
+def _sums(
+    limits_mm: NDArray[np.float64], sizes_mm: NDArray[np.float64], amounts: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    classes = np.searchsorted(limits_mm, sizes_mm, side="right")
+    n = len(limits_mm) + 1
+    columns = zip(classes.T, amounts.T, strict=True)
+    return np.stack([np.bincount(of_day, weights=amount, minlength=n) for of_day, amount in columns], axis=1)

@@ -1,0 +1,72 @@
+"""Measured diameters as a table of fruits and visits, as the model takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["SizeTable"]
+
+
+@dataclass(frozen=True, eq=False)
+class SizeTable:
+    """Diameters of N fruits on S visits, fruits in order of their trees.
+
+    Attributes
+    ----------
+    logs : (N, S) float64
+        Natural logarithms of diameters in mm, NaN where a visit did not measure the fruit.
+    trees : (N,) int64
+        Tree of each fruit, 0 to T - 1, ascending.
+    times : (S,) float64
+        Time of each visit, days or degree days in the length of days, ascending.
+    typical_mm : (S,) float64
+        Usual diameter of a visit, by which an error in mm is one of the logarithm.
+    """
+
+    logs: NDArray[np.float64]
+    trees: NDArray[np.int64]
+    times: NDArray[np.float64]
+    typical_mm: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, diameters_mm: NDArray[np.float64], trees: NDArray[np.int64], times: NDArray[np.float64]) -> SizeTable:
+        """Take (N, S) diameters, NaN for none; every visit has at least one."""
+        return cls(np.log(diameters_mm), trees, times, np.nanmedian(diameters_mm, axis=0))
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which fruit was measured when, (N, S)."""
+        return ~np.isnan(self.logs)
+
+    @property
+    def tree_starts(self) -> NDArray[np.int64]:
+        """First row of each tree, (T,)."""
+        return np.flatnonzero(np.diff(self.trees, prepend=-1))
+
+    def without(self, cells: NDArray[np.bool_]) -> SizeTable:
+        """Leave measurements out, (N, S)."""
+        return replace(self, logs=np.where(cells, np.nan, self.logs))
+
+    def first_visits(self, count: int) -> SizeTable:
+        """Keep the first visits, with the fruits that they measured."""
+        return self._kept(self.seen[:, :count].any(axis=1), count)
+
+    def some_fruits(self, most: int) -> SizeTable:
+        """Keep at most so many fruits, evenly over the trees, those of many visits first."""
+        if len(self.logs) <= most:
+            return self
+        # Of each tree the same share, and in it the fruits that say most about growth.
+        order = np.lexsort((-self.seen.sum(axis=1), self.trees))
+        sizes = np.diff(self.tree_starts, append=len(self.logs))
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.concatenate([np.arange(size) for size in sizes])
+        keep = rank < np.ceil(sizes * most / len(self.logs))[self.trees]
+        return self._kept(keep, self.logs.shape[1])
+
+    def _kept(self, fruits: ArrayLike, count: int) -> SizeTable:
+        fruits = np.asarray(fruits)
+        trees = np.unique(self.trees[fruits], return_inverse=True)[1].astype(np.int64)
+        return SizeTable(self.logs[fruits, :count], trees, self.times[:count], self.typical_mm[:count])

@@ -1,0 +1,357 @@
+"""Growth of the fruits of a map against curves that are known, and what its tables, pictures and refusals are."""
+
+import csv
+import json
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from datetime import date, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from growth_maker import BLOOM, GrownRow, grow_row
+from pomona import FruitCloud, PomonaError, geopackage
+from pomona.growth.blocks import blocks_of
+from pomona.growth.curve_families import FAMILIES
+from pomona.growth.drawn_names import drawn_name
+from pomona.growth.fitting import fit_shape
+from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.season_clock import DegreeDays, read_temperatures
+from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
+from pomona.growth.size_classes import class_counts, parsed_classes
+from pomona.growth.size_table import SizeTable
+from pomona.orchard import OrchardMap, Session, add_session
+
+Pomona = Callable[..., tuple[int, str, str]]
+
+HARVEST = BLOOM + timedelta(days=135)
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
+
+
+@pytest.fixture(scope="module")
+def grown(row: GrownRow) -> SeasonGrowth:
+    return grow_season(row.path, harvest=HARVEST)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def true_of(row: GrownRow, grown: SeasonGrowth, days: float) -> np.ndarray:
+    """True sizes in the order of the growth's fruits."""
+    numbers = [int(labels[0].split()[1]) for labels in grown.fruits.labels]
+    return row.sizes_mm(days)[numbers]
+
+
+def small_table() -> SizeTable:
+    rng = np.random.default_rng(1)
+    sizes_mm = 50.0 * np.exp(rng.normal(0.0, 0.1, (5, 3)) + np.array([-0.3, 0.0, 0.2]))
+    sizes_mm[1, 0] = sizes_mm[3, 2] = np.nan
+    return SizeTable.of(sizes_mm, np.array([0, 0, 0, 1, 1]), np.array([100.0, 114.0, 130.0]))
+
+
+SHAPE = Shape(0.09, 95.0, 0.07, 3.0, 0.02, 0.025, 2.0)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_likelihood_is_that_of_one_large_gaussian(name: str) -> None:
+    """All effects as one covariance of all measurements: what the elimination step by step must come to."""
+    table, family = small_table(), FAMILIES[name]
+    model = Hierarchy(table, family, SHAPE)
+    fruits, visits = np.nonzero(table.seen)
+    x = SHAPE.rate_per_day * (table.times - SHAPE.onset_day)
+    slopes = (-SHAPE.rate_per_day * family.slope(x))[visits]
+    middle = np.log(30.0) - model.log_size(np.array(SHAPE.onset_day))
+    same_fruit, same_visit = fruits[:, None] == fruits, visits[:, None] == visits
+    same_tree = table.trees[fruits][:, None] == table.trees[fruits]
+    covariance = 0.3**2 + SHAPE.visit_spread**2 * same_visit + SHAPE.tree_spread**2 * same_tree
+    of_fruit = SHAPE.fruit_spread**2 + SHAPE.onset_spread_days**2 * np.outer(slopes, slopes)
+    covariance = covariance + of_fruit * same_fruit + np.diag((SHAPE.noise_mm / table.typical_mm[visits]) ** 2)
+    away = table.logs[fruits, visits] - middle - model.log_size(table.times)[visits]
+    expected = -0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(2 * np.pi * covariance)[1])
+    assert model.log_likelihood() == pytest.approx(expected, abs=1e-8)
+    # The expectations are those of the same Gaussian: the fruit's size given all measurements.
+    gain = SHAPE.fruit_spread**2 * (fruits[:, None] == np.arange(5)).T
+    np.testing.assert_allclose(model.expected().sizes, gain @ np.linalg.solve(covariance, away), atol=1e-9)
+
+
+def test_draws_scatter_about_their_expectation() -> None:
+    model = Hierarchy(small_table(), FAMILIES["expolinear"], SHAPE)
+    rng = np.random.default_rng(0)
+    drawn = [model.draw(rng) for _ in range(4000)]
+    expected = model.expected()
+    for name in ("visits", "trees", "sizes", "onsets_days"):
+        values = np.array([getattr(one, name) for one in drawn])
+        np.testing.assert_allclose(values.mean(axis=0), getattr(expected, name), atol=4 * values.std() / 60)
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=list(FAMILIES))
+def test_slopes_are_those_of_the_curves(family) -> None:
+    x = np.linspace(-8.0, 20.0, 57)
+    differences = (family.log_size(x + 1e-5) - family.log_size(x - 1e-5)) / 2e-5
+    np.testing.assert_allclose(family.slope(x), differences, rtol=1e-6, atol=1e-9)
+    assert np.isfinite(family.log_size(np.array([-1e4, 1e4]))).all()
+
+
+def test_sizes_rates_and_forecasts_are_near_the_truth(row: GrownRow, grown: SeasonGrowth) -> None:
+    told = grown.foretold
+    rates = true_of(row, grown, 95.5) - true_of(row, grown, 94.5)
+    assert np.median(np.abs(told.rates_mm_per_day - rates)) < 0.03
+    assert np.abs(told.sizes_mm[:, 3] - true_of(row, grown, 95)).mean() < 1.5
+    low, high = told.lows_mm[:, -1], told.highs_mm[:, -1]
+    true = true_of(row, grown, 135)
+    assert np.mean((low < true) & (true < high)) > 0.8
+    mean = told.summaries["blocks"][:, 0, -2]
+    assert np.quantile(mean, 0.05) < true.mean() < np.quantile(mean, 0.95)
+    # A block's mean is surer than a fruit, and never as sure as fruits whose errors were their own would make it.
+    assert (high - low).mean() > np.ptp(np.quantile(mean, (0.05, 0.95))) > 0.5
+
+
+def test_the_error_that_a_visit_shares_is_told(grown: SeasonGrowth) -> None:
+    told = np.log(grown.foretold.scales)
+    assert np.corrcoef(told - told.mean(), np.log([1.0, 1.02, 0.99, 1.01]))[0, 1] > 0.8
+    assert grown.curve.fitted.likeliest.noise_mm == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_same_map_gives_the_same_growth(row: GrownRow, grown: SeasonGrowth) -> None:
+    again = grow_season(row.path, harvest=HARVEST)
+    np.testing.assert_array_equal(again.foretold.sizes_mm, grown.foretold.sizes_mm)
+    np.testing.assert_array_equal(again.foretold.summaries["counts"], grown.foretold.summaries["counts"])
+
+
+def test_the_families_are_told_apart_where_sizes_tell() -> None:
+    """Two hundred fruits without noise to speak of, over a whole season."""
+    times = np.linspace(140.0, 260.0, 9)
+    rng = np.random.default_rng(3)
+    sizes = np.exp(4.3 + 0.06 * rng.normal(size=(200, 1)) + FAMILIES["logistic"].log_size(0.04 * (times - 140.0)))
+    table = SizeTable.of(sizes + rng.normal(0.0, 0.2, sizes.shape), np.zeros(200, np.int64), times)
+    evidence = {name: fit_shape(table, family).log_evidence for name, family in FAMILIES.items()}
+    assert max(evidence, key=evidence.__getitem__) == "logistic"
+
+
+def test_a_size_of_another_fruit_is_put_aside(tmp_path: Path, row: GrownRow, grown: SeasonGrowth) -> None:
+    sizes_mm = grown.fruits.diameters_mm.copy()
+    sizes_mm[7, 2] += 25.0
+    found = growth_of(replace(grown.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
+    assert found.put_aside[7, 2]
+    assert found.odd[7]
+    assert found.put_aside.sum() <= 2
+    assert found.foretold.sizes_mm[7, -1] == pytest.approx(grown.foretold.sizes_mm[7, -1], abs=2.0)
+
+
+def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    folder = tmp_path / "growth"
+    code, printed, told = pomona("growth", row.path, "-o", folder, "--harvest", HARVEST, "--classes", "60,65,70")
+    assert (code, told) == (0, "")
+    assert "90 fruits on 4 visits" in printed
+    series, fruits, blocks, classes, curves = (
+        rows_of(folder / f"{name}.csv") for name in ("series", "fruits", "blocks", "classes", "curves")
+    )
+    assert list(series[0]) == ["fruit_id", "date", "diameter_mm", "sigma_mm"]
+    assert len(series) == 4 * 90
+    assert list(fruits[0]) == [
+        "fruit_id", "tree", "n_dates", "rate_mm_per_day", "rate_sigma_mm_per_day", "rate_relative_per_day",
+        "forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier",
+    ]  # fmt: skip
+    assert [int(line["fruit_id"]) for line in fruits] == list(range(1, 91))
+    assert {line["tree"] for line in fruits} == {"1", "2", "3"}
+    assert all(
+        float(one["forecast_low_mm"]) < float(one["forecast_mm"]) < float(one["forecast_high_mm"]) for one in fruits
+    )
+    assert [(one["block"], one["n_fruits"]) for one in blocks] == [("all", "90"), *[("tree", "30")] * 3]
+    harvested = [one for one in classes if one["date"] == str(HARVEST)]
+    assert sum(float(one["n_fruits"]) for one in harvested) == pytest.approx(90, abs=0.01)
+    assert float(harvested[0]["packs"]) == pytest.approx(float(harvested[0]["kg"]) / 13.0, abs=1e-3)
+    assert len(curves) == 5 * 90
+    for name in ("curves", "sizes", "variability"):
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    # It is taken again, and nothing else of these names is.
+    assert pomona("growth", row.path, "-o", folder)[0] == 0
+    assert rows_of(folder / "fruits.csv")[0]["forecast_mm"] == ""
+    (folder / "fruits.csv").write_text("mine\n")
+    code, _, told = pomona("growth", row.path, "-o", folder)
+    assert (code, told.count("\n")) == (2, 1)
+    assert "is not a folder of growth" in told
+
+
+def test_json_says_the_same(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    code, printed, _ = pomona("growth", row.path, "-o", tmp_path / "g", "--harvest", HARVEST, "--json")
+    found = json.loads(printed)
+    assert code == 0
+    assert found["curve"] in FAMILIES
+    assert [block["n_fruits"] for block in found["blocks"]] == [90, 30, 30, 30]
+    assert found["blocks"][0]["forecast_low_mm"] < found["blocks"][0]["forecast_mm"]
+    assert set(found["held_out_log_likelihood"]) == {f"{name} over days" for name in FAMILIES}
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (
+            ["--harvest", "2024-07-01"],
+            "found 2024-07-01, expected the last visit's day or later: 2024-07-29",
+        ),
+        (["--harvest", "soon"], "--harvest: found 'soon', expected a day"),
+        (["--classes", "70,60"], "--classes: found '70,60', expected rising limits in mm"),
+        (["--classes", "-5,60"], "expected rising limits"),
+        (["--classes", "nan"], "expected rising limits"),
+        (["--temperature", "absent.csv"], "absent.csv: not found"),
+    ],
+)
+def test_what_cannot_be_is_one_line(pomona: Pomona, row: GrownRow, tmp_path: Path, flags: list[str], said: str) -> None:
+    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g", *flags)
+    assert (code, printed, told.count("\n")) == (2, "", 1)
+    assert said in told
+    assert not (tmp_path / "g").exists()
+
+
+def test_one_day_is_no_growth(pomona: Pomona, tmp_path: Path) -> None:
+    row = grow_row(tmp_path / "once.gpkg", days=(50,))
+    code, _, told = pomona("growth", row.path, "-o", tmp_path / "g")
+    assert (code, told.count("\n")) == (2, 1)
+    assert "found diameters of one day, 2024-06-14, expected two or more" in told
+
+
+def test_a_session_and_sizes_that_are_none_are_refused(pomona: Pomona, here: Path, row: GrownRow) -> None:
+    code, _, told = pomona("growth", "session.gpkg", "-o", "g")
+    assert (code, told.count("\n")) == (2, 1)
+    assert "found a session, expected a map" in told
+    for size in (0.0, -0.05):
+        (here / "bad.gpkg").write_bytes(row.path.read_bytes())
+        with closing(geopackage.connect(here / "bad.gpkg")) as connection:
+            connection.execute("UPDATE observations SET diameter_m = ? WHERE id = 5", (size,))
+        code, _, told = pomona("growth", "bad.gpkg", "-o", "g")
+        assert (code, told.count("\n")) == (2, 1)
+        assert "diameter_m" in told
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_few_fruits_and_no_growth_have_curves_too(grown: SeasonGrowth, n: int) -> None:
+    """Priors carry what two sizes cannot; equal sizes are no division by nothing."""
+    few = grown.fruits
+    some = replace(
+        few,
+        cloud=few.cloud.select(np.arange(n)),
+        ids=few.ids[:n],
+        trees=few.trees.select(np.arange(n)),
+        diameters_mm=np.full((n, 4), 60.0),
+        labels=few.labels[:n],
+    )
+    found = growth_of(some, harvest=HARVEST)
+    assert np.isfinite(found.foretold.sizes_mm).all()
+    assert (found.foretold.lows_mm < found.foretold.highs_mm).all()
+    np.testing.assert_allclose(found.foretold.sizes_mm[:, 3], 60.0, atol=6.0)
+
+
+def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
+    fruits = grown.fruits
+    states = tuple("gone" if row < 40 else "seen" for row in range(90))
+    cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": states})
+    found = blocks_of(replace(fruits, cloud=cloud))
+    assert [int(block.members.sum()) for block in found] == [50, 20, 30]
+    in_rows = replace(fruits.cloud, extras={"row": ("east",) * 30 + ("west",) * 59 + ("",)})
+    of_rows = [block for block in blocks_of(replace(fruits, cloud=in_rows)) if block.kind == "row"]
+    rows = [(block.name, int(block.members.sum())) for block in of_rows]
+    assert rows == [("east", 30), ("west", 59)]
+    over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
+    assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
+
+
+def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:
+    row = grow_row(tmp_path / "twice.gpkg", days=(50, 65), scales=(1.0, 1.0))
+    again = OrchardMap(row.path).fruits()
+    cloud = FruitCloud(again.positions, diameters_m=1.05 * row.curves.diameters_m(65.2))
+    assert add_session(row.path, Session("evening", f"{row.day(65)}T18:00:00", "drawn", cloud)).is_added
+    found = grow_season(row.path)
+    assert len(found.fruits.days) == 3
+    assert found.foretold.scales[2] > found.foretold.scales[1] + 0.02
+    assert found.fruits.n_days.max() == 2
+
+
+def test_names_of_strangers_are_drawn_as_text(pomona: Pomona, tmp_path: Path) -> None:
+    """Formulas, markup, escapes, letters that no font has."""
+    row = grow_row(
+        tmp_path / "evil.gpkg", days=(50, 65), n_trees=1, labels="$\\frac{{ <b>\x1b[2J 林檎 {}", name="$x^ \x1b {}"
+    )
+    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g")
+    assert (code, told) == (0, "")
+    assert "\x1b" not in printed
+
+
+def test_long_names_lose_their_middle() -> None:
+    assert drawn_name("a$b\x1b林") == "a?b??"
+    assert drawn_name("first " + 100 * "x" + " last") == "first " + 10 * "x" + "..." + 11 * "x" + " last"
+
+
+def test_sizes_classes_take_their_minimum_and_leave_their_maximum() -> None:
+    count = class_counts(parsed_classes("60,65,70"), np.array([True, True, True, True, False]))
+    sizes = np.array([[59.999], [60.0], [65.0], [70.0], [62.0]])
+    np.testing.assert_array_equal(count(sizes, np.zeros(5))[:, 0], [1, 1, 1, 1])
+
+
+def write_temperatures(path: Path, first: date, means_c: list[float]) -> Path:
+    lines = [f"{first + timedelta(days=i)},{mean - 6:g},{mean + 6:g}" for i, mean in enumerate(means_c)]
+    path.write_text("date,min_c,max_c\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def test_degree_days_run_as_fast_as_it_is_warm(tmp_path: Path) -> None:
+    first = date(2024, 6, 1)
+    path = write_temperatures(tmp_path / "t.csv", first, [15.0] * 10 + [25.0] * 10)
+    means = read_temperatures(path, [first, first + timedelta(days=19)])
+    moments = [datetime(2024, 6, day) for day in (1, 11, 20)]
+    clock = DegreeDays(means, moments[0], moments[-1])
+    times = clock.times(moments)
+    assert times[2] - times[0] == pytest.approx(19.0)
+    assert (times[2] - times[1]) / (times[1] - times[0]) == pytest.approx(9 * 20 / (10 * 10))
+    assert clock.per_day(moments[-1]) == pytest.approx(2 * clock.per_day(moments[0]))
+    # Beyond the table goes on what was usual at its end.
+    later = clock.times([datetime(2024, 6, 21), datetime(2024, 6, 22)])
+    assert later[1] - later[0] == pytest.approx(15.0 * clock.per_day(moments[0]) / 10.0)
+
+
+def test_growth_by_degree_days_is_found_by_what_it_foretells(tmp_path: Path) -> None:
+    """A cold fortnight in the middle: fruits that grow by warmth stand still in it."""
+    first = BLOOM + timedelta(days=50)
+    path = write_temperatures(tmp_path / "t.csv", first, [25.0] * 15 + [6.0] * 15 + [25.0] * 16)
+    row = grow_row(tmp_path / "o.gpkg", days=(50, 65, 66, 88), scales=(1.0,) * 4, noise_mm=0.5, n_trees=2)
+    moved = tmp_path / "moved.gpkg"
+    moved.write_bytes(row.path.read_bytes())
+    # The same sizes, seen when the warmth that they took had come: after the cold.
+    with closing(geopackage.connect(moved)) as connection:
+        (name,) = connection.execute("SELECT name FROM sessions ORDER BY date LIMIT 1 OFFSET 2").fetchone()
+        connection.execute("UPDATE sessions SET date = ? WHERE name = ?", (str(first + timedelta(days=30)), name))
+    found = grow_season(moved, temperature=path)
+    assert found.curve.clock.name == "degree days"
+    assert len(found.curve.held_out) == 6
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "found the header ''"),
+        ("day,mean_c\n", "expected a table with date and mean_c"),
+        ("date,mean_c\n", "found no days"),
+        ("date,mean_c\n2024-06-01,x\n", "line 2: mean_c: found 'x', expected a number"),
+        ("date,mean_c\n2024-06-01,294\n", "line 2: mean_c: found 294, expected degrees Celsius"),
+        ("date,mean_c\n2024-06-01,20\n2024-06-01,21\n", "line 3: found 2024-06-01 a second time"),
+        ("date,mean_c\n01.06.2024,20\n", "date: found '01.06.2024', expected a day"),
+        ("date,mean_c\n2024-06-01,20\n2024-06-03,20\n", "found no 2024-06-02"),
+        ("date,mean_c\n2024-06-02,20\n2024-06-03,20\n", "expected all days from 2024-06-01 to 2024-06-03"),
+        ("date,mean_c\n2024-06-01\n", "line 2: found 1 cells, expected 2"),
+    ],
+)
+def test_temperatures_that_are_none_are_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    with pytest.raises(PomonaError) as refused:
+        read_temperatures(path, [date(2024, 6, 1), date(2024, 6, 3)])
+    assert said in str(refused.value)
+    assert str(refused.value).startswith(str(path))

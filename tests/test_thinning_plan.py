@@ -1,0 +1,96 @@
+"""What will drop, what stays, what to thin."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from growth_maker import GrownRow, grow_row
+from pomona.growth.clusters import clusters_of
+from pomona.growth.fruit_drop import drop_of
+
+Pomona = Callable[..., tuple[int, str, str]]
+
+DROPPING = range(0, 60, 6)
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    """Fruitlets a week apart, of which every sixth grows at a quarter of its rate."""
+    path = tmp_path_factory.mktemp("row") / "orchard.gpkg"
+    return grow_row(
+        path, days=(35, 42), n_trees=2, noise_mm=0.5, scales=(1.0, 1.0), dropping=DROPPING, slowed_from=35.0
+    )
+
+
+def test_fruits_that_stop_growing_will_drop(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    code, printed, told = pomona("thinning", row.path, "--target", 20, "-o", tmp_path / "thin.csv", "--json")
+    assert (code, told) == (0, "")
+    with (tmp_path / "thin.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert list(lines[0]) == [
+        "fruit_id", "tree", "cluster", "n_in_cluster", "diameter_mm", "rate_mm_per_day", "drop_probability", "action"
+    ]  # fmt: skip
+    # The first visit gave the ids, in its order.
+    said = {int(line["fruit_id"]) - 1 for line in lines if line["action"] == "drops"}
+    assert len(said & set(DROPPING)) >= 9
+    assert len(said - set(DROPPING)) <= 1
+    for tree in json.loads(printed)["trees"]:
+        assert tree["n_staying"] - tree["n_to_thin"] == 20
+    assert sum(line["action"] == "thin" for line in lines) == sum(
+        tree["n_to_thin"] for tree in json.loads(printed)["trees"]
+    )
+
+
+def test_the_fullest_clusters_are_thinned_of_their_smallest(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    assert pomona("thinning", row.path, "--target", 24, "-o", tmp_path / "thin.csv")[0] == 0
+    with (tmp_path / "thin.csv").open(newline="") as file:
+        lines = [line for line in csv.DictReader(file) if line["action"] != "drops"]
+    for tree in ("1", "2"):
+        of_tree = [line for line in lines if line["tree"] == tree]
+        left: dict[str, list[dict[str, str]]] = {}
+        for line in of_tree:
+            left.setdefault(line["cluster"], []).append(line)
+        kept = {name: [one for one in fruits if one["action"] == "keep"] for name, fruits in left.items()}
+        thinned_from = [len(fruits) for name, fruits in left.items() if len(kept[name]) < len(fruits)]
+        # Levelled from above: no cluster keeps two more than one that gave a fruit has left.
+        if thinned_from:
+            least = min(len(kept[name]) for name, fruits in left.items() if len(kept[name]) < len(fruits))
+            assert max(map(len, kept.values())) <= least + 1
+        for name, fruits in left.items():
+            sizes = sorted(float(one["diameter_mm"]) for one in fruits)
+            expected = sizes[len(fruits) - len(kept[name]) :]
+            assert sorted(float(one["diameter_mm"]) for one in kept[name]) == expected
+
+
+def test_without_a_target_none_is_thinned(pomona: Pomona, row: GrownRow) -> None:
+    code, printed, _ = pomona("thinning", row.path)
+    assert code == 0
+    assert [line.split()[4] for line in printed.splitlines()[2:]] == ["0", "0"]
+    assert pomona("thinning", row.path, "--target", "-3")[0] == 2
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+def test_as_many_drop_as_are_slow(share: float) -> None:
+    rng = np.random.default_rng(4)
+    slow = rng.random(400) < share
+    rates = np.where(slow, 0.2, rng.normal(0.9, 0.1, 400)) + rng.normal(0.0, 0.1, 400)
+    found = drop_of(rates, 0.1)
+    assert found.fast_mm_per_day == pytest.approx(0.9 + 1.28 * 0.1, abs=0.06)
+    assert np.mean((found.probabilities > 0.5) == slow) > 0.97
+    assert found.share == pytest.approx(share, abs=0.03)
+
+
+def test_what_was_not_measured_has_no_probability() -> None:
+    found = drop_of(np.array([0.9, np.nan, 0.8, 0.95, 0.1]), 0.05)
+    assert np.isnan(found.probabilities).tolist() == [False, True, False, False, False]
+    assert found.probabilities[4] > 0.9
+
+
+def test_clusters_are_chains_of_neighbours() -> None:
+    places = np.array([[0, 0, 0], [2.0, 0, 0], [0.08, 0, 0], [0.16, 0, 0], [2.0, 0.11, 0]])
+    assert clusters_of(places).tolist() == [0, 1, 0, 0, 2]
+    assert clusters_of(np.empty((0, 3))).tolist() == []
