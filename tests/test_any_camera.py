@@ -24,6 +24,11 @@ def scanned(date: Date, name: str, folder: Path) -> tuple[Scanned, dict[str, obj
     return found, date_row(date, found)
 
 
+def test_nothing_is_said_of_a_clean_row(date: Date, tmp_path: Path) -> None:
+    _, row = scanned(date, "clean", tmp_path)
+    assert row["told"] == 0
+
+
 def test_fruits_that_pass_by_in_half_the_frames_are_counted(date: Date, tmp_path: Path) -> None:
     found, row = scanned(date, "every 2nd frame", tmp_path)
     assert row["parts"] == 1
@@ -46,6 +51,12 @@ def test_boxes_that_are_missing_lose_few_fruits(date: Date, tmp_path: Path) -> N
 @pytest.mark.parametrize("name", ["one step x 0.6", "one eye x 0.4"])
 def test_exposure_changes_no_count(date: Date, tmp_path: Path, name: str) -> None:
     _, row = scanned(date, name, tmp_path)
+    assert (row["parts"], row["false"]) == (1, 0)
+    assert abs(float(str(row["count_error"]))) < 0.05
+
+
+def test_bands_that_roll_down_the_picture_change_no_count(shared_data: Path, tmp_path: Path) -> None:
+    _, row = scanned(Date(shared_data / "rendered_row" / DATES[1]), "bands of +-25 % that roll down", tmp_path)
     assert (row["parts"], row["false"]) == (1, 0)
     assert abs(float(str(row["count_error"]))) < 0.05
 
