@@ -163,3 +163,16 @@ def test_real_pairs_are_of_one_time(shared_data: Path, name: str) -> None:
     found = alignment_of(open_recording(shared_data / name))
     assert found is not None
     assert found.frames_late == 0
+
+
+def test_tall_pictures_are_measured_in_a_halving(tmp_path: Path) -> None:
+    row = recording(tmp_path / "row", 1.0).path
+    for file in row.glob("*/*.png"):
+        cv2.imwrite(str(file), cv2.resize(cv2.imread(str(file)), None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC))
+    numbers = json.loads((row / "calibration.json").read_text())
+    larger = {name: 3 * numbers[name] for name in ("width", "height", "fx", "fy", "cx", "cy")}
+    (row / "calibration.json").write_text(json.dumps(numbers | larger))
+    found = alignment_of(open_recording(row))
+    assert found is not None
+    assert found.lower_px == pytest.approx(3.0, abs=0.3)
+    assert np.degrees(found.turned_rad) == pytest.approx(0.0, abs=0.05)

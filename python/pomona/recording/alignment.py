@@ -49,7 +49,7 @@ BEYOND = 1.25
 AGREEING_PX, AGREEING_SHARE = 1.5, 1 / 3
 """Of corners that are sought everywhere, those of a pair that is one; of pictures of different places 1 in 10 agree."""
 
-AT_ONCE_PX, SURE_SHARE, SURE = 0.5, 0.6, 40
+AT_ONCE_WIDTHS, SURE_SHARE, SURE = 1 / 1280, 0.6, 40
 """Of corners that are sought in their rows: how near they agree where both were taken at once, as which part
 of them and how many, so that nothing else is asked."""
 
@@ -130,7 +130,7 @@ def alignment_of(recording: Recording) -> Alignment | None:
     found = _corners(recording, rows, row_errors)
     if found is None:
         return None
-    agreeing = partial(_agreeing, centre_px=centre_px, within_px=AT_ONCE_PX)
+    agreeing = partial(_agreeing, centre_px=centre_px, within_px=AT_ONCE_WIDTHS * recording.calibration.width)
     n_agreeing = agreeing(found)
     if n_agreeing >= max(SURE, SURE_SHARE * len(found)):
         return _fitted(found, centre_px)

@@ -11,6 +11,9 @@ from pomona import _core
 
 __all__ = ["row_errors"]
 
+TALLEST_PX = 540
+"""Corners of taller pictures are sought in a halving: it shows the same, in patches that tell more apart."""
+
 CORNERS, PATCH_PX, MIN_DISTANCE_PX = 250, 15, 8
 
 LEAST_CORRELATION = 0.85
@@ -25,6 +28,8 @@ def row_errors(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.
     import cv2
 
     greys = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) if one.ndim == 3 else one for one in (left, right)]
+    if len(left) > TALLEST_PX:
+        return 2.0 * row_errors(*(np.asarray(cv2.pyrDown(one), np.uint8) for one in greys))
     height, width = greys[0].shape
     half, reach = PATCH_PX // 2, _core.row_reach_px(width)
     corners = cv2.goodFeaturesToTrack(greys[0], CORNERS, 0.01, MIN_DISTANCE_PX)
