@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.disturbed import CASES, Date, Scanned, date_row
-from benchmarks.recordings import DATES
+from benchmarks.disturbed_boxes import write_recording
+from benchmarks.recordings import DATES, TrueBox, detector
+
+from pomona.errors import PomonaWarning
+from pomona.recording import open_recording
+from pomona.survey import scan
 
 CASE = {case.name: case for case in CASES}
 
@@ -27,6 +34,42 @@ def scanned(date: Date, name: str, folder: Path) -> tuple[Scanned, dict[str, obj
 def test_nothing_is_said_of_a_clean_row(date: Date, tmp_path: Path) -> None:
     _, row = scanned(date, "clean", tmp_path)
     assert row["told"] == 0
+
+
+def late(box: TrueBox) -> list[TrueBox]:
+    return [replace(box, frame=box.frame + 1)]
+
+
+def halved(box: TrueBox) -> list[TrueBox]:
+    xmin, ymin, xmax, ymax = box.box_px
+    middle = (ymin + ymax) / 2
+    return [replace(box, box_px=(xmin, ymin, xmax, middle)), replace(box, box_px=(xmin, middle, xmax, ymax))]
+
+
+def longer(box: TrueBox) -> list[TrueBox]:
+    xmin, ymin, xmax, ymax = box.box_px
+    return [replace(box, box_px=(xmin, ymin, xmax, min(ymax + 0.8 * (ymax - ymin), 359.0)))]
+
+
+@pytest.mark.parametrize(
+    ("change", "share", "words"),
+    [
+        (late, 1, "the boxes fit the pictures a frame before theirs"),
+        (halved, 4, "boxes make one square with the box beside them"),
+        (longer, 5, "boxes of fruits are long as two of them"),
+    ],
+)
+def test_boxes_that_cannot_be_right_are_told(
+    date: Date, tmp_path: Path, change: Callable[[TrueBox], list[TrueBox]], share: int, words: str
+) -> None:
+    fruits = sorted({box.fruit for box in date.boxes})[::share]
+    boxes = [one for box in date.boxes for one in (change(box) if box.fruit in fruits else [box])]
+    write_recording(date.source, tmp_path / "row", range(12), [box for box in boxes if box.frame < 12], None)
+    recording = open_recording(tmp_path / "row")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", PomonaWarning)
+        scan(recording, detector(tmp_path / "row", recording), odometry=True)
+    assert words in " ".join(str(one.message) for one in told)
 
 
 def test_fruits_that_pass_by_in_half_the_frames_are_counted(date: Date, tmp_path: Path) -> None:
