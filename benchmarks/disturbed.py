@@ -28,6 +28,7 @@ from benchmarks.disturbed_boxes import (
     misaligned,
     one_eye,
     rendered,
+    rolling,
     stepped,
     write_recording,
 )
@@ -83,6 +84,7 @@ CASES = (
          boxes=Boxed(missing=0.2, jitter_px=1.5, false=0.1, lasting=6), seeds=True),
     Case("exposure +-0.5 stop", change=lambda seed: flickering(0.5, seed), seeds=True),
     Case("exposure +-1 stop", change=lambda seed: flickering(1.0, seed), seeds=True),
+    Case("bands of +-25 % that roll down", change=lambda _: rolling(0.25)),
     Case("one step x 0.6", change=lambda _: stepped(0.6, 20)),
     Case("one eye x 0.7", change=lambda _: one_eye(0.7)),
     Case("one eye x 0.4", change=lambda _: one_eye(0.4)),

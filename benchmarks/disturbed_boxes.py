@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from benchmarks.recordings import TrueBox, in_camera
 from pomona.recording import Recording, open_recording
 
+BANDS, BANDS_A_FRAME = 2.0, 0.37
+"""Of a lamp at 100 Hz under a shutter that rolls for 20 ms, 27 times a second."""
+
 Boxes = list[TrueBox]
 """A box whose fruit is "" shows none."""
 
@@ -127,6 +130,17 @@ def flickering(stops: float, seed: int) -> Change:
     """Every frame is exposed by up to so many stops more or less."""
     by_frame = np.random.default_rng(seed).uniform(-stops, stops, 10_000)
     return lambda picture, _, row: _exposed(picture, 2.0 ** by_frame[row])
+
+
+def rolling(share: float) -> Change:
+    """Bands roll down the picture, brighter and darker by such a share; both eyes see them."""
+
+    def change(picture: NDArray[np.uint8], _: str, row: int) -> NDArray[np.uint8]:
+        down = np.arange(len(picture)) / len(picture)
+        light = 1.0 + share * np.sin(2.0 * np.pi * (BANDS * down + BANDS_A_FRAME * row))
+        return np.clip(np.rint(picture * light[:, None, None]), 0, 255).astype(np.uint8)
+
+    return change
 
 
 def stepped(factor: float, at_row: int) -> Change:

@@ -1,4 +1,4 @@
-"""Real bags, written by rosbags and mcap: a stereo or RGB-D camera that sees known noise."""
+"""Real bags, written by rosbags and mcap: a stereo or RGB-D camera that sees known noise; and how they are refused."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
+
+from pomona import PomonaError
+from pomona.recording import open_recording
 
 SIZE = (64, 48)
 START_NS = 1_723_190_400 * 10**9  # 2024-08-09T08:00:00 UTC
@@ -215,3 +219,26 @@ def _write_mcap(path: Path, entries: list[Entry], *, compression: str, chunk_siz
             writer.add_message(channels[topic], logged_ns, body, logged_ns)
         writer.finish()
     return path
+
+
+def rgbd(depths, *, colour=None, depth_topic="/camera/aligned_depth_to_color/image_raw", encoding="16UC1"):
+    """Frames of /camera/color and of depth in its picture."""
+    entries = []
+    for row, depth in enumerate(depths):
+        at = START_NS + row * STEP_NS
+        entries += [
+            info("/camera/color/camera_info", at),
+            image("/camera/color/image_raw", at, picture(row) if colour is None else colour, "rgb8"),
+            info(depth_topic.rpartition("/")[0] + "/camera_info", at),
+            image(depth_topic, at + 1000, depth, encoding),
+        ]
+    return entries
+
+
+def refused(path, *parts, **options):
+    """Expect one line that holds these parts."""
+    with pytest.raises(PomonaError) as caught:
+        open_recording(path, **options)
+    assert "\n" not in str(caught.value)
+    for part in parts:
+        assert part in str(caught.value)

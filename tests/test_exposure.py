@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.disturbed_boxes import rolling
 from tests.drive_scene import CALIBRATION, drive, sideways
 
 from depth_scene import box_of
@@ -39,6 +40,18 @@ def test_a_camera_that_changes_its_exposure_is_followed(stops: float) -> None:
         assert motion.part == 0, motion.broken
         assert motion.session_from_camera is not None, motion.lost
         assert np.linalg.norm(motion.session_from_camera[:3, 3] - scene.poses[row][:3, 3]) < 0.02
+
+
+def test_a_camera_under_lamps_that_flicker_is_followed() -> None:
+    scene, flicker = drive(sideways(8)), rolling(0.4)
+    odometry = StereoOdometry(CALIBRATION)
+    for row in range(8):
+        pictures = (flicker(one[..., None], "", row)[..., 0] for one in scene.pictures(row)[:2])
+        motion = odometry(*pictures)
+        assert motion.part == 0, motion.broken
+        assert motion.inliers > 60 or row == 0
+        assert motion.session_from_camera is not None, motion.lost
+        assert np.linalg.norm(motion.session_from_camera[:3, 3] - scene.poses[row][:3, 3]) < 0.01
 
 
 @pytest.mark.parametrize("factor", [0.7, 0.4])

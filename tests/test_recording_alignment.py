@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import cv2
@@ -19,12 +20,14 @@ HALVES = (slice(CALIBRATION.width // 2), slice(CALIBRATION.width // 2, None))
 """Columns; in an upright pair of two depths."""
 
 
-def recording(folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0) -> Recording:
-    """Three pairs whose right pictures are lower, turned clockwise, and larger."""
-    scene, change = drive(sideways(3)), misaligned(lower_px, -turned_deg)
+def recording(
+    folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0, frames: int = 3
+) -> Recording:
+    """Pairs whose right pictures are lower, turned clockwise, and larger."""
+    scene, change = drive(sideways(frames)), misaligned(lower_px, -turned_deg)
     for side in ("left", "right"):
         (folder / side).mkdir(parents=True)
-    for row in range(3):
+    for row in range(frames):
         left, right, _ = scene.pictures(row)
         cv2.imwrite(str(folder / "left" / f"{row:04d}.png"), left)
         larger = cv2.getRotationMatrix2D((CALIBRATION.cx - 0.5, CALIBRATION.cy - 0.5), 0.0, size)
@@ -133,3 +136,43 @@ def test_info_tells(pomona, tmp_path: Path) -> None:
     code, printed, _ = pomona("info", tmp_path / "knocked", "--check")
     assert code == 0
     assert "turned by 0.1" in next(line for line in printed.splitlines() if line.startswith("misaligned"))
+
+
+def late(source: Path, folder: Path, frames: int) -> Recording:
+    """The recording with right pictures that are so many frames late."""
+    shutil.copytree(source, folder, symlinks=True)
+    rights = sorted((source / "right").iterdir())
+    for row, file in enumerate(sorted((folder / "right").iterdir())):
+        file.unlink()
+        shutil.copy(rights[min(max(row - frames, 0), len(rights) - 1)], file)
+    return open_recording(folder)
+
+
+@pytest.mark.parametrize(("frames", "when"), [(1, "late"), (-1, "early")])
+def test_right_pictures_of_other_frames_are_told(pomona, tmp_path: Path, frames: int, when: str) -> None:
+    row = late(recording(tmp_path / "row", frames=8).path, tmp_path / when, frames)
+    with pytest.warns(PomonaWarning, match=f"the right pictures are a frame {when}, .*: pair the pictures"):
+        assert straightened(row) is row
+    code, printed, _ = pomona("info", row.path, "--check")
+    assert code == 1
+    assert f"a frame {when}" in printed
+
+
+@pytest.mark.parametrize("name", ["rendered_row/2024-08-09", "rendered_row/2024-08-28", "kitti_stereo"])
+def test_real_pairs_are_of_one_time(shared_data: Path, name: str) -> None:
+    found = alignment_of(open_recording(shared_data / name))
+    assert found is not None
+    assert found.frames_late == 0
+
+
+def test_tall_pictures_are_measured_in_a_halving(tmp_path: Path) -> None:
+    row = recording(tmp_path / "row", 1.0).path
+    for file in row.glob("*/*.png"):
+        cv2.imwrite(str(file), cv2.resize(cv2.imread(str(file)), None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC))
+    numbers = json.loads((row / "calibration.json").read_text())
+    larger = {name: 3 * numbers[name] for name in ("width", "height", "fx", "fy", "cx", "cy")}
+    (row / "calibration.json").write_text(json.dumps(numbers | larger))
+    found = alignment_of(open_recording(row))
+    assert found is not None
+    assert found.lower_px == pytest.approx(3.0, abs=0.3)
+    assert np.degrees(found.turned_rad) == pytest.approx(0.0, abs=0.05)

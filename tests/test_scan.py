@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -178,13 +179,14 @@ def test_an_unknown_date_is_said(pomona, tmp_path):
     assert "--date" in done.stderr
 
 
-def test_a_wrong_depth_unit_is_said(pomona, tmp_path):
+@pytest.mark.parametrize(("unit_m", "diameter"), [(0.01, r"7\d\d mm"), (0.0001, r"7\.\d+ mm")])
+def test_a_wrong_depth_unit_is_said(pomona, tmp_path, unit_m, diameter):
     folder = make_recording(tmp_path / "2024-08-09")
-    (folder / "calibration.json").write_text(json.dumps({**FIELDS, "depth_unit_m": 0.01}))
+    (folder / "calibration.json").write_text(json.dumps({**FIELDS, "depth_unit_m": unit_m}))
     done = pomona("scan", folder, "-o", tmp_path / "fruits.csv")
     assert done.returncode == 0
-    assert "the median diameter is 7" in done.stderr
-    assert "depth_unit_m" in done.stderr
+    said = rf"the median diameter is {diameter}, expected 10 to \d+ mm: check depth_unit_m {unit_m:g}"
+    assert re.search(said, done.stderr)
 
 
 def test_frames_without_poses_and_colour_are_refused(pomona, tmp_path):

@@ -3,7 +3,8 @@
 A rectified pair shows a point in the same row of both pictures. Where one camera was knocked since it was calibrated,
 the right picture lies lower and is turned: corners that are found in both pictures tell, whatever their depth. The core
 fits and decides (`stereo/alignment.rs`); small errors are taken out of the right picture. What is farther off than
-corners are sought in their rows, corners that are sought everywhere tell.
+corners are sought in their rows, corners that are sought everywhere tell. Where few corners agree on
+anything, the pictures may be of different moments (`late_eye.py`).
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from pomona import _core
 from pomona.errors import PomonaWarning
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
+from pomona.recording.late_eye import frames_late
 from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
+from pomona.recording.row_corners import row_errors
 from pomona.trajectory import Trajectory
 
 __all__ = ["Alignment", "StraightenedRecording", "alignment_of", "straightened"]
@@ -33,14 +36,6 @@ Picture = NDArray[np.uint8]
 
 LOOKED_AT = 6
 """Frames, evenly over the recording, that are measured."""
-
-CORNERS, PATCH_PX, MIN_DISTANCE_PX = 250, 15, 8
-
-LEAST_CORRELATION = 0.85
-"""Of a patch with its like in the other picture; below, leaves are found everywhere among leaves."""
-
-LARGEST_SHARE = 0.25
-"""Of the width of the picture, as disparity."""
 
 STRETCH_TOLD, MOST_STRETCH = 0.003, 0.02
 """By which the right picture is larger: told from, and taken out up to; good pairs are measured below 0.001."""
@@ -53,6 +48,10 @@ BEYOND = 1.25
 
 AGREEING_PX, AGREEING_SHARE = 1.5, 1 / 3
 """Of corners that are sought everywhere, those of a pair that is one; of pictures of different places 1 in 10 agree."""
+
+AT_ONCE_WIDTHS, SURE_SHARE, SURE = 1 / 1280, 0.6, 40
+"""Of corners that are sought in their rows: how near they agree where both were taken at once, as which part
+of them and how many, so that nothing else is asked."""
 
 ON_SIDE = 1.5
 """Times as many corners that keep their column as corners that keep their row."""
@@ -76,6 +75,8 @@ class Alignment:
         Whether it is small enough to be taken out.
     is_on_side : bool
         Whether the pair lies on its side: corners keep their column, not their row.
+    frames_late : int
+        By how many frames the right pictures are late; below 0, early.
     """
 
     lower_px: float
@@ -84,10 +85,14 @@ class Alignment:
     is_off: bool
     is_correctable: bool
     is_on_side: bool = False
+    frames_late: int = 0
 
     def __str__(self) -> str:
         if self.is_on_side:
             return "corners keep their column in the right picture and not their row, the pair is turned on its side"
+        if self.frames_late:
+            when, moved = ("late", "up") if self.frames_late > 0 else ("early", "down")
+            return f"the right pictures are a frame {when}, corners agree when they are moved {moved} by one"
         turned = f"{self.lower_px:.1f} px lower and turned by {np.degrees(self.turned_rad):.2f} degrees"
         size = "larger" if self.stretch > 0 else "smaller"
         larger = f" and {abs(self.stretch):.1%} {size}" if abs(self.stretch) >= STRETCH_TOLD else ""
@@ -98,6 +103,8 @@ class Alignment:
         """What to do where it is not taken out."""
         if self.is_on_side:
             return "give the pictures as the cameras took them, side by side"
+        if self.frames_late:
+            return "pair the pictures that were taken at once; all lengths are wrong else"
         most_px, most_rad = _core.MOST_MISALIGNED
         most = f"{most_px:g} px, {np.degrees(most_rad):.2f} degrees and {MOST_STRETCH:.0%}"
         return f"more than the {most} that are taken out, calibrate the cameras again"
@@ -117,20 +124,33 @@ def straightened(recording: Recording) -> Recording:
 
 def alignment_of(recording: Recording) -> Alignment | None:
     """Measure how right pictures lie to left ones; None where too little shows in both, or one is not there."""
-    found, anywhere = np.zeros((0, 3)), np.zeros((0, 4))
     middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
-    looked_at = {recording.numbers[min(row, len(recording) - 1)] for row in middles.tolist()}
-    for frame in recording.frames(looked_at):
+    rows = list(dict.fromkeys(min(row, len(recording) - 1) for row in middles.tolist()))
+    centre_px = (recording.calibration.cx, recording.calibration.cy)
+    found = _corners(recording, rows, row_errors)
+    if found is None:
+        return None
+    agreeing = partial(_agreeing, centre_px=centre_px, within_px=AT_ONCE_WIDTHS * recording.calibration.width)
+    n_agreeing = agreeing(found)
+    if n_agreeing >= max(SURE, SURE_SHARE * len(found)):
+        return _fitted(found, centre_px)
+    if late := frames_late(recording, rows, n_agreeing, agreeing):
+        return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, frames_late=late)
+    anywhere = _corners(recording, rows, far_corners)
+    return (None if anywhere is None else _beyond(anywhere, centre_px)) or _fitted(found, centre_px)
+
+
+def _corners(recording: Recording, rows: list[int], find: Callable[[Picture, Picture], Array]) -> Array | None:
+    """Give the corners that are found in the pairs of some frames; None where a frame is no pair."""
+    found = []
+    for frame in recording.frames({recording.numbers[row] for row in rows}):
         if frame.read_left is None or frame.read_right is None:
             return None
         try:
-            left, right = frame.read_left(), frame.read_right()
+            found.append(find(frame.read_left(), frame.read_right()))
         except UnreadablePictureError:
             continue
-        found = np.concatenate([found, row_errors(left, right)])
-        anywhere = np.concatenate([anywhere, far_corners(left, right)])
-    centre_px = (recording.calibration.cx, recording.calibration.cy)
-    return _beyond(anywhere, centre_px) or _fitted(found, centre_px)
+    return np.concatenate(found) if found else None
 
 
 def _fitted(corners: Array, centre_px: tuple[float, float]) -> Alignment | None:
@@ -160,42 +180,13 @@ def _beyond(places: Array, centre_px: tuple[float, float]) -> Alignment | None:
     return found if (off > BEYOND * np.array(most)).any() else None
 
 
-def _agreeing(corners: Array, centre_px: tuple[float, float]) -> int:
+def _agreeing(corners: Array, centre_px: tuple[float, float], within_px: float = AGREEING_PX) -> int:
     fit = _fitted(corners, centre_px)
     if fit is None:
         return 0
     x, y = corners[:, 0] - centre_px[0], corners[:, 1] - centre_px[1]
     left_over = corners[:, 2] - fit.lower_px - fit.turned_rad * x - fit.stretch * y
-    return int((np.abs(left_over) < AGREEING_PX).sum())
-
-
-def row_errors(left: Picture, right: Picture) -> Array:
-    """Find corners of the left picture in the right one: column there, row here and difference of the rows, (N, 3)."""
-    import cv2
-
-    greys = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) if one.ndim == 3 else one for one in (left, right)]
-    height, width = greys[0].shape
-    half, reach = PATCH_PX // 2, _core.row_reach_px(width)
-    corners = cv2.goodFeaturesToTrack(greys[0], CORNERS, 0.01, MIN_DISTANCE_PX)
-    farthest = int(LARGEST_SHARE * width)
-    found = []
-    for x, y in () if corners is None else corners[:, 0].astype(int):
-        low = max(x - half - farthest, 0)
-        if not (half <= x < width - half and half + reach <= y < height - half - reach):
-            continue
-        patch = greys[0][y - half : y + half + 1, x - half : x + half + 1]
-        strip = greys[1][y - half - reach : y + half + reach + 1, low : x + half + 1]
-        similar = cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED)
-        row, column = np.unravel_index(int(similar.argmax()), similar.shape)
-        if similar[row, column] >= LEAST_CORRELATION and 0 < row < 2 * reach:
-            found.append((low + half + column, y, row - reach + _vertex(similar[row - 1 : row + 2, column])))
-    return np.array(found, np.float64).reshape(-1, 3)
-
-
-def _vertex(three: NDArray[Any]) -> float:
-    before, peak, after = map(float, three)
-    bend = before - 2 * peak + after
-    return 0.5 * (before - after) / bend if bend < 0 else 0.0
+    return int((np.abs(left_over) < within_px).sum())
 
 
 @dataclass(frozen=True, eq=False)

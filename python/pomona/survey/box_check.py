@@ -1,44 +1,107 @@
-"""What boxes and sizes of a scan say of the detector and of units, where they cannot be right."""
+"""What boxes of a scan say of the detector, where they cannot be right: on each other, of halves, of two fruits."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaWarning
-from pomona.survey.part import Boxes
+from pomona.recording import Calibration
+from pomona.survey.part import Boxes, Part
 
-__all__ = ["check_boxes"]
+__all__ = ["check_boxes", "check_long_boxes"]
+
+Array = NDArray[np.float64]
 
 SAME_BOX = 0.8
 """Area that two boxes share over the area of both together; two fruits of a cluster share half of theirs at most."""
 
 MANY = 0.1
-"""Of all boxes; a detector that suppresses such pairs has none."""
+"""Of all boxes; a detector that suppresses such pairs has none, and of halves one in a hundred is by chance."""
+
+AS_WIDE, GAP, OVERLAP, SQUARE = 0.75, 0.25, 0.15, 1.3
+"""Halves of a fruit: their common side over that of both, what lies between or is shared over the other side of both,
+and how long both together are over how wide."""
+
+LONG, LONGER = 1.5, 1.2
+"""Times the median diameter, and times its own width, that a box is long which holds two fruits."""
+
+MANY_LONG = 0.02
+"""Of the boxes of fruits. On the rendered rows 0.1 to 0.4 % are as long; where fruits that touch share a box, 5 %."""
+
+SEVERAL = 40
+"""Boxes below which no share of them is told."""
 
 
 def check_boxes(path: Path, parts: Sequence[Boxes]) -> None:
-    """Warn where many boxes of one frame lie on another one: each fruit may count twice."""
+    """Warn where many boxes of one frame lie on another one, or are halves: each fruit may count twice."""
     n_boxes = sum(len(boxes.frames) for boxes in parts)
-    n_twins = sum(_n_twins(boxes.boxes_px[boxes.frames == frame]) for boxes in parts for frame in set(boxes.frames))
+    of_frames = [boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in dict.fromkeys(boxes.frames)]
+    n_twins = _count(_is_twin, of_frames)
     if n_twins > MANY * n_boxes:
         found = (
             f"{n_twins} of {n_boxes} boxes share {SAME_BOX:.0%} or more of their area with another one of their frame"
         )
         advice = "suppress such pairs, with the model's --iou or in the program that wrote them"
         warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+    n_halves = _count(_is_half, of_frames)
+    if n_boxes >= SEVERAL and n_halves > MANY * n_boxes:
+        found = f"{n_halves} of {n_boxes} boxes make one square with the box beside them, as halves of a fruit do"
+        warnings.warn(f"{path}: {found}: join the boxes of one fruit", PomonaWarning, stacklevel=3)
 
 
-def _n_twins(boxes_px: NDArray[np.float64]) -> int:
-    """Count boxes, (D, 4), that lie on another one."""
-    low = np.maximum(boxes_px[:, None, :2], boxes_px[None, :, :2])
-    high = np.minimum(boxes_px[:, None, 2:], boxes_px[None, :, 2:])
-    common = np.clip(high - low, 0, None).prod(axis=2)
-    areas = (boxes_px[:, 2:] - boxes_px[:, :2]).prod(axis=1)
-    overlap = common / (areas[:, None] + areas - common)
-    np.fill_diagonal(overlap, 0.0)
-    return int((overlap >= SAME_BOX).any(axis=1).sum())
+def check_long_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]) -> None:
+    """Warn where many boxes are as long as two fruits of the row: fruits that touch count once."""
+    longs = np.concatenate([np.zeros(0, bool), *(_is_long(part, calibration) for part in parts)])
+    if len(longs) >= SEVERAL and longs.sum() > MANY_LONG * len(longs):
+        found = f"{longs.sum()} of {len(longs)} boxes of fruits are long as two of them and not as wide"
+        advice = "give each fruit its box, with a higher --iou of the model or in the program that wrote them"
+        warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+
+
+def _count(is_so: Callable[[Array, Array], NDArray[np.bool_]], of_frames: Sequence[Array]) -> int:
+    """Count boxes that are so with another one of their frame; corners of both, (D, 1, 4) and (1, D, 4)."""
+    count = 0
+    for boxes_px in of_frames:
+        pairs = is_so(boxes_px[:, None], boxes_px[None])
+        np.fill_diagonal(pairs, False)
+        count += int(pairs.any(axis=1).sum())
+    return count
+
+
+def _common(one: Array, other: Array) -> Array:
+    """Width and height that two boxes share, below 0 how far they lie apart."""
+    return np.asarray(np.minimum(one[..., 2:], other[..., 2:]) - np.maximum(one[..., :2], other[..., :2]))
+
+
+def _is_twin(one: Array, other: Array) -> NDArray[np.bool_]:
+    common = np.clip(_common(one, other), 0, None).prod(axis=-1)
+    areas = [(box[..., 2:] - box[..., :2]).prod(axis=-1) for box in (one, other)]
+    return np.asarray(common >= SAME_BOX * (areas[0] + areas[1] - common))
+
+
+def _is_half(one: Array, other: Array) -> NDArray[np.bool_]:
+    both = np.maximum(one[..., 2:], other[..., 2:]) - np.minimum(one[..., :2], other[..., :2])
+    share = _common(one, other) / both
+    square = both.max(axis=-1) <= SQUARE * both.min(axis=-1)
+    beside = (share >= AS_WIDE) & (share[..., ::-1] >= -GAP) & (share[..., ::-1] <= OVERLAP)
+    return np.asarray(square & beside.any(axis=-1))
+
+
+def _is_long(part: Part, calibration: Calibration) -> NDArray[np.bool_]:
+    """Whether each box of a fruit is as long as two, (B,)."""
+    boxes, diameters_m = part.boxes, part.cloud.diameters_m
+    rows = np.flatnonzero(boxes.fruits >= 0)
+    if diameters_m is None or not len(rows):
+        return np.zeros(0, bool)
+    row_of = {int(frame): row for row, frame in enumerate(part.trajectory.frames)}
+    poses = part.trajectory.session_from_camera[[row_of[int(frame)] for frame in boxes.frames[rows]]]
+    ahead_m = np.einsum("bi,bi->b", part.cloud.positions[boxes.fruits[rows]] - poses[:, :3, 3], poses[:, :3, 2])
+    sides_px = boxes.boxes_px[rows, 2:] - boxes.boxes_px[rows, :2]
+    sides_m = sides_px * ahead_m[:, None] / (calibration.fx, calibration.fy)
+    longer_m, shorter_m = sides_m.max(axis=1), sides_m.min(axis=1)
+    return np.asarray((longer_m > LONG * np.nanmedian(diameters_m)) & (longer_m > LONGER * shorter_m))

@@ -14,7 +14,7 @@ from pomona.survey.believing import Believing
 from pomona.survey.pose_source import PoseSource
 from pomona.survey.registration import Fruits
 from pomona.survey.seeing import Look
-from pomona.survey.sightings import Sightings, fruits_of
+from pomona.survey.sightings import Sightings, fruits_of, places_of
 from pomona.survey.tally import Tally, TrackFate, often_enough, track_fates
 from pomona.survey.tracking import Tracker, Tracks
 from pomona.trajectory import Trajectory
@@ -150,12 +150,10 @@ class OpenPart:
 
     def fruits_seen_in(self, frames: slice, poses: NDArray[np.float64]) -> Fruits:
         """Give the places of what some of its frames saw, believed to be a fruit or not; all frames say where."""
-        cloud, _ = self._fused(Sightings.of(self._looks), self._owners(), poses)
-        if cloud.views is None or cloud.covariances is None:
-            return Fruits(np.empty((0, 3)), np.empty((0, 3, 3)))
-        seen = np.isin(cloud.views.frames, [look.frame for look in self._looks[frames]])
-        rows = np.unique(cloud.views.fruits[seen])
-        return Fruits(cloud.positions[rows], cloud.covariances[rows])
+        measured = _Measured.of(Sightings.of(self._looks), self._owners())
+        positions, covariances = places_of(measured.sightings, measured.fruits, poses)
+        rows = np.unique(measured.fruits[np.isin(measured.sightings.rows, np.arange(len(self._looks))[frames])])
+        return Fruits(positions[rows], covariances[rows])
 
     def continued(self, poses: NDArray[np.float64], other: OpenPart, other_poses: NDArray[np.float64]) -> OpenPart:
         """Give this part with the later frames of another one, whose poses are in the same frame of reference."""
@@ -174,13 +172,16 @@ class OpenPart:
         probability = frames_in_view = None
         if tracks is not None:
             # Fragments of one fruit that drift kept apart come together once poses and places are refined.
-            measured, row_of = self._fused(sightings, owners, poses)
-            tracks = _joined(tracks, measured, row_of)
+            tracks = _joined(tracks, _Measured.of(sightings, owners), poses)
             joined = self._tracked(tracks)
             belief = self._believing(tracks, self._looks, poses)
             rows, frames_in_view = np.flatnonzero(belief.is_believed), belief.frames_in_view
             owners, probability = self._tracked(tracks.select(rows)), belief.probability[rows]
-        cloud, row_of = self._fused(sightings, owners, poses)
+        measured = _Measured.of(sightings, owners)
+        cloud, row_of = (
+            fruits_of(measured.sightings, measured.fruits, self._looks, poses, measured.names),
+            measured.row_of,
+        )
         if probability is not None:
             of_cloud = np.argsort(row_of[:-1])[len(row_of) - 1 - len(cloud) :]
             cloud = _with_probability(cloud, probability[of_cloud])
@@ -195,15 +196,6 @@ class OpenPart:
 
     def _owners(self) -> _Owners:
         return self._named() if self._tracker is None else self._tracked(self._tracker.finish(min_views=1))
-
-    def _fused(
-        self, sightings: Sightings, owners: _Owners, poses: NDArray[np.float64]
-    ) -> tuple[FruitCloud, NDArray[np.int64]]:
-        """Give the fruits that have a place in 3D, in the order of their first sightings, and the row of each or -1."""
-        fruits = owners.of(sightings)
-        row_of, named = _measured(fruits, owners.names)
-        rows = np.flatnonzero(fruits >= 0)
-        return fruits_of(sightings.select(rows), row_of[fruits[rows]], self._looks, poses, named), row_of
 
     def _named(self) -> _Owners:
         """Take the names that the boxes carry; without any, of a single frame, each box is a fruit."""
@@ -253,38 +245,45 @@ def _with_probability(cloud: FruitCloud, probability: NDArray[np.float64]) -> Fr
     return replace(cloud, extras={**cloud.extras, "probability": tuple(f"{one:.4f}" for one in probability)})
 
 
-def _joined(tracks: Tracks, measured: FruitCloud, row_of: NDArray[np.int64]) -> Tracks:
-    """Join the tracks that are one fruit by the places that fusion found; the rest stay where the tracker had them."""
-    known = np.flatnonzero(row_of[:-1] >= 0)
-    centres, covariances = tracks.centres.copy(), tracks.covariances.copy()
-    centres[known] = measured.positions[row_of[known]]
-    if measured.covariances is not None:
-        covariances[known] = measured.covariances[row_of[known]]
-    return tracks.at(centres, covariances).joined()
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """The fruits that have sightings, in the order in which they were first seen.
 
-
-def _measured(fruits: NDArray[np.int64], names: Sequence[str]) -> tuple[NDArray[np.int64], list[str]]:
-    """Count off the fruits that have sightings, in the order in which they were first seen.
-
-    Parameters
+    Attributes
     ----------
+    sightings : Sightings
+        S of them, each of a fruit.
     fruits : (S,) int64
-        Fruit of each sighting, -1 for none.
-    names : sequence of N str
-        Names of the fruits.
-
-    Returns
-    -------
-    row_of : (N + 1,) int64
-        New row of each old one, -1 of a fruit never measured; the last is for boxes of no fruit.
+        Row in `names` of each.
     names : list of str
-        Names in the new order.
+        Of the fruits.
+    row_of : (N + 1,) int64
+        New row of each owner, -1 of one never measured; the last is for boxes of no fruit.
     """
-    found, first = np.unique(fruits[fruits >= 0], return_index=True)
-    found = found[np.argsort(first, kind="stable")]
-    row_of = np.full(len(names) + 1, -1, np.int64)
-    row_of[found] = np.arange(len(found))
-    return row_of, [names[row] for row in found]
+
+    sightings: Sightings
+    fruits: NDArray[np.int64]
+    names: list[str]
+    row_of: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, sightings: Sightings, owners: _Owners) -> _Measured:
+        fruits = owners.of(sightings)
+        rows = np.flatnonzero(fruits >= 0)
+        found, first = np.unique(fruits[rows], return_index=True)
+        found = found[np.argsort(first, kind="stable")]
+        row_of = np.full(len(owners.names) + 1, -1, np.int64)
+        row_of[found] = np.arange(len(found))
+        return cls(sightings.select(rows), row_of[fruits[rows]], [owners.names[row] for row in found], row_of)
+
+
+def _joined(tracks: Tracks, measured: _Measured, poses: NDArray[np.float64]) -> Tracks:
+    """Join tracks of one fruit by the places of all their sightings; the rest stay where the tracker had them."""
+    known = np.flatnonzero(measured.row_of[:-1] >= 0)
+    centres, covariances = tracks.centres.copy(), tracks.covariances.copy()
+    positions, of_positions = places_of(measured.sightings, measured.fruits, poses)
+    centres[known], covariances[known] = positions[measured.row_of[known]], of_positions[measured.row_of[known]]
+    return tracks.at(centres, covariances).joined()
 
 
 def _boxes(looks: Sequence[Look], fruits: NDArray[np.int64]) -> Boxes:

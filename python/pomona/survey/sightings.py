@@ -13,7 +13,7 @@ from pomona import _core
 from pomona.cloud import FruitCloud, Views
 from pomona.survey.seeing import Look
 
-__all__ = ["Sightings", "fruits_of"]
+__all__ = ["Sightings", "fruits_of", "places_of"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -101,6 +101,12 @@ def fruits_of(
         views=Views(frames=np.array([look.frame for look in looks], np.int64)[sightings.rows], fruits=fruits),
         extras=extras,
     )
+
+
+def places_of(sightings: Sightings, fruits: Rows, session_from_camera: Array) -> tuple[Array, Array]:
+    """Give only the centres (N, 3) and covariances (N, 3, 3) of the fruits; parameters as in `fruits_of`."""
+    positions, covariances, _, _ = _fused(sightings, fruits, session_from_camera)
+    return positions, covariances
 
 
 def _fused(sightings: Sightings, fruits: Rows, session_from_camera: Array) -> tuple[Array, Array, Array, Array]:

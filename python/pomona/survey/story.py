@@ -22,7 +22,8 @@ from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
-from pomona.survey.box_check import check_boxes
+from pomona.survey.box_check import check_boxes, check_long_boxes
+from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.kept import Kept
 from pomona.survey.part import OpenPart, Part
@@ -171,7 +172,10 @@ def scan(
                 break
     _tell_skipped(recording, findings.skipped)
     survey = findings.survey(camera)
-    check_boxes(recording.path, [part.boxes for part in survey.parts])
+    boxes = [part.boxes for part in survey.parts]
+    check_boxes(recording.path, boxes)
+    check_box_times(recording, boxes)
+    check_long_boxes(recording.path, recording.calibration, survey.parts)
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)

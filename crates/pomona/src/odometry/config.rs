@@ -85,7 +85,7 @@ pub struct PicturesConfig {
     pub window_px: usize,
     /// Halvings of the picture: finds what is up to about 20 px from where it is expected.
     pub levels: usize,
-    /// Steps of a point in one halving, at most.
+    /// Steps of a point in one halving, at most: what is there settles within these, what wanders on comes home by chance.
     pub max_steps: usize,
     /// A step below this settles a point, pixels.
     pub settled_px: f64,
@@ -158,7 +158,7 @@ impl Default for PicturesConfig {
             edge_px: 8,
             window_px: 13,
             levels: 2,
-            max_steps: 20,
+            max_steps: 10,
             settled_px: 0.01,
             forth_and_back_px: 1.0,
             max_row_error_px: 1.5,

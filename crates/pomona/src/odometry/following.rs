@@ -1,14 +1,16 @@
 //! Points followed from one picture to another: the method of Lucas and Kanade on pyramids (Bouguet, 2000), forth and back.
 //!
-//! A window T around a point of the first picture and the second picture J at x + d differ by what the gradients g of T and
-//! a step explain,
+//! A window T around a point of the first picture and the second picture J at x + d differ by what the gradients of T and a
+//! step explain, and by the light: a gain and an offset of each window's own, for lamps flicker, shutters roll and leaves
+//! shade. With g the gradients without the part that T itself and a constant explain as well, the light falls out of
 //!
 //! ```text
 //! (sum g g^T) step = sum g (T - J(x + d)),    d <- d + step,
 //! ```
 //!
-//! from the coarsest pictures to the finest. Only windows are looked at, so a call costs what its points cost, whatever the
-//! size of the pictures.
+//! from the coarsest pictures to the finest. Steps are as much too long as the gain is above 1: gains of whole pictures
+//! are better taken out before. Only windows are looked at, so a call costs what its points cost, whatever the size of the
+//! pictures.
 
 use super::config::PicturesConfig;
 use crate::row_search::Grey;
@@ -108,7 +110,7 @@ fn is_near(picture: Grey<'_>, corner: Vector2<f32>, side: usize) -> bool {
     reach(corner.x, picture.width) && reach(corner.y, picture.height())
 }
 
-/// A window of the first picture, its gradients, and the inverse of their sum of squares.
+/// A window of the first picture, its gradients as far as no light explains them, and the inverse of their sum of squares.
 struct Template {
     side: usize,
     values: [Row; LANES],
@@ -137,25 +139,33 @@ impl Template {
             inverse: Matrix2::zeros(),
         };
         let counts: Row = std::array::from_fn(|lane| f32::from(u8::from(lane < side)));
-        let (mut xx, mut xy, mut yy) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for row in 0..side {
             let [above, here, below] = [&wide[row], &wide[row + 1], &wide[row + 2]];
             // Scharr's weights: the gradient of a plane, and nearly the same in all directions.
             let slopes: [f32; AROUND] = std::array::from_fn(|k| (below[k] - above[k]) / 32.0);
             let smooth: [f32; AROUND] = std::array::from_fn(|k| (3.0 * (above[k] + below[k]) + 10.0 * here[k]) / 32.0);
             for lane in 0..LANES {
-                let x = counts[lane] * (smooth[lane + 2] - smooth[lane]);
-                let y = counts[lane] * (3.0 * (slopes[lane] + slopes[lane + 2]) + 10.0 * slopes[lane + 1]);
-                (all.values[row][lane], all.across[row][lane], all.down[row][lane]) = (here[lane + 1], x, y);
-                xx[lane] += x * x;
-                xy[lane] += x * y;
-                yy[lane] += y * y;
+                all.values[row][lane] = counts[lane] * here[lane + 1];
+                all.across[row][lane] = counts[lane] * (smooth[lane + 2] - smooth[lane]);
+                all.down[row][lane] =
+                    counts[lane] * (3.0 * (slopes[lane] + slopes[lane + 2]) + 10.0 * slopes[lane + 1]);
             }
         }
-        let [xx, xy, yy] = [xx, xy, yy].map(|lanes| lanes.iter().sum::<f32>());
+        let shades = all.shades(&counts);
+        for slopes in [&mut all.across, &mut all.down] {
+            without_light(&mut slopes[..side], &shades[..side], &counts);
+        }
+        let (across, down) = (&all.across[..side], &all.down[..side]);
+        let [xx, xy, yy] = [product(across, across), product(across, down), product(down, down)];
         let least = (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt()) / 2.0;
         all.inverse = Matrix2::new(xx, xy, xy, yy).try_inverse()?;
         (least >= MIN_EIGENVALUE * (side * side) as f32).then_some(all)
+    }
+
+    /// The values over their mean; 0 beyond the side.
+    fn shades(&self, counts: &Row) -> [Row; LANES] {
+        let mean = sum(&self.values[..self.side]) / (self.side * self.side) as f32;
+        self.values.map(|row| std::array::from_fn(|lane| row[lane] - counts[lane] * mean))
     }
 
     /// The step that explains best what differs with the window at `corner`; none where that leaves the picture.
@@ -193,6 +203,37 @@ impl Template {
         }
         [across, down]
     }
+}
+
+/// Takes out of gradients what another offset, and another gain of the values over their mean, explain as well.
+fn without_light(slopes: &mut [Row], shades: &[Row], counts: &Row) {
+    let offset = sum(slopes) / (slopes.len() * slopes.len()) as f32;
+    let gain = product(slopes, shades) / product(shades, shades).max(f32::MIN_POSITIVE);
+    for (slope, shade) in slopes.iter_mut().zip(shades) {
+        for lane in 0..LANES {
+            slope[lane] -= counts[lane] * offset + gain * shade[lane];
+        }
+    }
+}
+
+fn sum(rows: &[Row]) -> f32 {
+    let mut sums = [0.0; LANES];
+    for row in rows {
+        for lane in 0..LANES {
+            sums[lane] += row[lane];
+        }
+    }
+    sums.iter().sum()
+}
+
+fn product(first: &[Row], second: &[Row]) -> f32 {
+    let mut sums = [0.0; LANES];
+    for (one, other) in first.iter().zip(second) {
+        for lane in 0..LANES {
+            sums[lane] += one[lane] * other[lane];
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Values of a register that every processor has.
@@ -299,6 +340,18 @@ mod tests {
             let off = found - Vector2::new(80.0, 60.0) - Vector2::from(shift);
             assert!(off.norm() < 0.1, "{shift:?}: {off}");
         }
+    }
+
+    #[test]
+    fn windows_may_be_lit_otherwise() {
+        let (first, second) = (waves(0.0, 0.0), waves(3.3, -1.7));
+        let second: Vec<u8> = second.iter().map(|&value| (0.7 * f64::from(value) + 50.0).round() as u8).collect();
+        let points: Vec<_> = (0..30).map(|k| Vector2::new(f64::from(30 + 3 * k), f64::from(20 + 2 * k))).collect();
+        let found = follow(&[grey(&first)], &[grey(&second)], &points, &points, &PicturesConfig::default());
+        let is_near = |(place, point): (&Option<Vector2<f64>>, &Vector2<f64>)| {
+            place.is_some_and(|place| (place - point - Vector2::new(3.3, -1.7)).norm() < 0.1)
+        };
+        assert!(found.iter().zip(&points).filter(|&one| is_near(one)).count() > 25, "{found:?}");
     }
 
     #[test]
