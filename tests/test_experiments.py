@@ -35,9 +35,10 @@ def folder(tmp_path_factory):
         yield tmp_path_factory.mktemp("experiments")
 
 
-def a_visit(*names, countable=None):
+def a_visit(*names, countable=None, detected=None):
+    of_truth = frozenset(filter(None, names if countable is None else countable))
     places = np.arange(3.0 * len(names)).reshape(-1, 3)
-    return Visit(FruitCloud(places), names, frozenset(filter(None, names if countable is None else countable)), 1, 0.0)
+    return Visit(FruitCloud(places), names, of_truth, of_truth if detected is None else detected)
 
 
 def test_a_take_is_what_a_user_has(folder):
@@ -53,14 +54,13 @@ def test_a_take_is_what_a_user_has(folder):
 
 
 def test_an_experiment_runs_from_pictures_to_its_table(folder, monkeypatch):
-    monkeypatch.setattr(tables, "RUNS", 2)
     monkeypatch.setattr(tables, "CONDITIONS", ("true", "hard"))
     backwards = Take("small", backwards=True)
-    said = tables.table(ExperimentSet("Small", "", "small", (Line(backwards, (0.9, 0.8), (0.9, 0.8)),)), folder)
+    said = tables.table(ExperimentSet("Small", "", "small", (Line(backwards, (0.9, 0.8), (0.9, 0.8)),)), folder, 2)
     lines = [line for line in said.splitlines() if line.startswith("| small-backwards")]
     assert len(lines) == 4
     assert all("0.900 / 0.800" in line for line in lines[:2])
-    found = tables.measured("small", backwards, "true", folder)
+    found = tables.measured("small", backwards, "true", folder, 1)
     assert found["verified"].precision > 0.95
     assert found["verified"].recall > 0.9
     assert found["verified"].common > 20
@@ -72,6 +72,7 @@ def test_what_was_scanned_is_taken_up(folder, monkeypatch):
     again = visited(Take("small"), "true", folder)
     assert (again.cloud.positions == first.cloud.positions).all()
     assert again.true_ids == first.true_ids
+    assert first.countable <= first.detected
     assert len(first.countable - set(first.true_ids)) <= 1
 
 
@@ -108,11 +109,17 @@ def test_a_score_tells_what_is_wrong():
 def test_a_fruit_that_a_scan_lacks_is_missed():
     query, map_ = a_visit("a", countable=("a", "b")), a_visit("a", "b")
     found = score(query, map_, [(0, 0)])
-    assert (found.recall, found.not_scanned, found.not_paired) == (0.5, 1, 0)
+    assert (found.recall, found.not_detected, found.not_scanned, found.not_paired) == (0.5, 0, 1, 0)
+
+
+def test_a_fruit_that_a_detector_lacks_is_its_miss():
+    query, map_ = a_visit("a", countable=("a", "b"), detected=frozenset("a")), a_visit("a", "b")
+    found = score(query, map_, [(0, 0)])
+    assert (found.recall, found.not_detected, found.not_scanned, found.not_paired) == (0.5, 1, 0, 0)
 
 
 def test_the_page_has_every_set():
     parts = ("robustness", *SETS, "trajectory", "from_above")
-    said = page({name: f"what {name} says" for name in parts})
+    said = page({name: f"what {name} says" for name in parts}, 10)
     assert all(f"what {name} says" in said for name in parts)
     assert "{" not in said

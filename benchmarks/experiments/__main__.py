@@ -30,23 +30,25 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.experiments", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "out" / "experiments", metavar="FOLDER")
     parser.add_argument("--render-only", action="store_true", help="make the videos and stop")
+    parser.add_argument("--runs", type=int, default=10, help="matches that are averaged; the paper: 10")
     options = parser.parse_args(arguments)
     for name in VIDEOS:
         rendered(name, options.folder)
     if not options.render_only:
-        _experiments(options.folder, ROOT / "docs")
+        _experiments(options.folder, ROOT / "docs", options.runs)
     return 0
 
 
-def _experiments(folder: Path, docs: Path) -> None:
+def _experiments(folder: Path, docs: Path, runs: int) -> None:
     stories = {
         "robustness": partial(robustness, folder, docs / "images"),
-        **{name: partial(table, one, folder) for name, one in SETS.items()},
+        **{name: partial(table, one, folder, runs) for name, one in SETS.items()},
         "trajectory": partial(trajectory, folder, docs / "images"),
         "from_above": partial(from_above, folder, docs / "images"),
     }
-    found = {name: _kept(folder / "said" / f"{name}-{_made_by()}.md", story) for name, story in stories.items()}
-    (docs / "experiments.md").write_text(page(found), encoding="utf-8")
+    made_by = f"{_made_by()}-{runs}"
+    found = {name: _kept(folder / "said" / f"{name}-{made_by}.md", story) for name, story in stories.items()}
+    (docs / "experiments.md").write_text(page(found, runs), encoding="utf-8")
 
 
 def _kept(path: Path, story: Callable[[], str]) -> str:

@@ -24,8 +24,8 @@ class Score:
         Fruits that show clearly in enough frames of both videos.
     found : float
         Of these, those that were joined.
-    not_scanned : float
-        Of these, those that one of the two scans does not have.
+    not_detected, not_scanned : float
+        Of these, those that one of the two detectors, or else one of the two scans, does not have.
     """
 
     right: float
@@ -33,6 +33,7 @@ class Score:
     to_none: float
     common: float
     found: float
+    not_detected: float
     not_scanned: float
 
     @property
@@ -48,7 +49,7 @@ class Score:
     @property
     def not_paired(self) -> float:
         """Common fruits that both scans have and the match did not join."""
-        return self.common - self.found - self.not_scanned
+        return self.common - self.found - self.not_detected - self.not_scanned
 
 
 def score(query: Visit, map: Visit, pairs: Iterable[tuple[int, int]]) -> Score:
@@ -56,13 +57,16 @@ def score(query: Visit, map: Visit, pairs: Iterable[tuple[int, int]]) -> Score:
     named = [(query.true_ids[row], map.true_ids[other]) for row, other in pairs]
     right = [first for first, second in named if first and first == second]
     common = query.countable & map.countable
+    missed = common - set(right)
+    seen = missed & query.detected & map.detected
     return Score(
         right=len(right),
         to_another=sum(first != second for first, second in named if first and second),
         to_none=sum(bool(first) != bool(second) for first, second in named),
         common=len(common),
         found=len(common & set(right)),
-        not_scanned=len(common - (set(query.true_ids) & set(map.true_ids))),
+        not_detected=len(missed - seen),
+        not_scanned=len(seen - (set(query.true_ids) & set(map.true_ids))),
     )
 
 

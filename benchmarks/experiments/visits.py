@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-import time
-from collections import Counter, defaultdict
+import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import pomona
 from benchmarks.experiments.boxes import MIN_FRAMES, clear, fruits_often_in
+from benchmarks.experiments.naming import detected, named_boxes, true_fruits
 from benchmarks.experiments.takes import LaidOut, Take, laid_out
 from benchmarks.experiments.videos import rendered
-from benchmarks.recordings import TrueBox
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud, Views
 from pomona.made_from import MADE_FROM
-from pomona.survey import Part
 
-SAME_BOX_IOU = 0.5
+FORMAT = b"2"
+"""Of the files of scans."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +35,14 @@ class Visit:
         The fruit that most boxes of each show, empty where that is none.
     countable : frozenset of str
         True fruits that show clearly in as many frames.
-    parts : int
-        Pieces in which the camera was followed; the cloud is that of the longest.
-    seconds : float
-        CPU time of the scan.
+    detected : frozenset of str
+        True fruits around which the scan was given boxes in as many frames.
     """
 
     cloud: FruitCloud
     true_ids: tuple[str, ...]
     countable: frozenset[str]
-    parts: int
-    seconds: float
+    detected: frozenset[str]
 
 
 def visited(take: Take, boxes: str, folder: Path) -> Visit:
@@ -58,17 +53,16 @@ def visited(take: Take, boxes: str, folder: Path) -> Visit:
     if not kept.is_file():
         kept.parent.mkdir(exist_ok=True)
         _scan(place, boxes, kept)
-    cloud, names, parts, seconds = _read(kept)
-    often = np.flatnonzero(cloud.n_views >= MIN_FRAMES)
-    true_ids = tuple(names[row] for row in often)
-    return Visit(cloud.select(often), true_ids, fruits_often_in(clear(place.boxes)), parts, seconds)
+    return _read(kept, fruits_often_in(clear(place.boxes)))
 
 
 def _scan(place: LaidOut, boxes: str, kept: Path) -> None:
-    began = time.process_time()
     given = {"detections": place.true_boxes} if boxes == "true" else {"model": boxes}
     survey = pomona.scan(place.folder, odometry=True, **given)
-    part, seconds = survey.parts[survey.longest], time.process_time() - began
+    if len(survey.parts) > 1:
+        sys.stderr.write(f"{kept.stem}: the track broke, the longest of {len(survey.parts)} parts is taken\n")
+    part = survey.parts[survey.longest]
+    names = named_boxes(part.boxes, place.boxes)
     arrays = {
         "positions": part.cloud.positions,
         "diameters_m": part.cloud.diameters_m,
@@ -76,14 +70,14 @@ def _scan(place: LaidOut, boxes: str, kept: Path) -> None:
         "n_boxes": np.bincount(part.boxes.fruits[part.boxes.fruits >= 0], minlength=len(part.cloud)),
         "view_frames": part.cloud.views.frames,
         "view_fruits": part.cloud.views.fruits,
-        "true_ids": np.array(true_fruits(part, place.boxes), dtype=np.str_),
-        "parts_seconds": np.array([len(survey.parts), seconds]),
+        "true_ids": np.array(true_fruits(part, names), dtype=np.str_),
+        "detected": np.array(detected(part.boxes, names), dtype=np.str_),
     }
     with whole_file(kept) as partial, partial.open("wb") as file:
         np.savez(file, **arrays)
 
 
-def _read(kept: Path) -> tuple[FruitCloud, list[str], int, float]:
+def _read(kept: Path, countable: frozenset[str]) -> Visit:
     with np.load(kept) as found:
         cloud = FruitCloud(
             found["positions"],
@@ -92,46 +86,13 @@ def _read(kept: Path) -> tuple[FruitCloud, list[str], int, float]:
             n_views=found["n_boxes"],
             views=Views(found["view_frames"], found["view_fruits"]),
         )
-        parts, seconds = found["parts_seconds"].tolist()
-        return cloud, found["true_ids"].tolist(), int(parts), seconds
-
-
-def true_fruits(part: Part, truth: list[TrueBox]) -> list[str]:
-    """Give the true fruit that most boxes of each fruit show, "" where most show none."""
-    of_frame: dict[int, list[TrueBox]] = defaultdict(list)
-    for box in truth:
-        of_frame[box.frame].append(box)
-    votes: list[Counter[str]] = [Counter() for _ in range(len(part.cloud))]
-    for frame in np.unique(part.boxes.frames).tolist():
-        rows = np.flatnonzero((part.boxes.frames == frame) & (part.boxes.fruits >= 0))
-        for fruit, name in zip(
-            part.boxes.fruits[rows], _named(part.boxes.boxes_px[rows], of_frame[frame]), strict=True
-        ):
-            votes[fruit][name] += 1
-    return [vote.most_common(1)[0][0] if vote else "" for vote in votes]
-
-
-def _named(boxes_px: NDArray[np.float64], truth: list[TrueBox]) -> list[str]:
-    """Name of the true box that each box is, "" for none."""
-    if not truth:
-        return [""] * len(boxes_px)
-    overlap = _overlap(boxes_px, np.array([box.box_px for box in truth], np.float64))
-    best = overlap.argmax(axis=1)
-    same = overlap[np.arange(len(best)), best] >= SAME_BOX_IOU
-    return [truth[row].fruit if is_same else "" for row, is_same in zip(best.tolist(), same.tolist(), strict=True)]
-
-
-def _overlap(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Intersection over union of each box of one with each of the other, (A, B)."""
-    low = np.maximum(first[:, None, :2], second[None, :, :2])
-    high = np.minimum(first[:, None, 2:], second[None, :, 2:])
-    shared = np.prod(np.clip(high - low, 0.0, None), axis=2)
-    of_first, of_second = (np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (first, second))
-    return np.asarray(shared / (of_first[:, None] + of_second[None] - shared))
+        often = np.flatnonzero(found["n_boxes"] >= MIN_FRAMES)
+        true_ids = tuple(found["true_ids"][often].tolist())
+        return Visit(cloud.select(often), true_ids, countable, frozenset(found["detected"].tolist()))
 
 
 def _made_by(video: Path) -> str:
-    return hashlib.sha256(program() + (video / MADE_FROM).read_bytes()).hexdigest()[:12]
+    return hashlib.sha256(FORMAT + program() + (video / MADE_FROM).read_bytes()).hexdigest()[:12]
 
 
 @cache

@@ -31,7 +31,8 @@ def made_worse(visit: Visit, distance_m: float, seed: tuple[int, int]) -> Visit:
     sigma_m = SIGMA_M * (distance_m / NEAR_M) ** 2
     cloud = FruitCloud(places + rng.normal(0.0, sigma_m, places.shape), views=_seen_with(seen, strays))
     names = (*(visit.true_ids[row] for row in kept), *("" for _ in strays))
-    return Visit(cloud, names, visit.countable & frozenset(names), visit.parts, visit.seconds)
+    left = frozenset(names)
+    return Visit(cloud, names, visit.countable & left, visit.detected & left)
 
 
 def _seen_with(seen: FruitCloud, strays: NDArray[np.float64]) -> Views:
