@@ -21,7 +21,7 @@ APART_M = 1.6
 """The query is moved off the map by so much; else it lies where the match puts it, so right lines are parallel."""
 
 
-KINDS = {"same fruit": "tab:green", "another": "black", "no fruit of the row": "0.75"}
+KINDS = {"right": "tab:green", "wrong": "black", "between fruits of other rows": "0.75"}
 """What a pair joins, and the colour of its line."""
 
 SAID = "lines green, black, grey; map red, query blue; own detections"
@@ -43,8 +43,8 @@ def from_above(folder: Path, images: Path) -> str:
 
 def _kind(first: str, second: str) -> str:
     if not first and not second:
-        return "no fruit of the row"
-    return "same fruit" if first == second else "another"
+        return "between fruits of other rows"
+    return "right" if first == second else "wrong"
 
 
 def draw(match: pomona.Match, query: FruitCloud, map_: FruitCloud, kinds: list[str], path: Path) -> None:
@@ -63,6 +63,6 @@ def draw(match: pomona.Match, query: FruitCloud, map_: FruitCloud, kinds: list[s
     axes.scatter(*seen_query.T, s=9, color="tab:blue", label="query", zorder=3)
     axes.set(xlabel="along the row (m)", ylabel="across (m)")
     axes.set_aspect("equal")
-    axes.legend(frameon=False, loc="upper right", ncols=2)
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     figure.savefig(path, dpi=100)
     plt.close(figure)
