@@ -9,7 +9,7 @@ FUZZ_SEED ?= 1
 NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop demo test test-rust test-python lint format bench fuzz audit wheel docs clean help
+.PHONY: all install develop demo test test-rust test-python lint format bench experiments fuzz audit wheel docs clean help
 
 all: lint docs test ## what CI runs
 
@@ -51,6 +51,9 @@ format: install ## rewrite the sources in the house's format
 
 bench: install ## accuracy and speed; writes benchmarks/results
 	$(RUN) python -m benchmarks
+
+experiments: install ## the paper's experiments on rendered videos, kept in out/experiments; writes docs/experiments.md
+	$(RUN) python -m benchmarks.experiments
 
 fuzz: install ## damaged input for every reader and binding, FUZZ_SECONDS=600; what fails lies in out/fuzz
 	$(RUN) python -m fuzz --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)

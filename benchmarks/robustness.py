@@ -8,6 +8,7 @@ of its own. Writes robustness.csv and the paper's two figures.
 
 import argparse
 import sys
+from pathlib import Path
 from statistics import fmean
 
 import numpy as np
@@ -29,27 +30,33 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks robustness", description=__doc__)
     parser.add_argument("--frames", type=int, default=40, help="frames per occlusion and noise")
     options = parser.parse_args(arguments)
+    rows = conditions([frame(np.random.Generator(np.random.PCG64(number))) for number in range(options.frames)])
+    write_rows("robustness.csv", rows)
+    draw_occlusion(rows, FOLDER / "robustness_occlusion.png")
+    draw_noise(rows, FOLDER / "robustness_noise.png")
+
+
+def conditions(frames: list[NDArray[np.float64]]) -> list[dict[str, object]]:
+    """Perturb the same frames in all ways."""
     rows: list[dict[str, object]] = []
     for sigma_m in SIGMAS_M:
-        rows.extend(condition(occlusion, sigma_m, options.frames) for occlusion in OCCLUSIONS)
+        rows.extend(condition(occlusion, sigma_m, frames) for occlusion in OCCLUSIONS)
         sys.stderr.write(f"sigma {100 * sigma_m:g} cm done\n")
-    write_rows("robustness.csv", rows)
-    draw(rows)
+    return rows
 
 
-def condition(occlusion: float, sigma_m: float, frames: int) -> dict[str, object]:
-    """Perturb `frames` frames alike and register each to its original."""
+def condition(occlusion: float, sigma_m: float, frames: list[NDArray[np.float64]]) -> dict[str, object]:
+    """Perturb frames, (N, 3) each, alike and register each to its original."""
     errors_m: list[float] = []
-    for number in range(frames):
+    for number, original in enumerate(frames):
         rng = np.random.Generator(np.random.PCG64([number, round(100 * occlusion), round(1e4 * sigma_m)]))
-        original = frame(np.random.Generator(np.random.PCG64(number)))
         error_m = registration_error_m(original, *perturbed(rng, original, occlusion, sigma_m))
         if error_m is not None:
             errors_m.append(error_m)
     return {
         "occlusion": occlusion,
         "sigma_m": sigma_m,
-        "frames": frames,
+        "frames": len(frames),
         "registered": len(errors_m),
         "mean_m": fmean(errors_m) if errors_m else None,
         "median_m": float(np.median(errors_m)) if errors_m else None,
@@ -90,8 +97,8 @@ def registration_error_m(
     return float(np.linalg.norm(original @ shift[:3, :3].T + shift[:3, 3], axis=1).mean())
 
 
-def draw(rows: list[dict[str, object]]) -> None:
-    """Draw the paper's figures: without noise, and with it."""
+def draw_occlusion(rows: list[dict[str, object]], path: Path) -> None:
+    """Draw the paper's figure without noise."""
     import matplotlib as mpl
 
     mpl.use("agg")
@@ -106,8 +113,16 @@ def draw(rows: list[dict[str, object]]) -> None:
     axes.set(xlabel="occluded fruits (%)", ylabel="distance to the originals (mm)")
     axes.set_title("Without noise")
     axes.legend(frameon=False)
-    figure.savefig(FOLDER / "robustness_occlusion.png", dpi=130)
+    figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def draw_noise(rows: list[dict[str, object]], path: Path) -> None:
+    """Draw the paper's figure with noise."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
     colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, len(SIGMAS_M)))
@@ -121,5 +136,5 @@ def draw(rows: list[dict[str, object]]) -> None:
     axes.set(xlabel="occluded fruits (%)", ylabel="mean distance to the originals (m)", yscale="log", ylim=(1e-3, 0.2))
     axes.set_title("Occlusion and noise (open circles: over 10 % of the frames got no answer)", fontsize=10)
     axes.legend(title="sigma", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(FOLDER / "robustness_noise.png", dpi=130)
+    figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -144,7 +144,11 @@ def test_paths_differ_as_they_are_called():
     assert ways["tractor-back"][0, 0, 3] > ways["tractor-back"][-1, 0, 3]
     assert (ways["other-side"][:, 1, 3] > 1.0).all()
     assert (ways["upside-down"][:, 2, 1] > 0.9).all()  # the camera's down is up
+    assert (ways["upside-down-back"][:, 2, 1] > 0.9).all()
     assert (ways["tractor"][:, 2, 1] < -0.9).all()
+    for name in ("upside-down-back", "walking-far"):
+        assert ways[name][0, 0, 3] > ways[name][-1, 0, 3]
+    assert ways["walking-far"][:, 1, 3].mean() < ways["hand-held"][:, 1, 3].mean() - 0.5
     assert (np.diff(ways["hand-held"][:, 0, 3]).std() > 2 * np.diff(ways["tractor"][:, 0, 3]).std()).all()
     assert pairs_along("fast", REACH_M) < pairs_along("tractor", REACH_M) < pairs_along("hand-held", REACH_M)
 

@@ -79,7 +79,9 @@ PATHS: Mapping[str, PathShape] = {
     "far": replace(_TRACTOR, distance_m=2.3, height_m=1.6, speed_m_s=-1.8),
     "other-side": replace(_TRACTOR, from_behind=True),
     "angle": replace(_TRACTOR, yaw_rad=0.3, pitch_rad=0.12, height_m=1.2),
+    "walking-far": replace(_BY_HAND, distance_m=2.3, height_m=1.6, speed_m_s=-0.9),
     "upside-down": replace(_TRACTOR, roll_rad=np.pi),
+    "upside-down-back": replace(_TRACTOR, roll_rad=np.pi, speed_m_s=-1.8, height_m=1.55),
 }
 """By name."""
 
