@@ -17,6 +17,7 @@ NAMES = (
     "diameters",
     "kinect",
     "season",
+    "seasons",
     "clouds",
     "odometry",
     "tracking",
