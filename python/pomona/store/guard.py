@@ -31,6 +31,7 @@ PRAGMAS = frozenset(
     (
         "application_id",
         "busy_timeout",
+        "defer_foreign_keys",
         "foreign_key_check",
         "integrity_check",
         "page_count",
