@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ from pomona.store.stored_fruits import fruits_in_map
 if TYPE_CHECKING:
     from pomona.matching import Match
 
-__all__ = ["Added", "add_session"]
+__all__ = ["Added", "add_session", "add_sessions"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +113,44 @@ def add_session(
     return _add(path, session, settings, timeout_s, waiting)
 
 
+def add_sessions(
+    path: str | Path,
+    sessions: Sequence[Session],
+    *,
+    settings: Settings | None = None,
+    timeout_s: float = TIMEOUT_S,
+    waiting: Waiting | None = None,
+) -> list[Added]:
+    """Add several sessions, each in a transaction of its own; return what became of each, in their order.
+
+    One that is not found in the map is tried again after the others, which may have seen what lies between.
+
+    Parameters
+    ----------
+    path, settings, timeout_s, waiting
+        As for `add_session`.
+    sessions : sequence of Session
+        The visits to add.
+
+    Raises
+    ------
+    PomonaError
+        As `add_session`; the sessions before that one are in the map.
+    """
+    answers: dict[int, Added] = {}
+    waiting_for_others = list(range(len(sessions)))
+    while waiting_for_others:
+        for number in waiting_for_others:
+            answers[number] = add_session(
+                path, sessions[number], settings=settings, timeout_s=timeout_s, waiting=waiting
+            )
+        refused = [number for number in waiting_for_others if not answers[number].is_added]
+        if len(refused) == len(waiting_for_others):
+            break
+        waiting_for_others = refused
+    return [answers[number] for number in range(len(sessions))]
+
+
 def _start_in_place(
     path: Path, session: Session, settings: Settings | None, timeout_s: float, waiting: Waiting | None
 ) -> Added:
@@ -143,7 +181,7 @@ def _add(
         last_ids(connection)
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
-        known = fruits_in_map(connection, FruitCloud)
+        known = _worth_recognising(fruits_in_map(connection, FruitCloud))
         if not len(known):
             raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)
@@ -198,6 +236,13 @@ def _join(
     write_changes(connection, "added", session.name, settlement.changes)
     update_layers(connection)
     return _told(settlement, own, found)
+
+
+def _worth_recognising(fruits: FruitCloud) -> FruitCloud:
+    """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
+    judged = zip(fruits.extras["state"], fruits.extras["fruit_probability"], strict=True)
+    may_hang = np.array([state != "gone" and (state != "missed" or float(p or 1) > 0.5) for state, p in judged], bool)
+    return fruits.select(may_hang) if may_hang.any() else fruits
 
 
 def _told(settlement: Settlement, own: int, found: Match | None) -> Added:

@@ -33,6 +33,7 @@ PRAGMAS = frozenset(
         "busy_timeout",
         "defer_foreign_keys",
         "foreign_key_check",
+        "foreign_keys",
         "integrity_check",
         "page_count",
         "page_size",
