@@ -13,12 +13,12 @@ from pomona.identity.visits import Sights, VisitPair
 
 __all__ = ["UNPAIRED", "Links", "links_of"]
 
-UNPAIRED = 3.5
-"""Nats against two sights of matched visits that the match left unpaired: of the fruits that both have seen it pairs
-all but 3 in 100."""
+UNPAIRED = 7.0
+"""Nats against two sights of matched visits that the match left unpaired. Of the fruits that both have seen it pairs
+all but 3 in 100, which were 3.5 nats; twice that keeps a fruit apart from the neighbour of one that was thinned."""
 
-SUREST = 6.0
-"""Nats of a pair at most: no match is surer than it is right, 1 in 400 (`how-it-decides.md`, reliability)."""
+SUREST = 8.0
+"""Nats of a pair at most: more than `UNPAIRED`, so that one missing pair does not part what sure ones join."""
 
 
 LEAST_SURE = 0.5

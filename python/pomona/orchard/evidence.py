@@ -190,8 +190,8 @@ def _rows(
     rows = np.zeros(ids.shape, np.int64)
     for side, number in enumerate(numbers):
         own = visits[number].observation_ids
-        rows[:, side] = np.minimum(np.searchsorted(own, ids[:, side]), len(own) - 1)
-        strange = own[rows[:, side]] != ids[:, side]
+        rows[:, side] = np.searchsorted(own, ids[:, side])
+        strange = ~np.isin(ids[:, side], own)
         if strange.any():
             found = ids[np.argmax(strange), side]
             raise WrongContentError(f"matches {match_id}: pairs: found {found}, expected observations of its sessions")

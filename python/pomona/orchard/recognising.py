@@ -60,6 +60,8 @@ def matches_with_visits(
 
 def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
     """Tell whether two visits saw other places; that takes less than to match them."""
+    if not len(other.cloud):
+        return True
     others = other.cloud.transformed(other.map_from_session).positions
     low, high = others.min(axis=0) - MARGIN_M, others.max(axis=0) + MARGIN_M
     return bool((in_map.min(axis=0) > high).any() or (in_map.max(axis=0) < low).any())

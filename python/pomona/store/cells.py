@@ -71,7 +71,8 @@ def _text(expected: str, is_right: Callable[[str], bool] = bool) -> CellKind:
 
 
 def _one_of(*words: str) -> CellKind:
-    return _text(" or ".join(f"'{word}'" for word in words), words.__contains__)
+    *before, last = (f"'{word}'" for word in words)
+    return _text(f"{', '.join(before)} or {last}", words.__contains__)
 
 
 def _json(expected: str, is_right: Callable[[Any], bool]) -> CellKind:
