@@ -15,7 +15,7 @@ from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import all_sights
 from pomona.orchard.fruit_ids import Change, changes_between, ids_of_clusters
 
-SURE, DOUBTED = 0.99, 0.7
+SURE, DOUBTED = 0.9999, 0.7
 
 
 def visit(number: int, positions: np.ndarray, **about: object) -> SeenVisit:
