@@ -42,9 +42,9 @@ class IdentityScore:
         return {
             "P": _share(self.right, self.said),
             "R": _share(self.right, self.common),
-            "whole": _share(self.whole, self.tracked),
-            "gone_found": _share(self.gone_right, self.gone_true),
-            "gone_right": _share(self.gone_right, self.gone_said),
+            "whole_of_tracked": _share(self.whole, self.tracked),
+            "gone_recall": _share(self.gone_right, self.gone_true),
+            "gone_precision": _share(self.gone_right, self.gone_said),
             "living_said_gone": _share(self.gone_wrong, self.living),
         }
 

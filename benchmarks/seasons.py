@@ -42,11 +42,11 @@ def main(arguments: list[str]) -> None:
     if options.shuffled:
         sys.stdout.write(table(rows))
         return
-    write_rows("seasons.csv", [{**row, "score": None, **vars(row["score"]), **row["score"].shares()} for row in rows])
+    write_rows("seasons.csv", [{**row, **vars(score), **score.shares()} for row, score in rows])
     write_text("seasons.md", f"# Seasons\n\n{' '.join((__doc__ or '').split())}\n\n{table(rows)}")
 
 
-def row_of(season: DrawnSeason, *, shuffled: bool) -> dict[str, object]:
+def row_of(season: DrawnSeason, *, shuffled: bool) -> tuple[dict[str, object], IdentityScore]:
     """Add all visits of a season to a map and compare."""
     order = list(range(len(season.visits)))
     if shuffled:
@@ -59,7 +59,7 @@ def row_of(season: DrawnSeason, *, shuffled: bool) -> dict[str, object]:
         score = scored(season, OrchardMap(path))
     figures = ", ".join(f"{name} {share(value)}" for name, value in score.shares().items())
     sys.stderr.write(f"{season.name} {season.seed}: {figures}, {seconds:.1f} s\n")
-    return {"season": season.name, "seed": season.seed, "refused": n_refused, "seconds": seconds, "score": score}
+    return {"season": season.name, "seed": season.seed, "refused": n_refused}, score
 
 
 def scored(season: DrawnSeason, orchard: OrchardMap) -> IdentityScore:
@@ -81,7 +81,7 @@ def scored(season: DrawnSeason, orchard: OrchardMap) -> IdentityScore:
     return score_identities(visits, said, season.gone)
 
 
-def table(rows: Sequence[dict[str, object]]) -> str:
+def table(rows: Sequence[tuple[dict[str, object], IdentityScore]]) -> str:
     header = (
         "season",
         "seasons",
@@ -95,10 +95,10 @@ def table(rows: Sequence[dict[str, object]]) -> str:
         "bars P, R, whole",
     )
     lines = []
-    for name in dict.fromkeys(str(row["season"]) for row in rows):
-        own = [row for row in rows if row["season"] == name]
-        pooled = sum((row["score"] for row in own), IdentityScore())
-        refused = sum(int(str(row["refused"])) for row in own)
+    for name in dict.fromkeys(str(row["season"]) for row, _ in rows):
+        own = [(row, score) for row, score in rows if row["season"] == name]
+        pooled = sum((score for _, score in own), IdentityScore())
+        refused = sum(int(str(row["refused"])) for row, _ in own)
         figures = [share(value) for value in pooled.shares().values()]
         lines.append((name, str(len(own)), str(refused), *figures, ", ".join(BARS[name])))
     return markdown(header, lines)
