@@ -18,6 +18,7 @@ NAMES = (
     "kinect",
     "season",
     "growth",
+    "seasons",
     "clouds",
     "odometry",
     "tracking",

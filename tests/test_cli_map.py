@@ -54,13 +54,13 @@ def orchard(visits: Path) -> Path:
 
 def test_info_tells_people_and_programs(orchard: Path) -> None:
     info = json.loads(run("info", orchard, "--json").stdout)
-    assert (info["kind"], info["format_version"]) == ("map", 1)
+    assert (info["kind"], info["format_version"]) == ("map", 2)
     assert [visit["name"] for visit in info["sessions"]] == ["august", "september"]
     assert info["n_observations"] == sum(visit["n_fruits"] for visit in info["sessions"])
     assert info["n_fruits"] == sum(visit["n_new"] for visit in info["sessions"]) == sum(info["states"].values())
     assert np.shape(info["extent_m"]) == (2, 3)
     text = run("info", orchard).stdout
-    assert text.startswith(f"{orchard}: map, format 1\n{info['n_fruits']} fruits (")
+    assert text.startswith(f"{orchard}: map, format 2\n{info['n_fruits']} fruits (")
     assert text.splitlines()[-1].split()[0] == "september"
 
 

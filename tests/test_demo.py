@@ -30,7 +30,8 @@ def test_finds_the_second_visit_in_the_map_of_the_first(made: Demo) -> None:
 def test_the_map_holds_every_fruit_once(made: Demo) -> None:
     orchard = OrchardMap(made.orchard)
     first, second = orchard.visits()
-    assert second.n_matched == len(made.match.pairs)
+    # Sizes speak in the map, too: pairs that did not grow as the others stay apart.
+    assert 0.9 * len(made.match.pairs) < second.n_matched <= len(made.match.pairs)
     assert made.n_identities == first.n_fruits + second.n_fruits - second.n_matched == len(orchard.fruits())
 
 

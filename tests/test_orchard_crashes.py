@@ -49,8 +49,10 @@ def content(path: Path) -> list[object] | None:
     if not path.exists():
         return None
     connection = sqlite3.connect(path)
-    tables = ("sessions", "fruits", "observations", "sightings", "poses", "rtree_fruits_geom", "sqlite_sequence")
-    rows = [connection.execute(f"SELECT * FROM {table} ORDER BY 1, 2").fetchall() for table in tables]
+    tables = ("sessions", "fruits", "observations", "sightings", "poses", "matches", "changes", "rtree_fruits_geom")
+    rows = [
+        connection.execute(f"SELECT * FROM {table} ORDER BY 1, 2").fetchall() for table in (*tables, "sqlite_sequence")
+    ]
     connection.close()
     return rows
 

@@ -163,7 +163,10 @@ def test_what_people_do_in_qgis_is_taken(orchard: Path, script: str) -> None:
 @pytest.mark.parametrize(
     ("script", "line"),
     [
-        ("UPDATE fruits SET state = 7 WHERE id = 3", "fruits 3: state: found '7', expected 'seen' or 'missed'"),
+        (
+            "UPDATE fruits SET state = 7 WHERE id = 3",
+            "fruits 3: state: found '7', expected 'new', 'seen', 'missed' or 'gone'",
+        ),
         (
             "UPDATE fruits SET geom = x'00' WHERE id = 3",
             "fruits 3: geom: found b'\\x00', expected a little-endian",
@@ -206,7 +209,7 @@ def test_check_names_the_cell(orchard: Path, script: str, line: str) -> None:
         ),
         ("UPDATE sessions SET configuration = '[]'", "sessions 1: configuration: found '[]', expected a JSON object"),
         ("DELETE FROM sessions", "is a session file with 0 sessions, expected 1"),
-        ("INSERT INTO pomona_format VALUES (2, 1, 'map', '')", "has format None and kind None, expected 1 and"),
+        ("INSERT INTO pomona_format VALUES (2, 1, 'map', '')", "has format None and kind None, expected 1 to 2 and"),
     ],
 )
 def test_a_session_that_cannot_be_is_refused(session: Path, script: str, line: str) -> None:

@@ -78,10 +78,9 @@ def test_whichever_goes_the_map_is_whole(season: Path, scene: FruitCloud, name: 
     transforms = {one.name: one.map_from_session.tolist() for one in OrchardMap(season).visits()}
     assert remove_session(season, name) is not None
     assert problems(season) == []
-    # The frame stays, that of the first session too.
-    assert {one.name: one.map_from_session.tolist() for one in OrchardMap(season).visits()} == {
-        other: transform for other, transform in transforms.items() if other != name
-    }
+    # The frame stays, that of the first session too; who hung on the one that goes hangs on its neighbour.
+    for one in OrchardMap(season).visits():
+        np.testing.assert_allclose(one.map_from_session, transforms[one.name], atol=0.01)
     firsts = np.unique(OrchardMap(season).observations().fruit_ids, return_counts=True)
     unmatched = np.isnan(OrchardMap(season).observations().probabilities).sum()
     assert unmatched == len(firsts[0])

@@ -23,6 +23,7 @@ __all__ = [
     "LOCAL_METRES",
     "USER_VERSION",
     "add_functions",
+    "add_index_triggers",
     "add_table",
     "are_points",
     "connect",
@@ -84,8 +85,9 @@ UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","432
 """
 
 # {t} is a table with the primary key `id` and the geometry `geom`.
-RTREE = """
-CREATE VIRTUAL TABLE rtree_{t}_geom USING rtree(id, minx, maxx, miny, maxy);
+RTREE = "CREATE VIRTUAL TABLE rtree_{t}_geom USING rtree(id, minx, maxx, miny, maxy);"
+
+RTREE_TRIGGERS = """
 CREATE TRIGGER rtree_{t}_geom_insert AFTER INSERT ON {t}
 WHEN NEW.geom NOT NULL AND NOT ST_IsEmpty(NEW.geom) BEGIN
     INSERT OR REPLACE INTO rtree_{t}_geom VALUES
@@ -169,7 +171,13 @@ def add_table(connection: sqlite3.Connection, name: str, columns: str, descripti
             "INSERT INTO gpkg_extensions VALUES (?, 'geom', 'gpkg_rtree_index', ?, 'write-only')",
             (name, "http://www.geopackage.org/spec120/#extension_rtree"),
         )
-        execute_all(connection, RTREE.format(t=name))
+        connection.execute(RTREE.format(t=name))
+        add_index_triggers(connection, name)
+
+
+def add_index_triggers(connection: sqlite3.Connection, name: str) -> None:
+    """Let the spatial index of a layer follow it."""
+    execute_all(connection, RTREE_TRIGGERS.format(t=name))
 
 
 def touch(connection: sqlite3.Connection, name: str, last_change: str) -> None:

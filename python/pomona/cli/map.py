@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from pomona.orchard import Added, OrchardMap, Removed, Session
+    from pomona.orchard import Added, Change, OrchardMap, Removed, Session
+
+_EVENTS = {"joined": "joined", "split": "split off as", "moved": "moved to"}
 
 app = Verbs(help="Keep an orchard map: one identity for each fruit over all visits.", no_args_is_help=True)
 
@@ -42,7 +44,9 @@ def _map() -> None:
 @app.command("add")
 def map_add(
     orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg); made when it is not there."),
-    session: Path = typer.Argument(metavar="SESSION", help="A session (.gpkg), or a cloud (.csv, .ply) with --date."),
+    sessions: list[Path] = typer.Argument(
+        metavar="SESSION...", help="Sessions (.gpkg), or a cloud (.csv, .ply) with --date."
+    ),
     date: str | None = typer.Option(
         None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; a session has its own."
     ),
@@ -60,28 +64,33 @@ def map_add(
 ) -> None:
     """Recognise the fruits of SESSION in ORCHARD and add it.
 
-    Matched fruits keep their ids, the others get new ones; the first session starts the map. Exit code 0: added.
-    1: not found in the map, which stays as it was. 2: wrong input.
+    Who is who follows from all sessions at once, in whatever order they came. Fruits keep their ids where they can;
+    what becomes another fruit is told. The first session starts the map; of several, one that is not found is tried
+    again after the others. Exit code 0: added. 1: one was not found in the map. 2: wrong input.
     """
     from pomona.cli.progress import working
     from pomona.errors import PomonaError
-    from pomona.orchard import add_session, load_session
+    from pomona.orchard import add_sessions, load_session
     from pomona.settings import Settings
 
     if unit is Unit.free and not orchard.exists():
         raise PomonaError(
             f"{orchard}: is not there, and a map starts in metres: found --unit free, expected m, cm or mm"
         )
-    visit = load_session(session, date=date, unit=None if unit is None else unit.value)
+    if date is not None and len(sessions) > 1:
+        raise PomonaError(f"--date: found it with {len(sessions)} sessions, expected one; each has a day of its own")
+    visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
-    with working(f"adding {len(visit.cloud)} fruits to {orchard.name}"):
-        added = add_session(orchard, visit, settings=settings, waiting=_waiting(orchard))
+    with working(f"adding {sum(len(visit.cloud) for visit in visits)} fruits to {orchard.name}"):
+        answers = add_sessions(orchard, visits, settings=settings, waiting=_waiting(orchard))
+    told = list(zip(visits, answers, strict=True))
     if json:
-        say_json(_added_as_json(visit, added))
+        objects = [_added_as_json(visit, added) for visit, added in told]
+        say_json(objects[0] if len(objects) == 1 else objects)
     else:
-        say(_added_as_text(visit, added))
-    if not added.is_added:
+        say(*(line for visit, added in told for line in _added_as_lines(visit, added)))
+    if not all(added.is_added for added in answers):
         raise typer.Exit(1)
 
 
@@ -162,6 +171,8 @@ def _removed_as_text(session: str, removed: Removed | None) -> str:
 
 
 def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
+    from dataclasses import asdict
+
     match = added.match
     return {
         "session": visit.name,
@@ -171,11 +182,21 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "n_matched": added.n_matched,
         "n_new": added.n_new,
         "n_missed": added.n_missed,
+        "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
         "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
         if added.is_added
         else {},
     }
+
+
+def _added_as_lines(visit: Session, added: Added) -> list[str]:
+    return [_added_as_text(visit, added), *map(_change_as_text, added.changes)]
+
+
+def _change_as_text(change: Change) -> str:
+    count = "1 observation" if change.n_observations == 1 else f"{change.n_observations} observations"
+    return f"  fruit {change.from_fruit_id}: {count} {_EVENTS[change.event]} fruit {change.to_fruit_id}"
 
 
 def _added_as_text(visit: Session, added: Added) -> str:

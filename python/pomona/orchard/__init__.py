@@ -1,6 +1,7 @@
 """The orchard map: fruits with one identity over all sessions, in one GeoPackage file."""
 
-from pomona.orchard.adding import Added, add_session
+from pomona.orchard.adding import Added, add_session, add_sessions
+from pomona.orchard.fruit_ids import Change
 from pomona.orchard.integrity import problems
 from pomona.orchard.loading import load_session
 from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
@@ -13,12 +14,14 @@ from pomona.store.schema import FORMAT_VERSION
 __all__ = [
     "FORMAT_VERSION",
     "Added",
+    "Change",
     "Observations",
     "OrchardMap",
     "Removed",
     "Session",
     "Visit",
     "add_session",
+    "add_sessions",
     "load_session",
     "problems",
     "read_session",

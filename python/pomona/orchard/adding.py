@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona import geopackage
 from pomona.atomic import NoLinksError, new_file
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.orchard.replay import in_view_unseen
+from pomona.identity import VisitPair
+from pomona.orchard.evidence import Evidence, new_visit, read_evidence
+from pomona.orchard.fruit_ids import Change
+from pomona.orchard.recognising import matches_with_visits
 from pomona.orchard.session import Session
-from pomona.orchard.writing import Placement, insert_fruits, insert_observations, insert_session, update_layers
+from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
+from pomona.orchard.writing import Placement, insert_matches, insert_observations, insert_session, update_layers
 from pomona.settings import Settings
 from pomona.store import schema
 from pomona.store.failures import WrongContentError
@@ -28,7 +32,7 @@ from pomona.store.stored_fruits import fruits_in_map
 if TYPE_CHECKING:
     from pomona.matching import Match
 
-__all__ = ["Added", "add_session"]
+__all__ = ["Added", "add_session", "add_sessions"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +48,8 @@ class Added:
         session looked and were not seen.
     match : Match, optional
         How the session was found in the map; None for the first session.
+    changes : tuple of Change
+        Observations of other sessions that now are of another fruit.
     """
 
     fruit_ids: NDArray[np.int64]
@@ -51,6 +57,7 @@ class Added:
     n_new: int
     n_missed: int
     match: Match | None
+    changes: tuple[Change, ...] = ()
 
     @property
     def is_added(self) -> bool:
@@ -106,6 +113,44 @@ def add_session(
     return _add(path, session, settings, timeout_s, waiting)
 
 
+def add_sessions(
+    path: str | Path,
+    sessions: Sequence[Session],
+    *,
+    settings: Settings | None = None,
+    timeout_s: float = TIMEOUT_S,
+    waiting: Waiting | None = None,
+) -> list[Added]:
+    """Add several sessions, each in a transaction of its own; return what became of each, in their order.
+
+    One that is not found in the map is tried again after the others, which may have seen what lies between.
+
+    Parameters
+    ----------
+    path, settings, timeout_s, waiting
+        As for `add_session`.
+    sessions : sequence of Session
+        The visits to add.
+
+    Raises
+    ------
+    PomonaError
+        As `add_session`; the sessions before that one are in the map.
+    """
+    answers: dict[int, Added] = {}
+    waiting_for_others = list(range(len(sessions)))
+    while waiting_for_others:
+        for number in waiting_for_others:
+            answers[number] = add_session(
+                path, sessions[number], settings=settings, timeout_s=timeout_s, waiting=waiting
+            )
+        refused = [number for number in waiting_for_others if not answers[number].is_added]
+        if len(refused) == len(waiting_for_others):
+            break
+        waiting_for_others = refused
+    return [answers[number] for number in range(len(sessions))]
+
+
 def _start_in_place(
     path: Path, session: Session, settings: Settings | None, timeout_s: float, waiting: Waiting | None
 ) -> Added:
@@ -136,50 +181,85 @@ def _add(
         last_ids(connection)
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
-        known = fruits_in_map(connection, FruitCloud)
+        known = _worth_recognising(fruits_in_map(connection, FruitCloud))
         if not len(known):
             raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)
         if found.status.value != "Found":
             return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
-        return _join(connection, session, known, found, settings)
+        evidence = read_evidence(connection)
+        ids = np.array(known.ids, np.int64)
+        matches = matches_with_visits(evidence, new_visit(session), found, ids, settings)
+        placement = Placement(settings, found.log_odds, found.noise_m)
+        return _join(connection, session, evidence, matches, placement, found)
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:
     """Make the session's frame the map's, and each of its fruits a new one."""
     schema.create(connection, "map")
-    session_id = insert_session(connection, session)
-    fruit_ids = insert_fruits(connection, session_id, session.date, session.cloud)
-    insert_observations(connection, session_id, fruit_ids, session.cloud)
-    update_layers(connection)
-    return Added(fruit_ids, 0, len(fruit_ids), 0, None)
+    return _join(connection, session, Evidence((), ()), {})
 
 
 def _join(
-    connection: sqlite3.Connection, session: Session, known: FruitCloud, found: Match, settings: Settings
+    connection: sqlite3.Connection,
+    session: Session,
+    evidence: Evidence,
+    matches: Mapping[int, VisitPair],
+    placement: Placement | None = None,
+    found: Match | None = None,
 ) -> Added:
-    """Write the session: matched fruits keep their ids, the others get new ones, the map moves with the tree."""
-    assert found.map_from_query is not None
-    assert known.ids is not None
-    cloud_in_map = session.cloud.transformed(found.map_from_query)
-    known_ids = np.array(known.ids, dtype=np.int64)
-    is_newest = _is_newest(connection, session.date)
-    placement = Placement(found.map_from_query, settings, found.log_odds, found.noise_m)
-    session_id = insert_session(connection, session, placement)
-    rows, known_rows = found.pairs[:, 0], found.pairs[:, 1]
-    is_new = np.isin(np.arange(len(cloud_in_map)), rows, invert=True)
-    fruit_ids = np.zeros(len(cloud_in_map), dtype=np.int64)
-    fruit_ids[rows] = known_ids[known_rows]
-    fruit_ids[is_new] = insert_fruits(connection, session_id, session.date, cloud_in_map.select(is_new))
-    probabilities, distances_m = np.full((2, len(cloud_in_map)), np.nan)
-    probabilities[rows], distances_m[rows] = found.probabilities, found.distances_m
-    insert_observations(connection, session_id, fruit_ids, cloud_in_map, probabilities, distances_m)
-
-    _move_fruits(connection, session_id, session.date, cloud_in_map.select(rows), fruit_ids[rows])
-    missed = in_view_unseen(known.positions, np.isin(np.arange(len(known)), known_rows))
-    _count_misses(connection, known_ids[missed], is_newest=is_newest)
+    """Write the session and all that follows from it with the others."""
+    visit = new_visit(session)
+    together = evidence.with_visit(visit, matches)
+    settlement = settlement_of(connection, together)
+    own = together.number_of(0)
+    frame = settlement.conclusion.frames[own]
+    fruit_ids = settlement.fruit_ids[settlement.conclusion.sights.visits == own]
+    # Fruits come after their observations: where they hang, the last observation says.
+    connection.execute("PRAGMA defer_foreign_keys = ON")
+    session_id = insert_session(connection, session, frame, placement)
+    observation_ids = insert_observations(connection, session_id, fruit_ids, session.cloud.transformed(frame))
+    added = replace(
+        visit,
+        session_id=session_id,
+        map_from_session=frame,
+        observation_ids=observation_ids,
+        fruit_ids=fruit_ids,
+    )
+    together = together.with_known(added)
+    for pair in together.pairs:
+        if own in (pair.first, pair.second):
+            one, other = together.visits[pair.first], together.visits[pair.second]
+            ids = (one.session_id, other.session_id), (one.observation_ids, other.observation_ids)
+            insert_matches(connection, pair, *ids)
+    settle(connection, together, settlement)
+    write_changes(connection, "added", session.name, settlement.changes)
     update_layers(connection)
-    return Added(fruit_ids, len(rows), int(is_new.sum()), len(missed), found)
+    return _told(settlement, own, found)
+
+
+def _worth_recognising(fruits: FruitCloud) -> FruitCloud:
+    """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
+    judged = zip(fruits.extras["state"], fruits.extras["fruit_probability"], strict=True)
+    may_hang = np.array([state != "gone" and (state != "missed" or float(p or 1) > 0.5) for state, p in judged], bool)
+    return fruits.select(may_hang) if may_hang.any() else fruits
+
+
+def _told(settlement: Settlement, own: int, found: Match | None) -> Added:
+    """Say what became of a session that is there now."""
+    conclusion = settlement.conclusion
+    looks = conclusion.looks
+    is_elsewhere = looks.seen.sum(axis=1) > looks.seen[:, own]
+    n_matched = int((looks.seen[:, own] & is_elsewhere).sum())
+    n_seen = int(looks.seen[:, own].sum())
+    return Added(
+        fruit_ids=settlement.fruit_ids[conclusion.sights.visits == own],
+        n_matched=n_matched,
+        n_new=n_seen - n_matched,
+        n_missed=int((looks.in_view[:, own] & ~looks.seen[:, own]).sum()),
+        match=found,
+        changes=tuple(settlement.changes),
+    )
 
 
 def _require_new(connection: sqlite3.Connection, session: Session) -> None:
@@ -194,34 +274,3 @@ def _require_new(connection: sqlite3.Connection, session: Session) -> None:
             raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same fruits")
         if session.input_hashes and input_hashes == session.input_hashes_json:
             raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same input files")
-
-
-def _is_newest(connection: sqlite3.Connection, date: str) -> bool:
-    (dates,) = columns_of(connection, "sessions", ("date",))
-    return bool(date >= max(dates))
-
-
-def _move_fruits(
-    connection: sqlite3.Connection, session_id: int, date: str, matched_in_map: FruitCloud, fruit_ids: NDArray[np.int64]
-) -> None:
-    """Put matched fruits where the session saw them, unless a later visit has seen them since."""
-    ids = fruit_ids.tolist()
-    connection.executemany("UPDATE fruits SET n_sessions = n_sessions + 1 WHERE id = ?", ((i,) for i in ids))
-    diameters_m = matched_in_map.diameters_m
-    sizes = [None] * len(ids) if diameters_m is None else [d if d == d else None for d in diameters_m.tolist()]
-    connection.executemany(
-        """UPDATE fruits SET geom = ?, state = 'seen', last_seen = ?, last_session_id = ?,
-        diameter_m = coalesce(?, diameter_m) WHERE id = ? AND last_seen <= ?""",
-        (
-            (geom, date, session_id, size, fruit_id, date)
-            for geom, size, fruit_id in zip(geopackage.points(matched_in_map.positions), sizes, ids, strict=True)
-        ),
-    )
-
-
-def _count_misses(connection: sqlite3.Connection, fruit_ids: NDArray[np.int64], *, is_newest: bool) -> None:
-    """Count a miss; the state is that of the newest visit."""
-    connection.executemany(
-        "UPDATE fruits SET n_missed = n_missed + 1, state = CASE WHEN ? THEN 'missed' ELSE state END WHERE id = ?",
-        ((is_newest, fruit_id) for fruit_id in fruit_ids.tolist()),
-    )

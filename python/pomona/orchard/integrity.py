@@ -6,9 +6,8 @@ import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
-from pomona.orchard.replay import replayed, sighted
+from pomona.orchard.evidence import read_evidence
+from pomona.orchard.settling import FruitRow, fruit_rows, settlement_of
 from pomona.store.cells import COLUMNS
 from pomona.store.failures import WrongContentError
 from pomona.store.numbering import misnumbered
@@ -62,7 +61,7 @@ def _contradictions(connection: sqlite3.Connection) -> list[str]:
     wrong = [line for table in COLUMNS for line in misfits(connection, table)]
     broken = [line for query in INVARIANTS for (line,) in connection.execute(query) if line is not None]
     found = wrong + list(_dangling(connection)) + broken + misnumbered(connection)
-    return found or list(_miscounted(connection))
+    return found or list(_unsettled(connection))
 
 
 def _dangling(connection: sqlite3.Connection) -> Iterator[str]:
@@ -71,13 +70,27 @@ def _dangling(connection: sqlite3.Connection) -> Iterator[str]:
             yield f"{table} {row} points to a row of {parent} that is not there"
 
 
-def _miscounted(connection: sqlite3.Connection) -> Iterator[str]:
-    """Compare what only the whole history tells; that of a map whose places are wrong would be another one."""
-    fruits = replayed(sighted(connection))
-    states = np.where(fruits.is_missed, "missed", "seen").tolist()
-    told = columns_of(connection, "fruits", ("id", "state", "n_missed", "last_session_id"))
-    history = (fruits.ids.tolist(), states, fruits.n_missed.tolist(), fruits.last_session_ids.tolist())
-    for (fruit_id, *found), (_, *expected) in zip(zip(*told, strict=True), zip(*history, strict=True), strict=True):
-        for what, one, other in zip(("state", "n_missed", "last_session_id"), found, expected, strict=True):
+def _unsettled(connection: sqlite3.Connection) -> Iterator[str]:
+    """Compare identities and states with what follows from all sessions; a map of format 1 never was settled."""
+    (judged,) = columns_of(connection, "fruits", ("state_probability",))
+    if None in judged:
+        return
+    evidence = read_evidence(connection)
+    settlement = settlement_of(connection, evidence)
+    for change in settlement.changes:
+        yield (
+            f"fruit {change.from_fruit_id} has {change.n_observations} observations that from what the sessions saw "
+            f"are of fruit {change.to_fruit_id}"
+        )
+    if not settlement.changes:
+        yield from _misjudged(connection, fruit_rows(connection, evidence, settlement))
+
+
+def _misjudged(connection: sqlite3.Connection, rows: dict[int, FruitRow]) -> Iterator[str]:
+    names = ("state", "n_missed", "last_session_id")
+    told = columns_of(connection, "fruits", ("id", *names))
+    for fruit_id, *found in zip(*told, strict=True):
+        _, state, _, last_session_id, _, n_missed, *_ = rows[fruit_id]
+        for name, one, other in zip(names, found, (state, n_missed, last_session_id), strict=True):
             if one != other:
-                yield f"fruit {fruit_id} has the {what} {one}, from what the sessions saw follows {other}"
+                yield f"fruit {fruit_id} has the {name} {one}, from what the sessions saw follows {other}"

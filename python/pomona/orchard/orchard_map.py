@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
+from pomona.orchard.fruit_ids import Change
 from pomona.store.cells import finite_json
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
@@ -32,7 +33,7 @@ class Visit:
     map_from_session : (4, 4) float64
         Rigid transform into the map.
     n_fruits, n_matched : int
-        Fruits the session saw, and how many of them the map knew.
+        Fruits the session saw, and how many of them a visit before had seen.
     method : str or None
         How it was matched; None for the first.
     log_odds, noise_m : float or None
@@ -67,7 +68,7 @@ class Observations:
     diameters_m : (K,) float64
         NaN where unknown.
     probabilities : (K,) float64
-        Of the match; NaN where the session was the first to see the fruit.
+        That it is this fruit; NaN for the first sight of the fruit.
     """
 
     fruit_ids: NDArray[np.int64]
@@ -178,6 +179,13 @@ class OrchardMap:
             Visit(name, date, recording, np.array(finite_json(transform)), n_fruits[i], n_matched[i], *about_match)
             for i, name, date, recording, transform, *about_match in rows
         )
+
+    def changes(self) -> list[tuple[str, str, Change]]:
+        """Return what later evidence changed, in order: cause (added, removed), session, and the change."""
+        names = ("cause", "session", "event", "from_fruit_id", "to_fruit_id", "n_observations")
+        with snapshot(self.path) as (connection, _):
+            rows = zip(*columns_of(connection, "changes", names), strict=True)
+            return [(cause, session, Change(*change)) for cause, session, *change in rows]
 
     def observations(self) -> Observations:
         """Return what was seen of each fruit, in order of fruit and date."""

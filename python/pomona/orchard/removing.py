@@ -6,12 +6,10 @@ import sqlite3
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pomona import geopackage
-from pomona.orchard.replay import ReplayedFruits, replayed, sighted
-from pomona.orchard.writing import nullable, update_layers
+from pomona.orchard.evidence import read_evidence
+from pomona.orchard.fruit_ids import Change
+from pomona.orchard.settling import FruitRow, fruit_rows, settle, settlement_of, write_changes
+from pomona.orchard.writing import update_layers
 from pomona.store.failures import WrongContentError
 from pomona.store.opening import TIMEOUT_S, Waiting, writing
 from pomona.store.rows import columns_of
@@ -19,9 +17,10 @@ from pomona.store.rows import columns_of
 __all__ = ["Removed", "remove_session"]
 
 PARTS = (
-    "DELETE FROM sightings WHERE observation_id IN (SELECT id FROM observations WHERE session_id = ?)",
-    "DELETE FROM observations WHERE session_id = ?",
-    "DELETE FROM poses WHERE session_id = ?",
+    "DELETE FROM sightings WHERE observation_id IN (SELECT id FROM observations WHERE session_id = :session)",
+    "DELETE FROM observations WHERE session_id = :session",
+    "DELETE FROM poses WHERE session_id = :session",
+    "DELETE FROM matches WHERE :session IN (first_session_id, second_session_id)",
 )
 """What belongs to a session, in an order that leaves no row without the one it points to."""
 
@@ -37,15 +36,18 @@ class Removed:
     n_gone : int
         Those that no other session has seen; they are gone.
     n_changed : int
-        Fruits that are now where another session saw them, or are no longer missed.
+        Fruits that are now where another session saw them, or of another state.
     n_left : int
         Sessions that are left.
+    changes : tuple of Change
+        Observations of other sessions that now are of another fruit.
     """
 
     n_observations: int
     n_gone: int
     n_changed: int
     n_left: int
+    changes: tuple[Change, ...] = ()
 
 
 def remove_session(
@@ -54,7 +56,8 @@ def remove_session(
     """Undo `add_session`: the session, its observations, sightings and poses go, in one transaction.
 
     Fruits that only it saw go too, and their ids are never given out again. The others fall back to where the last of
-    the remaining sessions saw them; hits and misses are counted anew. The frame of the map stays, whoever goes.
+    the remaining sessions saw them; identities, hits and misses follow from those. The frame of the map stays, whoever
+    goes.
 
     Parameters
     ----------
@@ -85,56 +88,39 @@ def remove_session(
             return None
         if len(ids) == 1:
             raise WrongContentError(f"{name} is its only session, and a map has at least one: delete the file instead")
-        return _remove(connection, ids[names.index(name)], dry=dry)
+        return _remove(connection, name, ids[names.index(name)], dry=dry)
 
 
-def _remove(connection: sqlite3.Connection, session_id: int, *, dry: bool) -> Removed:
-    visits = sighted(connection)
-    before = replayed(visits)
-    after = replayed([visit for visit in visits if visit.session_id != session_id])
-    going = next(visit for visit in visits if visit.session_id == session_id)
-    kept = np.isin(before.ids, after.ids)
-    changed = _changed(before, after, kept)
+def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: bool) -> Removed:
+    evidence = read_evidence(connection)
+    going = evidence.visits[evidence.number_of(session_id)]
+    rest = evidence.without_session(session_id)
+    settlement = settlement_of(connection, rest)
+    before = _fruits(connection)
     if not dry:
         for part in PARTS:
-            connection.execute(part, (session_id,))
-        connection.executemany("DELETE FROM fruits WHERE id = ?", ((i,) for i in before.ids[~kept].tolist()))
-        _write_fruits(connection, after)
-        _forget_matches(connection, after)
+            connection.execute(part, {"session": session_id})
+    after = fruit_rows(connection, rest, settlement)
+    if not dry:
+        settle(connection, rest, settlement)
+        write_changes(connection, "removed", name, settlement.changes)
         connection.execute("DELETE FROM sessions WHERE id = ?", (session_id,))
         update_layers(connection)
-    return Removed(len(going.fruit_ids), int((~kept).sum()), int(changed.sum()), len(visits) - 1)
-
-
-def _changed(before: ReplayedFruits, after: ReplayedFruits, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which of the remaining fruits are elsewhere or no longer missed, (N,)."""
-    moved = (before.positions[kept] != after.positions).any(axis=1)
-    changed: NDArray[np.bool_] = moved | (before.is_missed[kept] != after.is_missed)
-    return changed
-
-
-def _write_fruits(connection: sqlite3.Connection, fruits: ReplayedFruits) -> None:
-    connection.executemany(
-        """UPDATE fruits SET geom = ?, state = ?, last_seen = ?, last_session_id = ?, n_sessions = ?, n_missed = ?,
-        diameter_m = ? WHERE id = ?""",
-        zip(
-            geopackage.points(fruits.positions),
-            np.where(fruits.is_missed, "missed", "seen").tolist(),
-            fruits.last_seen.tolist(),
-            fruits.last_session_ids.tolist(),
-            fruits.n_sessions.tolist(),
-            fruits.n_missed.tolist(),
-            nullable(fruits.diameters_m),
-            fruits.ids.tolist(),
-            strict=True,
-        ),
+    n_changed = sum(_place_and_state(row) != before[fruit_id] for fruit_id, row in after.items() if fruit_id in before)
+    return Removed(
+        n_observations=len(going.cloud),
+        n_gone=len(before.keys() - after.keys()),
+        n_changed=n_changed,
+        n_left=len(rest.visits),
+        changes=tuple(settlement.changes),
     )
 
 
-def _forget_matches(connection: sqlite3.Connection, fruits: ReplayedFruits) -> None:
-    """Make the sessions that are now the first to have seen a fruit say so: their matches were with what is gone."""
-    connection.executemany(
-        """UPDATE observations SET match_probability = NULL, match_distance_m = NULL
-        WHERE id = ? AND match_probability IS NOT NULL""",
-        ((i,) for i in fruits.first_observation_ids.tolist()),
-    )
+def _fruits(connection: sqlite3.Connection) -> dict[int, tuple[bytes, str]]:
+    """Return place and state of each fruit."""
+    ids, geoms, states = columns_of(connection, "fruits", ("id", "geom", "state"))
+    return dict(zip(ids, zip(geoms, states, strict=True), strict=True))
+
+
+def _place_and_state(row: FruitRow) -> tuple[bytes, str]:
+    return row[0], row[1]

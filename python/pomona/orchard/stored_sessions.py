@@ -19,7 +19,7 @@ from pomona.store.rows import columns_of
 from pomona.store.stored_fruits import OF_SESSION, observed_cloud, only_session
 from pomona.trajectory import Trajectory
 
-__all__ = ["read_session"]
+__all__ = ["cameras_in_map", "read_session"]
 
 
 def read_session(path: str | Path) -> Session:
@@ -42,6 +42,17 @@ def read_session(path: str | Path) -> Session:
 
 
 def _trajectory(connection: sqlite3.Connection, session_id: int) -> Trajectory | None:
+    found = cameras_in_map(connection, session_id)
+    if found is None:
+        return None
+    with content("poses"):
+        return Trajectory(*found)
+
+
+def cameras_in_map(
+    connection: sqlite3.Connection, session_id: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return frames, (F,), times in seconds, (F,), and `map_from_camera`, (F, 4, 4), of a session that has them."""
     from scipy.spatial.transform import Rotation
 
     names = ("id", "geom", "frame", "time_s", "qx", "qy", "qz", "qw")
@@ -53,8 +64,7 @@ def _trajectory(connection: sqlite3.Connection, session_id: int) -> Trajectory |
     poses = np.tile(np.eye(4), (len(ids), 1, 1))
     poses[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix()
     poses[:, :3, 3] = geopackage.points_of(geoms)
-    with content("poses"):
-        return Trajectory(np.array(frames), np.array(times_s), poses)
+    return np.array(frames, np.int64), np.array(times_s, np.float64), poses
 
 
 def _require_units(ids: Sequence[int], quaternions: NDArray[np.float64]) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
+from pomona.identity import VisitPair
 from pomona.orchard.session import Session
 from pomona.settings import Settings
 from pomona.store import schema
@@ -23,8 +24,11 @@ from pomona.trajectory import Trajectory
 
 __all__ = [
     "Placement",
+    "covariance_cells",
     "insert_fruits",
+    "insert_matches",
     "insert_observations",
+    "insert_poses",
     "insert_session",
     "nullable",
     "update_layers",
@@ -34,9 +38,8 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """How a session came to its place in the map: what `sessions` notes of the match. Without one, it is the frame."""
+    """How a session was found in the map: what `sessions` notes of the match."""
 
-    map_from_session: NDArray[np.float64]
     settings: Settings
     log_odds: float
     noise_m: float
@@ -87,15 +90,19 @@ def write_session(
     session = Session(name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {})
     with whole_file(path) as partial, blank(partial, Path(path)) as connection:
         schema.create(connection, "session")
-        session_id = insert_session(connection, session)
+        session_id = insert_session(connection, session, np.eye(4))
         fruit_ids = insert_fruits(connection, session_id, session.date, cloud)
         insert_observations(connection, session_id, fruit_ids, cloud)
         update_layers(connection)
 
 
-def insert_session(connection: sqlite3.Connection, session: Session, placement: Placement | None = None) -> int:
+def insert_session(
+    connection: sqlite3.Connection,
+    session: Session,
+    map_from_session: NDArray[np.float64],
+    placement: Placement | None = None,
+) -> int:
     """Add the session, its provenance and its poses; return its number. Fruits follow."""
-    map_from_session = np.eye(4) if placement is None else placement.map_from_session
     cursor = connection.execute(
         """INSERT INTO sessions (name, date, recording, content_sha256, map_from_session, program_version,
         configuration, input_hashes, method, settings, log_odds, noise_m)
@@ -114,7 +121,7 @@ def insert_session(connection: sqlite3.Connection, session: Session, placement: 
     )
     session_id = int(cursor.lastrowid or 0)
     if session.trajectory is not None:
-        _insert_poses(connection, session_id, session.trajectory, map_from_session)
+        insert_poses(connection, session_id, session.trajectory, map_from_session)
     return session_id
 
 
@@ -144,32 +151,24 @@ def insert_observations(
     session_id: int,
     fruit_ids: NDArray[np.int64],
     cloud_in_map: FruitCloud,
-    probabilities: NDArray[np.float64] | None = None,
-    distances_m: NDArray[np.float64] | None = None,
-) -> None:
-    """Add what the session saw of each fruit, one row of the cloud each; NaN where nothing was matched."""
+) -> NDArray[np.int64]:
+    """Add what the session saw of each fruit, one row of the cloud each; return their numbers, (N,)."""
     n = len(cloud_in_map)
     last = last_ids(connection).get("observations", 0)
-    cells = np.full((n, 6), np.nan)
-    if cloud_in_map.covariances is not None:
-        cells = cloud_in_map.covariances.reshape(n, 9)[:, [0, 4, 8, 1, 2, 5]]
-    blank = np.full(n, np.nan)
     columns = zip(
         range(last + 1, last + 1 + n),
         geopackage.points(cloud_in_map.positions),
         fruit_ids.tolist(),
         cloud_in_map.ids or [None] * n,
         _diameters(cloud_in_map),
-        *(nullable(column) for column in cells.T),
+        *(nullable(column) for column in covariance_cells(cloud_in_map).T),
         [None] * n if cloud_in_map.n_views is None else cloud_in_map.n_views.tolist(),
-        nullable(blank if probabilities is None else probabilities),
-        nullable(blank if distances_m is None else distances_m),
         _other_columns(cloud_in_map),
         strict=True,
     )
     connection.executemany(
         f"""INSERT INTO observations (session_id, id, geom, fruit_id, label, diameter_m, cxx, cyy, czz, cxy, cxz, cyz,
-        n_views, match_probability, match_distance_m, other_columns) VALUES ({session_id:d}{", ?" * 15})""",
+        n_views, other_columns) VALUES ({session_id:d}{", ?" * 13})""",
         columns,
     )
     if cloud_in_map.views is not None:
@@ -181,6 +180,30 @@ def insert_observations(
                 strict=True,
             ),
         )
+    return np.arange(last + 1, last + 1 + n)
+
+
+def insert_matches(
+    connection: sqlite3.Connection,
+    pair: VisitPair,
+    session_ids: tuple[int, int],
+    observation_ids: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> None:
+    """Note how two sessions match; `observation_ids` are those of their rows."""
+    first, second = (ids[rows] for ids, rows in zip(observation_ids, pair.rows.T, strict=True))
+    pairs = zip(first.tolist(), second.tolist(), pair.probabilities.tolist(), strict=True)
+    connection.execute(
+        """INSERT INTO matches (first_session_id, second_session_id, first_from_second, log_odds, pairs)
+        VALUES (?, ?, ?, ?, ?)""",
+        (*session_ids, json.dumps(pair.first_from_second.tolist()), pair.log_odds, json.dumps(list(pairs))),
+    )
+
+
+def covariance_cells(cloud: FruitCloud) -> NDArray[np.float64]:
+    """Return the columns cxx, cyy, czz, cxy, cxz, cyz, (N, 6); NaN where unknown."""
+    if cloud.covariances is None:
+        return np.full((len(cloud), 6), np.nan)
+    return cloud.covariances.reshape(len(cloud), 9)[:, [0, 4, 8, 1, 2, 5]]
 
 
 def update_layers(connection: sqlite3.Connection) -> None:
@@ -191,9 +214,10 @@ def update_layers(connection: sqlite3.Connection) -> None:
         geopackage.touch(connection, name, f"{day}T{time[:8] or '00:00:00'}.000Z")
 
 
-def _insert_poses(
+def insert_poses(
     connection: sqlite3.Connection, session_id: int, trajectory: Trajectory, map_from_session: NDArray[np.float64]
 ) -> None:
+    """Add the cameras of a session in the map's frame."""
     from scipy.spatial.transform import Rotation
 
     if not len(trajectory):

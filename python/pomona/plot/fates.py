@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.orchard.replay import in_view_unseen
-
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
 
 __all__ = ["Fates"]
+
+NEIGHBOURS = 5
+"""A fruit was in view when most of its five nearest fruits were seen: as many as make a constellation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class Fates:
         in_map = query.positions @ pose[:3, :3].T + pose[:3, 3]
         again, known = match.pairs.T
         seen = np.isin(np.arange(len(map)), known)
-        missed = np.isin(np.arange(len(map)), in_view_unseen(map.positions, seen))
+        missed = np.isin(np.arange(len(map)), _in_view_unseen(map.positions, seen))
         return cls(
             was=map.positions[known],
             found=in_map[again],
@@ -54,3 +55,16 @@ class Fates:
             missed=map.positions[missed],
             elsewhere=map.positions[~seen & ~missed],
         )
+
+
+def _in_view_unseen(positions: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the rows of known fruits, (N, 3), that were in view, by their neighbours, and were not seen, (N,)."""
+    from scipy.spatial import cKDTree
+
+    neighbours = min(NEIGHBOURS, len(positions) - 1)
+    unseen = np.flatnonzero(~seen)
+    if neighbours < 1 or not len(unseen):
+        return unseen[:0]
+    _, nearest = cKDTree(positions).query(positions[unseen], k=list(range(2, neighbours + 2)))
+    in_view: NDArray[np.bool_] = 2 * seen[nearest].sum(axis=1) > neighbours
+    return unseen[in_view]

@@ -70,6 +70,11 @@ def _text(expected: str, is_right: Callable[[str], bool] = bool) -> CellKind:
     return CellKind(expected, str, lambda cells: _are_unicode(cells) and all(map(is_right, set(cells))))
 
 
+def _one_of(*words: str) -> CellKind:
+    *before, last = (f"'{word}'" for word in words)
+    return _text(f"{', '.join(before)} or {last}", words.__contains__)
+
+
 def _json(expected: str, is_right: Callable[[Any], bool]) -> CellKind:
     return _text(expected, lambda text: is_right(finite_json(text)))
 
@@ -123,6 +128,13 @@ def _are_places(blobs: Sequence[bytes]) -> bool:
     return geopackage.are_points(blobs) and bool(np.abs(geopackage.points_of(blobs)).max() <= FARTHEST_M)
 
 
+def _are_pairs(value: object) -> bool:
+    """Tell whether these are rows of two ids and a probability."""
+    return isinstance(value, list) and all(
+        isinstance(row, list) and list(map(type, row)) == [int, int, float] and 0.0 <= row[2] <= 1.0 for row in value
+    )
+
+
 def _texts_by_name(value: object) -> bool:
     return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
 
@@ -136,6 +148,7 @@ DATE = _text("ISO 8601 local time as 2021-09-27 or 2021-09-27T11:40:12", _is_dat
 OBJECT = _json("a JSON object", lambda value: isinstance(value, dict))
 HASHES = _json("a JSON object of texts", _texts_by_name)
 TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
+PAIRS = _json("a JSON list of [observation id, observation id, probability]", _are_pairs)
 POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
 FINITE = _number("a finite number", -np.finfo(float).max, np.finfo(float).max)
 SQUARE = _number("square metres", -(FARTHEST_M**2), FARTHEST_M**2)
@@ -165,12 +178,14 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
     "fruits": {
         "id": ID,
         "geom": POINT,
-        "state": _text("'seen' or 'missed'", ("seen", "missed").__contains__),
+        "state": _one_of("new", "seen", "missed", "gone"),
         "last_seen": DATE,
         "last_session_id": ID,
         "n_sessions": ID,
         "n_missed": COUNT,
         "diameter_m": _or_null(DIAMETER),
+        "state_probability": _or_null(SHARE),
+        "fruit_probability": _or_null(SHARE),
     },
     "observations": {
         "id": ID,
@@ -193,6 +208,23 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
         "frame": WHOLE,
         "time_s": FINITE,
         **dict.fromkeys(("qx", "qy", "qz", "qw"), UNIT),
+    },
+    "matches": {
+        "id": ID,
+        "first_session_id": ID,
+        "second_session_id": ID,
+        "first_from_second": TRANSFORM,
+        "log_odds": NUMBER,
+        "pairs": PAIRS,
+    },
+    "changes": {
+        "id": ID,
+        "cause": _one_of("added", "removed"),
+        "session": NAME,
+        "event": _one_of("joined", "split", "moved"),
+        "from_fruit_id": ID,
+        "to_fruit_id": ID,
+        "n_observations": ID,
     },
 }
 """The columns that Pomona reads, and what they may hold; the layers `trees` and `rows` are the user's."""

@@ -31,7 +31,9 @@ PRAGMAS = frozenset(
     (
         "application_id",
         "busy_timeout",
+        "defer_foreign_keys",
         "foreign_key_check",
+        "foreign_keys",
         "integrity_check",
         "page_count",
         "page_size",

@@ -13,6 +13,7 @@ from pomona.errors import PomonaError
 from pomona.store import recovery, shape
 from pomona.store.failures import DAMAGED, WrongContentError, told
 from pomona.store.guard import guard, release, trust
+from pomona.store.migration import migrate, migrated_copy
 from pomona.store.rows import columns_of
 from pomona.store.schema import FORMAT_VERSION, Kind
 
@@ -39,7 +40,13 @@ def snapshot(path: Path) -> Iterator[tuple[sqlite3.Connection, Kind]]:
     """
     _require_there(path)
     with told(path), _begun(path) as connection:
-        yield connection, _kind_of(connection)
+        kind, version = _about(connection)
+        if version == FORMAT_VERSION:
+            yield connection, kind
+        else:
+            with migrated_copy(connection) as copy:
+                guard(copy, path.stat().st_size)
+                yield copy, kind
 
 
 @contextmanager
@@ -54,13 +61,14 @@ def writing(
         _require_there(path)
     with told(path), _connection(path, create=create, timeout_s=timeout_s) as connection:
         _begin_to_write(connection, timeout_s, waiting)
+        _migrate_older(connection, path, kind, timeout_s)
         with _transaction(connection):
             _load_schema(connection)
             if create and _is_blank(connection):
                 release(connection)
                 yield connection, True
             else:
-                _require_kind(_kind_of(connection), kind)
+                _require_kind(_about(connection)[0], kind)
                 trust(connection)
                 yield connection, False
 
@@ -137,6 +145,27 @@ def _begin_to_write(connection: sqlite3.Connection, timeout_s: float, waiting: W
     connection.execute(f"PRAGMA busy_timeout = {int(1000 * timeout_s)}")
 
 
+def _migrate_older(connection: sqlite3.Connection, path: Path, kind: Kind, timeout_s: float) -> None:
+    """Bring an older file up to date, in a transaction of its own; the one that was begun is there afterwards again."""
+    _load_schema(connection)
+    if _is_blank(connection):
+        return
+    found, version = _about(connection)
+    if version == FORMAT_VERSION:
+        return
+    _require_kind(found, kind)
+    connection.execute("ROLLBACK")
+    # Tables are laid out anew under those that refer to them; SQLite lets nobody say so later than here.
+    connection.execute("PRAGMA foreign_keys = OFF")
+    _begin_to_write(connection, timeout_s, None)
+    with _transaction(connection):
+        if _about(connection)[1] != FORMAT_VERSION:
+            release(connection)
+            migrate(connection)
+    guard(connection, path.stat().st_size)
+    _begin_to_write(connection, timeout_s, None)
+
+
 @contextmanager
 def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
     try:
@@ -164,8 +193,8 @@ def _is_blank(connection: sqlite3.Connection) -> bool:
     return connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None
 
 
-def _kind_of(connection: sqlite3.Connection) -> Kind:
-    """Return what the file is; refuse one that is not ours or from a newer program."""
+def _about(connection: sqlite3.Connection) -> tuple[Kind, int]:
+    """Return what the file is and its format; refuse one that is not ours or from a newer program."""
     (application_id,) = connection.execute("PRAGMA application_id").fetchone()
     if application_id == 0 and _is_blank(connection):
         raise WrongContentError("is empty: a map that another program is making just now, or never finished; try again")
@@ -176,16 +205,18 @@ def _kind_of(connection: sqlite3.Connection) -> Kind:
         raise WrongContentError("is a GeoPackage but not one of pomona: it has no table pomona_format")
     # The table that tells the version has been the same in every version.
     shape.require_item(items, shape.expected()["table", "pomona_format"])
-    kind = _kind_of_format(connection)
-    shape.require_ours(items)
-    return kind
+    kind, version = _kind_and_version(connection)
+    shape.require_ours(items, version)
+    return kind, version
 
 
-def _kind_of_format(connection: sqlite3.Connection) -> Kind:
+def _kind_and_version(connection: sqlite3.Connection) -> tuple[Kind, int]:
     versions, kinds = columns_of(connection, "pomona_format", ("format_version", "kind"))
     version, kind = (versions[0], kinds[0]) if len(versions) == 1 else (None, None)
     if version is not None and version > FORMAT_VERSION:
         raise WrongContentError(f"has format {version}, this program reads up to {FORMAT_VERSION}: update pomona")
-    if version != FORMAT_VERSION or kind not in ("session", "map"):
-        raise WrongContentError(f"has format {version} and kind {kind!r}, expected 1 and 'session' or 'map'")
-    return "session" if kind == "session" else "map"
+    if version is None or version < 1 or kind not in ("session", "map"):
+        raise WrongContentError(
+            f"has format {version} and kind {kind!r}, expected 1 to {FORMAT_VERSION} and 'session' or 'map'"
+        )
+    return "session" if kind == "session" else "map", version

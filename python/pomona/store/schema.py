@@ -7,10 +7,10 @@ from typing import Literal
 
 from pomona import __version__, geopackage
 
-__all__ = ["FORMAT_VERSION", "LAYERS", "Kind", "create"]
+__all__ = ["FORMAT_VERSION", "LAYERS", "Kind", "create", "layers_of"]
 
-FORMAT_VERSION = 1
-"""Counts the changes of the tables below. Version 1 is the first: no older file exists that could be migrated."""
+FORMAT_VERSION = 2
+"""Counts the changes of the tables below; `migration.py` brings older files up to date."""
 
 Kind = Literal["session", "map"]
 
@@ -28,9 +28,10 @@ LAYERS = (
     (
         "fruits",
         "POINT",
-        """state TEXT NOT NULL CHECK (state IN ('seen', 'missed')), last_seen TEXT NOT NULL,
+        """state TEXT NOT NULL CHECK (state IN ('new', 'seen', 'missed', 'gone')), last_seen TEXT NOT NULL,
         last_session_id INTEGER NOT NULL REFERENCES sessions(id), n_sessions INTEGER NOT NULL,
-        n_missed INTEGER NOT NULL DEFAULT 0, diameter_m REAL, tree_id INTEGER REFERENCES trees(id)""",
+        n_missed INTEGER NOT NULL DEFAULT 0, diameter_m REAL, state_probability REAL, fruit_probability REAL,
+        tree_id INTEGER REFERENCES trees(id)""",
         "fruits where they were last seen; id is the fruit's for good",
     ),
     (
@@ -54,8 +55,30 @@ LAYERS = (
         qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, qw REAL NOT NULL, UNIQUE (session_id, frame)""",
         "cameras of each session in the map's frame: position and orientation (map_from_camera)",
     ),
+    (
+        "matches",
+        "",
+        """first_session_id INTEGER NOT NULL REFERENCES sessions(id),
+        second_session_id INTEGER NOT NULL REFERENCES sessions(id), first_from_second TEXT NOT NULL,
+        log_odds REAL NOT NULL, pairs TEXT NOT NULL, UNIQUE (first_session_id, second_session_id)""",
+        "how every two sessions match: what identities follow from",
+    ),
+    (
+        "changes",
+        "",
+        """cause TEXT NOT NULL CHECK (cause IN ('added', 'removed')), session TEXT NOT NULL,
+        event TEXT NOT NULL CHECK (event IN ('joined', 'split', 'moved')), from_fruit_id INTEGER NOT NULL,
+        to_fruit_id INTEGER NOT NULL, n_observations INTEGER NOT NULL""",
+        "observations that later evidence gave to another fruit",
+    ),
 )
 """Name, geometry, columns and description of each layer."""
+
+FRUITS_OF_VERSION_1 = """state TEXT NOT NULL CHECK (state IN ('seen', 'missed')), last_seen TEXT NOT NULL,
+        last_session_id INTEGER NOT NULL REFERENCES sessions(id), n_sessions INTEGER NOT NULL,
+        n_missed INTEGER NOT NULL DEFAULT 0, diameter_m REAL, tree_id INTEGER REFERENCES trees(id)"""
+
+SINCE_VERSION_2 = ("matches", "changes")
 
 INDEXES = """
 CREATE INDEX observations_by_fruit ON observations (fruit_id);
@@ -63,7 +86,18 @@ CREATE INDEX sightings_by_observation ON sightings (observation_id);
 """
 
 
-def create(connection: sqlite3.Connection, kind: Kind) -> None:
+def layers_of(version: int) -> tuple[tuple[str, str, str, str], ...]:
+    """Return the layers of a version of the format."""
+    if version == FORMAT_VERSION:
+        return LAYERS
+    return tuple(
+        (name, geometry, FRUITS_OF_VERSION_1 if name == "fruits" else columns, description)
+        for name, geometry, columns, description in LAYERS
+        if name not in SINCE_VERSION_2
+    )
+
+
+def create(connection: sqlite3.Connection, kind: Kind, version: int = FORMAT_VERSION) -> None:
     """Lay out an empty map in an empty database, inside the open transaction."""
     geopackage.create(connection)
     geopackage.add_table(
@@ -72,7 +106,7 @@ def create(connection: sqlite3.Connection, kind: Kind) -> None:
         "format_version INTEGER NOT NULL, kind TEXT NOT NULL, program_version TEXT NOT NULL",
         "version of these tables, and whether this is a session or a map",
     )
-    connection.execute("INSERT INTO pomona_format VALUES (1, ?, ?, ?)", (FORMAT_VERSION, kind, __version__))
-    for name, geometry, columns, description in LAYERS:
+    connection.execute("INSERT INTO pomona_format VALUES (1, ?, ?, ?)", (version, kind, __version__))
+    for name, geometry, columns, description in layers_of(version):
         geopackage.add_table(connection, name, columns, description, geometry)
     geopackage.execute_all(connection, INDEXES)

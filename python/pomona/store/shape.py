@@ -46,11 +46,11 @@ def shown(name: str) -> str:
 
 
 @functools.cache
-def expected() -> Mapping[tuple[str, str], Item]:
-    """Return what a new file of ours has, by kind and name: made by the code that makes files."""
+def expected(version: int = schema.FORMAT_VERSION) -> Mapping[tuple[str, str], Item]:
+    """Return what a file of ours has, by kind and name: made by the code that makes files."""
     connection = sqlite3.connect(":memory:")
     geopackage.add_functions(connection)
-    schema.create(connection, "map")
+    schema.create(connection, "map", version)
     items = {(item.kind, item.name): item for item in items_of(connection)}
     connection.close()
     return {key: item for key, item in items.items() if item.table != NOT_OURS_ALONE}
@@ -81,7 +81,7 @@ def require_item(items: Iterable[Item], wanted: Item) -> None:
         raise WrongContentError(f"{wanted}: is not as Pomona makes it: {_difference(named[0], wanted)}")
 
 
-def require_ours(items: list[Item]) -> None:
+def require_ours(items: list[Item], version: int) -> None:
     """Refuse a schema that is not ours, or that could act on our tables.
 
     Raises
@@ -89,7 +89,7 @@ def require_ours(items: list[Item]) -> None:
     WrongContentError
         With the first object that is wrong.
     """
-    for wanted in expected().values():
+    for wanted in expected(version).values():
         require_item(items, wanted)
     names = Counter(item.name for item in items if item.kind != "trigger")
     name, count = max(names.items(), key=lambda counted: counted[1])

@@ -26,6 +26,8 @@ COVARIANCE = ("cxx", "cxy", "cxz", "cxy", "cyy", "cyz", "cxz", "cyz", "czz")
 
 OF_SESSION = "WHERE session_id = {:d} ORDER BY id"
 
+PROBABILITIES = ("state_probability", "fruit_probability")
+
 AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id ORDER BY fruit_id"
 """The observation of each fruit by the session that saw it last."""
 
@@ -64,6 +66,7 @@ def fruits_in_map(connection: sqlite3.Connection, make: type[FruitCloud]) -> Fru
     ids, geoms, diameters_m, states, last_seen, last_session_ids, n_sessions, n_missed = columns_of(
         connection, "fruits", names
     )
+    probabilities = columns_of(connection, "fruits", PROBABILITIES)
     seen_ids, *cells = columns_of(connection, "observations", ("fruit_id", *COVARIANCE), AT_LAST)
     _require_seen(ids, last_session_ids, seen_ids)
     with content("fruits"):
@@ -77,6 +80,7 @@ def fruits_in_map(connection: sqlite3.Connection, make: type[FruitCloud]) -> Fru
                 "last_seen": tuple(last_seen),
                 "n_sessions": tuple(map(str, n_sessions)),
                 "n_missed": tuple(map(str, n_missed)),
+                **{name: _shares(cells) for name, cells in zip(PROBABILITIES, probabilities, strict=True)},
             },
         )
 
@@ -108,6 +112,10 @@ def _numbers(column: Sequence[float | None]) -> NDArray[np.float64] | None:
     """Return numbers with NaN for what is unknown; None when all of it is."""
     numbers = np.array(column, dtype=np.float64)
     return None if np.isnan(numbers).all() else numbers
+
+
+def _shares(column: Sequence[float | None]) -> tuple[str, ...]:
+    return tuple("" if cell is None else f"{cell:.4f}" for cell in column)
 
 
 def _covariances(cells: Sequence[Sequence[float | None]]) -> NDArray[np.float64] | None:

@@ -1,0 +1,6 @@
+"""One identity for each fruit over all visits: `conclusion.py` tells the story; equations in `docs/identities.md`."""
+
+from pomona.identity.conclusion import Conclusion, conclude
+from pomona.identity.visits import SeenVisit, VisitPair
+
+__all__ = ["Conclusion", "SeenVisit", "VisitPair", "conclude"]

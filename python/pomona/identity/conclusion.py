@@ -1,0 +1,113 @@
+"""The story: from what all visits saw to who is who, where everybody hangs, and who is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.identity.common_frame import frames_of_visits
+from pomona.identity.contraction import contracted
+from pomona.identity.links import Links, links_of
+from pomona.identity.lives import Lives, lives_of, states_of
+from pomona.identity.looks import Looks, chances_of_missing, looks_of
+from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
+
+__all__ = ["Conclusion", "conclude"]
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """What follows from all visits together; S sights in the order of the visits, V visits, K fruits.
+
+    Attributes
+    ----------
+    sights : Sights
+    labels : (S,) int64
+        Fruit of each sight, from 0.
+    frames : (V, 4, 4) float64
+        `map_from_visit`.
+    positions : (S, 3) float64
+        In the map.
+    probabilities : (S,) float64
+        That the sight is of its fruit, by its best link; NaN for the first sight of each fruit.
+    distances_m : (S,) float64
+        From the fruit's sight before, NaN for the first.
+    looks : Looks
+    lives : Lives
+    states : list of str
+        Of each fruit: new, seen, missed or gone.
+    state_probabilities : (K,) float64
+    """
+
+    sights: Sights
+    labels: NDArray[np.int64]
+    frames: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    probabilities: NDArray[np.float64]
+    distances_m: NDArray[np.float64]
+    looks: Looks
+    lives: Lives
+    states: list[str]
+    state_probabilities: NDArray[np.float64]
+
+
+def conclude(
+    visits: Sequence[SeenVisit], pairs: Sequence[VisitPair], known: NDArray[np.float64], keepers: Sequence[int]
+) -> Conclusion:
+    """Say who is who, from all visits at once.
+
+    Nothing here depends on the order in which the visits came; only the frame of the map does.
+
+    Parameters
+    ----------
+    visits
+        In the order of their keys.
+    pairs
+        Matches of two visits, found in one another.
+    known, keepers
+        As for `frames_of_visits`.
+    """
+    sights = all_sights(visits)
+    links = links_of(sights, pairs)
+    labels = contracted(sights, links)
+    frames = frames_of_visits(visits, pairs, known, keepers)
+    positions = np.concatenate(
+        [visit.positions @ frame[:3, :3].T + frame[:3, 3] for visit, frame in zip(visits, frames, strict=True)]
+    )
+    before = _sights_before(labels)
+    looks = looks_of(visits, sights, labels, positions, frames)
+    lives = lives_of(looks.seen, chances_of_missing(looks))
+    states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
+    return Conclusion(
+        sights=sights,
+        labels=labels,
+        frames=frames,
+        positions=positions,
+        probabilities=np.where(before < 0, np.nan, _best_links(links, labels)),
+        distances_m=np.where(before < 0, np.nan, np.linalg.norm(positions - positions[before], axis=1)),
+        looks=looks,
+        lives=lives,
+        states=states,
+        state_probabilities=state_probabilities,
+    )
+
+
+def _sights_before(labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the sight of the same fruit before each, -1 where there is none."""
+    order = np.argsort(labels, kind="stable")
+    before = np.full(len(labels), -1)
+    same = labels[order][1:] == labels[order][:-1]
+    before[order[1:][same]] = order[:-1][same]
+    return before
+
+
+def _best_links(links: Links, labels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the probability of the surest link of each sight with its fruit, (S,)."""
+    best = np.full(len(labels), -np.inf)
+    inside = labels[links.sights[:, 0]] == labels[links.sights[:, 1]]
+    for side in (0, 1):
+        np.maximum.at(best, links.sights[inside, side], links.log_odds[inside])
+    return np.asarray(1.0 / (1.0 + np.exp(-best)))

@@ -1,0 +1,139 @@
+"""How likely a visit is to miss a fruit that hangs where it looks: what leaves hide from one side stays hidden."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.identity.places import looked_at, surroundings_of, towards_camera
+from pomona.identity.visits import SeenVisit, Sights
+
+__all__ = ["Looks", "chances_of_missing", "looks_of"]
+
+SAME_SIDE = 0.5
+"""Cosine of the angle between two looks at a fruit, 60 degrees, under which one tells of the other."""
+
+FADING = 0.6
+"""What an older look from the same side still counts, for each newer one."""
+
+AROUND = 25
+"""Fruits with which the views of one are compared: those that as many frames could see."""
+
+MOST_VIEWS = 0.85
+"""Quantile of their views that is all views."""
+
+SHARES_OF_VIEWS = np.array([0.08, 0.18, 0.30, 0.42, 0.55, 0.70])
+"""Between the classes of fruits by how well earlier looks saw them, as ranks in the visit."""
+
+CHANCES_OF_SEEING = np.array([0.62, 0.30, 0.50, 0.65, 0.78, 0.88, 0.95, 0.98])
+"""Of a fruit never looked at from this side, and of the classes; what to believe before the season says its own."""
+
+BELIEF = 20.0
+"""Looks that this belief is worth."""
+
+MOST_CHANCE = 0.985
+"""Of seeing: a detector misses fruits that hang free, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """What each visit saw of each fruit and where it looked.
+
+    Attributes
+    ----------
+    seen, in_view : (K, V) bool
+        Whether the visit saw the fruit, and whether it looked where it hangs.
+    views : (K, V) float64
+        How well it saw it: rank in the visit, 0 to 1, by the views that a fruit there can have; 0 where it did not.
+    towards : (K, V, 3) float64
+        From the fruit to the camera; NaN where unknown.
+    """
+
+    seen: NDArray[np.bool_]
+    in_view: NDArray[np.bool_]
+    views: NDArray[np.float64]
+    towards: NDArray[np.float64]
+
+
+def looks_of(
+    visits: Sequence[SeenVisit],
+    sights: Sights,
+    labels: NDArray[np.int64],
+    positions: NDArray[np.float64],
+    frames: NDArray[np.float64],
+) -> Looks:
+    """Find out where each visit looked; `positions`, (S, 3), and `frames`, (V, 4, 4), are in and into the map."""
+    around = surroundings_of(sights, labels, positions)
+    places = around.places
+    seen = np.zeros(places.shape[:2], bool)
+    seen[labels, sights.visits] = True
+    in_view, views, towards = seen.copy(), np.zeros(seen.shape), np.full(places.shape, np.nan)
+    for number, visit in enumerate(visits):
+        own = np.flatnonzero(sights.visits == number)
+        if not len(own):
+            continue
+        scale = np.cbrt(np.linalg.det(frames[number, :3, :3]))
+        in_map = _with_cameras_in_map(visit, frames[number], scale)
+        in_view[:, number] |= looked_at(in_map, positions[own], places[:, number], around.spacings_m[:, number])
+        towards[:, number] = towards_camera(in_map, positions[own], frames[number, :3, :3] / scale, places[:, number])
+        views[labels[own], number] = _shares_of_views(visit.n_views, positions[own])
+    return Looks(seen, in_view, views, towards)
+
+
+def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], scale: float) -> SeenVisit:
+    from dataclasses import replace
+
+    if visit.cameras is None:
+        return visit
+    cameras = map_from_visit @ visit.cameras
+    cameras[:, :3, :3] /= scale
+    return replace(visit, cameras=cameras)
+
+
+def _shares_of_views(n_views: NDArray[np.int64] | None, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ranks, 0 to 1, of the views of each fruit against those around it; the middle where nobody counted."""
+    from scipy.spatial import cKDTree
+    from scipy.stats import rankdata
+
+    n = len(positions)
+    if n_views is None:
+        return np.full(n, 0.5)
+    around = cKDTree(positions).query(positions, k=list(range(1, min(AROUND, n) + 1)))[1]
+    possible = np.maximum(np.quantile(n_views[around], MOST_VIEWS, axis=1), 1.0)
+    return np.asarray(rankdata(n_views / possible) / n)
+
+
+def chances_of_missing(looks: Looks) -> NDArray[np.float64]:
+    """Return for each fruit and visit, (K, V), how likely it is missed if it hangs there; 1 where nobody looked."""
+    classes = _classes(looks)
+    n_visits = looks.seen.shape[1]
+    order = np.arange(n_visits)
+    first = looks.seen.argmax(axis=1)[:, None]
+    last = n_visits - 1 - looks.seen[:, ::-1].argmax(axis=1)[:, None]
+    # Between two sights a fruit hung there for sure.
+    hung = looks.in_view & (order > first) & (order < last)
+    n_seen = np.bincount(classes[hung & looks.seen], minlength=len(CHANCES_OF_SEEING))
+    n_hung = np.bincount(classes[hung], minlength=len(CHANCES_OF_SEEING))
+    chances = np.minimum((n_seen + BELIEF * CHANCES_OF_SEEING) / (n_hung + BELIEF), MOST_CHANCE)
+    return np.where(looks.in_view, 1.0 - chances[classes], 1.0)
+
+
+def _classes(looks: Looks) -> NDArray[np.int64]:
+    """Return the class of each fruit on each visit, (K, V), by the visits before that looked from the same side."""
+    n_fruits, n_visits = looks.seen.shape
+    classes = np.zeros((n_fruits, n_visits), np.int64)
+    for visit in range(n_visits):
+        views, looks_before = np.zeros(n_fruits), np.zeros(n_fruits)
+        for before in range(visit):
+            cosines = np.einsum("ki,ki->k", looks.towards[:, before], looks.towards[:, visit])
+            # What is not known is NaN, and counts as the same side.
+            tells = looks.in_view[:, before] & ~(cosines < SAME_SIDE)
+            views = np.where(tells, FADING * views + looks.views[:, before], views)
+            looks_before = np.where(tells, FADING * looks_before + 1.0, looks_before)
+        shares = views / np.maximum(looks_before, 1.0)
+        known = 1 + np.searchsorted(SHARES_OF_VIEWS, shares, side="right")
+        classes[:, visit] = np.where(looks_before > 0, known, 0)
+    return classes

@@ -1,0 +1,159 @@
+"""Where each fruit hung on the day of each visit, and whether the visit looked there, and from where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.identity.visits import SeenVisit, Sights
+
+__all__ = ["Surroundings", "looked_at", "on_days", "surroundings_of", "towards_camera"]
+
+NEIGHBOURS = 3
+"""A visit looked where so many of its fruits are near."""
+
+NEAR = 1.5
+"""As near as that many times what was when the fruit was seen: where every second fruit is gone, 1.3 times."""
+
+AS_MOST = 0.98
+"""Share of the visit's own fruits by which near, and straight before a camera, are measured."""
+
+PENCIL = 24
+"""Lines of sight that are laid together: the fruits of a few frames."""
+
+LEAST_LENGTH = 1.5
+"""Of a covariance along its first axis against the second, squared, by which it tells the line of sight."""
+
+LEAST_LINES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is around each fruit on the day of each visit.
+
+    Attributes
+    ----------
+    places : (K, V, 3) float64
+        Where the fruit hangs, metres.
+    spacings_m : (K, V) float64
+        How near the third of its neighbours was when it was seen.
+    """
+
+    places: NDArray[np.float64]
+    spacings_m: NDArray[np.float64]
+
+
+def surroundings_of(sights: Sights, labels: NDArray[np.int64], positions: NDArray[np.float64]) -> Surroundings:
+    """Return the surroundings by the sight of each fruit that is nearest in order; `positions` of sights, (S, 3)."""
+    spacings_m = np.concatenate(
+        [_spacings_m(own, own, NEIGHBOURS + 1) for own in np.split(positions, sights.starts[1:])]
+    )
+    return Surroundings(on_days(sights, labels, positions), on_days(sights, labels, spacings_m))
+
+
+def on_days(sights: Sights, labels: NDArray[np.int64], of_sights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what sights, (S, ...), tell of each fruit on each day, (K, V, ...): the one nearest in order."""
+    n_fruits, n_visits = int(labels.max(initial=-1)) + 1, len(sights.starts)
+    is_seen = np.zeros((n_fruits, n_visits), bool)
+    is_seen[labels, sights.visits] = True
+    seen = np.zeros((n_fruits, n_visits, *of_sights.shape[1:]))
+    seen[labels, sights.visits] = of_sights
+    told, is_told = seen.copy(), is_seen.copy()
+    for visit in range(n_visits):
+        for other in sorted(range(n_visits), key=lambda other: (abs(other - visit), other)):
+            now = ~is_told[:, visit] & is_seen[:, other]
+            told[now, visit] = seen[now, other]
+            is_told[now, visit] = True
+    return told
+
+
+def looked_at(
+    visit: SeenVisit, own: NDArray[np.float64], places: NDArray[np.float64], spacings_m: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell at which places, (K, 3), a visit looked; `own` are its fruits, (N, 3), in the same frame.
+
+    By its cameras where it has them and they explain its own fruits: one came as straight before the place as before
+    most of the fruits that it saw, and as near. Else by its fruits around the place, which are as near as they ever
+    were, (K,), or as the visit's fruits are to one another.
+    """
+    if visit.cameras is not None and len(visit.cameras):
+        widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in _straightest(visit.cameras, own))
+        if np.isfinite(widest):
+            tangents, depths_m = _straightest(visit.cameras, places)
+            return np.asarray((tangents <= widest) & (depths_m <= farthest_m))
+    if len(own) <= NEIGHBOURS:
+        return np.zeros(len(places), bool)
+    usual_m = np.quantile(_spacings_m(own, own, NEIGHBOURS + 1), AS_MOST)
+    return np.asarray(_spacings_m(own, places, NEIGHBOURS) <= np.maximum(usual_m, NEAR * spacings_m))
+
+
+def _spacings_m(own: NDArray[np.float64], places: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return how near the so manieth of a visit's fruits is to each place, (K,); infinite where there are fewer."""
+    from scipy.spatial import cKDTree
+
+    if not len(own):
+        return np.full(len(places), np.inf)
+    return np.asarray(cKDTree(own).query(places, k=[count])[0]).reshape(-1)
+
+
+def _straightest(
+    cameras: NDArray[np.float64], places: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return tangent and depth of each place in the camera that has it most in its middle, (K,) each."""
+    best, depths = np.full(len(places), np.inf), np.full(len(places), np.inf)
+    for camera in cameras:
+        x, y, z = camera[:3, :3].T @ (places - camera[:3, 3]).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tangents = np.where(z > 0, np.maximum(np.abs(x), np.abs(y)) / z, np.inf)
+        depths = np.where(tangents < best, z, depths)
+        best = np.minimum(best, tangents)
+    return best, depths
+
+
+def towards_camera(
+    visit: SeenVisit, own: NDArray[np.float64], axes: NDArray[np.float64], places: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return unit vectors from places, (K, 3), to where a visit looked at them from; NaN where nothing tells.
+
+    The camera nearest to the place; or where the lines of sight of the fruits around it meet, which are the long axes
+    of their covariances. `axes` turns the visit's axes into those of `own` and `places`, (3, 3).
+    """
+    towards: NDArray[np.float64]
+    if visit.cameras is not None and len(visit.cameras):
+        from scipy.spatial import cKDTree
+
+        stations = visit.cameras[:, :3, 3]
+        towards = stations[cKDTree(stations).query(places)[1]] - places
+    else:
+        towards = _meeting_points(visit.covariances, own, axes, places) - places
+    with np.errstate(invalid="ignore"):
+        return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True))
+
+
+def _meeting_points(
+    covariances: NDArray[np.float64] | None,
+    own: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    places: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the points nearest to the lines of sight around each place: sum of (1 - d d') (c - x) is zero."""
+    from scipy.spatial import cKDTree
+
+    nowhere = np.full(places.shape, np.nan)
+    if covariances is None:
+        return nowhere
+    lengths, vectors = np.linalg.eigh(covariances)
+    tell = np.flatnonzero(lengths[:, 2] > LEAST_LENGTH * lengths[:, 1])
+    if len(tell) < LEAST_LINES:
+        return nowhere
+    lines = vectors[tell, :, 2] @ axes.T
+    across = np.eye(3) - lines[:, :, None] * lines[:, None, :]
+    nearest = cKDTree(own[tell]).query(places, k=list(range(1, min(PENCIL, len(tell)) + 1)))[1]
+    weights = across[nearest].sum(axis=1)
+    moments = np.einsum("knij,knj->ki", across[nearest], own[tell][nearest])
+    # Lines that are all parallel meet nowhere; the little weight of the place itself keeps the sum solvable.
+    little = 1e-6
+    solved = np.linalg.solve(weights + little * np.eye(3), (moments + little * places)[:, :, None])
+    return np.asarray(solved[:, :, 0])

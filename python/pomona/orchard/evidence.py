@@ -1,0 +1,212 @@
+"""What the map holds of its sessions and their matches: all that identities follow from."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
+from pomona.orchard.session import Session
+from pomona.orchard.stored_sessions import cameras_in_map
+from pomona.store.cells import finite_json
+from pomona.store.failures import WrongContentError
+from pomona.store.rows import columns_of
+from pomona.store.stored_fruits import OF_SESSION, observed_cloud
+
+__all__ = ["Evidence", "KnownVisit", "new_visit", "read_evidence"]
+
+BEGINNING = datetime(2000, 1, 1)
+"""Days are counted from here, in the orchard's local time."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownVisit:
+    """One session as the map holds it.
+
+    Attributes
+    ----------
+    session_id : int
+        0 for one that is not in the map yet.
+    date : str
+    cloud : FruitCloud
+        In the session's own frame.
+    seen : SeenVisit
+        The same for the identities.
+    map_from_session : (4, 4) float64
+    observation_ids, fruit_ids : (N,) int64
+        Of each fruit of the cloud; 0 where it has none yet.
+    """
+
+    session_id: int
+    date: str
+    cloud: FruitCloud
+    seen: SeenVisit
+    map_from_session: NDArray[np.float64]
+    observation_ids: NDArray[np.int64]
+    fruit_ids: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """All visits, in the order of date and content, and their matches."""
+
+    visits: Sequence[KnownVisit]
+    pairs: Sequence[VisitPair]
+
+    def with_visit(self, visit: KnownVisit, matches: Mapping[int, VisitPair]) -> Evidence:
+        """Return it with one visit more; `matches` by the number of the other visit, the earlier of both first."""
+        visits = sorted([*self.visits, visit], key=lambda one: one.seen.key)
+        own = visits.index(visit)
+        pairs = [
+            replace(pair, first=pair.first + (pair.first >= own), second=pair.second + (pair.second >= own))
+            for pair in self.pairs
+        ]
+        for other, match in matches.items():
+            first, second = sorted((own, other + (other >= own)))
+            pairs.append(replace(match, first=first, second=second))
+        return Evidence(visits, pairs)
+
+    def with_known(self, known: KnownVisit) -> Evidence:
+        """Return it with the visit that was new as the map holds it now."""
+        return replace(self, visits=[visit if visit.session_id else known for visit in self.visits])
+
+    def without_session(self, session_id: int) -> Evidence:
+        """Return it with one visit less."""
+        gone = self.number_of(session_id)
+        pairs = [
+            replace(pair, first=pair.first - (pair.first > gone), second=pair.second - (pair.second > gone))
+            for pair in self.pairs
+            if gone not in (pair.first, pair.second)
+        ]
+        return Evidence([visit for number, visit in enumerate(self.visits) if number != gone], pairs)
+
+    def number_of(self, session_id: int) -> int:
+        """Return the number of a visit."""
+        return [visit.session_id for visit in self.visits].index(session_id)
+
+    @property
+    def fruit_ids(self) -> NDArray[np.int64]:
+        """Fruit of every sight, as the map has it; 0 where it has none yet."""
+        return np.concatenate([visit.fruit_ids for visit in self.visits])
+
+    @property
+    def observation_ids(self) -> NDArray[np.int64]:
+        """Observation of every sight; 0 where it is not in the map yet."""
+        return np.concatenate([visit.observation_ids for visit in self.visits])
+
+    def conclusion(self) -> Conclusion:
+        """Say what follows; the sessions that came first stay where they are."""
+        known = np.array([visit.map_from_session for visit in self.visits])
+        newest_last = [visit.session_id or np.inf for visit in self.visits]
+        keepers = np.argsort(newest_last, kind="stable").tolist()
+        return conclude([visit.seen for visit in self.visits], self.pairs, known, keepers)
+
+
+def read_evidence(connection: sqlite3.Connection) -> Evidence:
+    """Read all sessions of a map and their matches."""
+    names = ("id", "date", "content_sha256", "map_from_session")
+    rows = sorted(zip(*columns_of(connection, "sessions", names), strict=True), key=lambda row: (row[1], row[2]))
+    visits = [
+        _known_visit(connection, session_id, (date, content), np.array(finite_json(transform), np.float64))
+        for session_id, date, content, transform in rows
+    ]
+    return Evidence(visits, _pairs(connection, visits))
+
+
+def _known_visit(
+    connection: sqlite3.Connection, session_id: int, key: tuple[str, str], map_from_session: NDArray[np.float64]
+) -> KnownVisit:
+    which = OF_SESSION.format(session_id)
+    ids, fruit_ids = columns_of(connection, "observations", ("id", "fruit_id"), which)
+    in_map = observed_cloud(connection, session_id, FruitCloud)
+    session_from_map = np.linalg.inv(map_from_session)
+    cloud = in_map.transformed(session_from_map)
+    cameras = cameras_in_map(connection, session_id)
+    return KnownVisit(
+        session_id=session_id,
+        date=key[0],
+        cloud=cloud,
+        seen=_seen_visit(key, cloud, None if cameras is None else _rigid(session_from_map @ cameras[2])),
+        map_from_session=map_from_session,
+        observation_ids=np.array(ids, np.int64),
+        fruit_ids=np.array(fruit_ids, np.int64),
+    )
+
+
+def _seen_visit(key: tuple[str, str], cloud: FruitCloud, cameras: NDArray[np.float64] | None) -> SeenVisit:
+    """Return what a session saw in the words of the identities."""
+    unknown = np.full(len(cloud), np.nan)
+    return SeenVisit(
+        key=key,
+        day=(datetime.fromisoformat(key[0]) - BEGINNING) / timedelta(days=1),
+        positions=cloud.positions,
+        diameters_m=unknown if cloud.diameters_m is None else cloud.diameters_m,
+        covariances=cloud.covariances,
+        n_views=cloud.n_views,
+        cameras=cameras,
+    )
+
+
+def _rigid(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses with axes of length one; those of a session of unknown scale have come by a similarity."""
+    poses = poses.copy()
+    poses[:, :3, :3] /= np.cbrt(np.linalg.det(poses[:, :3, :3]))[:, None, None]
+    return poses
+
+
+def _pairs(connection: sqlite3.Connection, visits: Sequence[KnownVisit]) -> list[VisitPair]:
+    numbers = {visit.session_id: number for number, visit in enumerate(visits)}
+    names = ("id", "first_session_id", "second_session_id", "first_from_second", "log_odds", "pairs")
+    found = []
+    for match_id, first, second, transform, log_odds, pairs in zip(
+        *columns_of(connection, "matches", names), strict=True
+    ):
+        if first not in numbers or second not in numbers:
+            raise WrongContentError(f"matches {match_id}: points to a row of sessions that is not there")
+        asked = (numbers[first], numbers[second])
+        found.append(
+            VisitPair(
+                *asked,
+                first_from_second=np.array(finite_json(transform), np.float64),
+                log_odds=log_odds,
+                rows=_rows(match_id, visits, asked, finite_json(pairs)),
+                probabilities=np.array([pair[2] for pair in finite_json(pairs)], np.float64),
+            )
+        )
+    return found
+
+
+def _rows(
+    match_id: int, visits: Sequence[KnownVisit], numbers: tuple[int, int], pairs: list[tuple[int, int, float]]
+) -> NDArray[np.int64]:
+    """Return the rows of the two visits, (M, 2), that the observations of a match are."""
+    ids = np.array([pair[:2] for pair in pairs], np.int64).reshape(-1, 2)
+    rows = np.zeros(ids.shape, np.int64)
+    for side, number in enumerate(numbers):
+        own = visits[number].observation_ids
+        rows[:, side] = np.searchsorted(own, ids[:, side])
+        strange = ~np.isin(ids[:, side], own)
+        if strange.any():
+            found = ids[np.argmax(strange), side]
+            raise WrongContentError(f"matches {match_id}: pairs: found {found}, expected observations of its sessions")
+    return rows
+
+
+def new_visit(session: Session) -> KnownVisit:
+    """Return a session that is not in the map yet; where it lies there nobody knows."""
+    cameras = None if session.trajectory is None else session.trajectory.session_from_camera
+    return KnownVisit(
+        session_id=0,
+        date=session.date,
+        cloud=session.cloud,
+        seen=_seen_visit((session.date, session.content_sha256), session.cloud, cameras),
+        map_from_session=np.eye(4),
+        observation_ids=np.zeros(len(session.cloud), np.int64),
+        fruit_ids=np.zeros(len(session.cloud), np.int64),
+    )
