@@ -10,11 +10,13 @@ from scipy.spatial.transform import Rotation
 import pomona
 from pomona import FruitCloud
 from pomona.matching import Match
+from pomona.synth.clouds import scene_pair
 
 TESTDATA = Path(__file__).parents[1] / "testdata"
 METHODS = ["paper", "verified"]
 TURN = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()
 SHIFT = np.array([3.0, -1.0, 0.5])
+UP = (0.0, 0.0, 1.0)
 
 
 def row(n: int = 120, seed: int = 0) -> NDArray[np.float64]:
@@ -33,13 +35,43 @@ def as_tuple(match: Match) -> tuple[object, ...]:
     return match.status, match.map_from_query.tolist(), match.pairs.tolist(), match.probabilities.tolist()
 
 
-def test_an_answer_has_pairs() -> None:
-    """Two rows without a common fruit, whose outlines lie on each other by chance."""
+def test_outlines_that_lie_on_each_other_by_chance_are_no_answer() -> None:
+    """Two rows without a common fruit."""
     query, map = (FruitCloud.read(TESTDATA / f"matching/outline_of_strangers_{name}.csv") for name in ("query", "map"))
-    match = pomona.match(query, map, up=(0.0, 0.0, 1.0))
+    match = pomona.match(query, map, up=UP)
+    assert match.status == "NoMatch"
+    assert match.map_from_query is None
+
+
+def test_an_answer_has_pairs() -> None:
+    fruits = row()
+    noisy = fruits + np.random.default_rng(1).normal(0.0, 0.01, fruits.shape)
+    match = pomona.match(noisy, fruits, config={"verified": {"min_probability": 1.0}})
     assert match.status == "NoMatch"
     assert match.map_from_query is None
     assert dict(match.stages)["verified"] == 1.0, "no longer what it tests"
+
+
+@pytest.mark.parametrize("seed", [9, 24, 53])
+def test_rows_on_wires_without_a_common_fruit_are_no_match(seed: int) -> None:
+    pair = scene_pair("trellis-noovup", seed)
+    assert pomona.match(pair.query, pair.map, up=UP).status == "NoMatch"
+
+
+def spurs(seed: int) -> NDArray[np.float64]:
+    """Fruits on a quarter of the spurs, 15 cm apart, of five wires, and five more elsewhere."""
+    random = np.random.default_rng(seed)
+    places = np.array([(x, 0.0, z) for x in np.arange(0.0, 8.0, 0.15) for z in 0.6 + 0.4 * np.arange(5)])
+    taken = places[random.random(len(places)) < 0.25]
+    elsewhere = random.uniform((0.0, -0.1, 0.5), (8.0, 0.1, 2.3), (5, 3))
+    return np.vstack([taken + random.normal(0.0, 0.03, taken.shape), elsewhere])
+
+
+@pytest.mark.parametrize("seed", [5, 12, 14])
+def test_a_planting_that_meets_itself_everywhere_is_not_found(seed: int) -> None:
+    """Two rows without a common fruit: each step from spur to spur is as good as the next."""
+    match = pomona.match(spurs(2 * seed), spurs(2 * seed + 1), up=UP)
+    assert match.status in ("NoMatch", "Ambiguous")
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -63,16 +63,19 @@ impl VerifiedConfig {
     ///
     /// Where only a `share` of all turns is admitted, the probability is that share of it.
     pub(crate) fn threshold(&self, poses: f64, share: f64) -> f64 {
-        OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - self.false_alarm_rate.ln())
+        reached(self.false_alarm_rate, poses, share)
     }
+}
 
-    /// What the pairs of an answer must say together for "the same fruit", nats.
-    ///
-    /// They are settled with every fruit predicted without its own partner, so that no fit stretches their tail. The form
-    /// is that of Markov's inequality, which does not hold here: only what speaks for pairs is summed.
-    pub(crate) fn least_told(&self, poses: f64, share: f64) -> f64 {
-        (poses * share).max(1.0).ln() - self.false_alarm_rate.ln()
-    }
+/// Log-odds, in nats, from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
+/// in twenty.
+pub(crate) fn pattern(poses: f64, share: f64) -> f64 {
+    reached(0.05, poses, share)
+}
+
+/// Log-odds, in nats, that the best wrong pose exceeds with a probability of `rate`.
+fn reached(rate: f64, poses: f64, share: f64) -> f64 {
+    OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - rate.ln())
 }
 
 /// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales.

@@ -1,45 +1,29 @@
-//! The answer to a query: the best finding settled, its pairs, its rivals.
+//! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::decision::{Finding, Search, Stages};
+use super::decision::{Finding, Findings, Search, Stages};
 use super::overlap::Overlap;
 use super::pairing::Pairing;
-use super::settlement::{Settled, settle};
-use super::size::Diameters;
 use crate::answer::{Match, Pair, Registration, Verdict};
-use crate::cloud::FruitCloud;
 
 impl Search<'_> {
-    /// The best finding settled; `NoMatch` where its pairs say less than `least_told`, nats.
-    pub(super) fn answer(
-        &self,
-        mut findings: Vec<Finding>,
-        map: &FruitCloud,
-        query: &FruitCloud,
-        least_told: Option<f64>,
-        mut stages: Stages,
-    ) -> Match {
-        if findings.is_empty() {
+    /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
+    ///
+    /// The other optima of the same search show what wrong poses reach on this very planting.
+    pub(super) fn answer(&self, Findings { accepted, others }: Findings, mut stages: Stages) -> Match {
+        let mut accepted = accepted.into_iter();
+        let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
+            return Match::without_answer(Verdict::NoMatch, stages);
+        };
+        let overlap = Overlap { log_odds, ..settled.overlap };
+        let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap);
+        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        let outdone = others.iter().any(rivals);
+        stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
+        if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
-        let best = findings.remove(0);
-        let sizes = Diameters::new(query, map, self.query, self.map);
-        let Settled { overlap, marginals } = settle(&best.growth, self.noise_m, sizes.as_ref());
-        if let Some(least) = least_told {
-            let told = marginals.told();
-            stages.extend([("settled_threshold_nats", least), ("settled_nats", told)]);
-            if told < least {
-                return Match::without_answer(Verdict::NoMatch, stages);
-            }
-        }
-        let overlap = Overlap { log_odds: best.overlap.log_odds, ..overlap };
-        let rivals: Vec<Registration> = findings
-            .iter()
-            .map(|finding| &finding.overlap)
-            .filter(|other| self.rivals(&overlap, other))
-            .map(|other| self.registration(other))
-            .collect();
-        let pairs = marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
-        stages.push(("pairs", pairs.len() as f64));
+        let rivals: Vec<Registration> =
+            accepted.filter(rivals).map(|finding| self.registration(&finding.overlap)).collect();
         Match {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),

@@ -1,6 +1,6 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::{VerifiedConfig, poses};
+use super::acceptance::{VerifiedConfig, pattern, poses};
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
 use super::growth::{Growth, grow, hold};
@@ -10,6 +10,8 @@ use super::overlap::Overlap;
 use super::placement::Placement;
 use super::search::{Contender, Effort, Starts, of_some_fruits, round};
 use super::seeds::{self, Seed, SeedIndex};
+use super::settlement::{Settled, settle};
+use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
@@ -54,6 +56,9 @@ const GROWN: usize = 6;
 /// A pose with this many times the evidence needed is no local optimum.
 const SURE: f64 = 6.0;
 
+/// Share of the evidence needed that must be left when every fruit is predicted without its own partner.
+const SETTLED: f64 = 0.8;
+
 /// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
 const UPRIGHT_SEEDS: u64 = 2;
 
@@ -76,15 +81,25 @@ impl VerifiedMap {
 /// An overlap with the region it was found from.
 pub(super) struct Finding<'a> {
     pub(super) growth: Growth<'a>,
+    /// As it grew.
     pub(super) overlap: Overlap,
     pub(super) seed: Hypothesis,
-    /// Found by the outline, not by seeds.
-    outlined: bool,
+    /// As it stands in the end, once it was looked at closely.
+    pub(super) settled: Option<Settled>,
+}
+
+/// What a search has found.
+#[derive(Default)]
+pub(super) struct Findings<'a> {
+    /// Those with enough evidence, most first.
+    pub(super) accepted: Vec<Finding<'a>>,
+    /// Other poses that it grew: what chance and the planting's own pattern reach.
+    pub(super) others: Vec<Finding<'a>>,
 }
 
 impl<'a> Finding<'a> {
     pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
-        Self { overlap: growth.overlap(), growth, seed, outlined: false }
+        Self { overlap: growth.overlap(), growth, seed, settled: None }
     }
 }
 
@@ -100,25 +115,15 @@ pub(crate) fn search(
         return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
     }
     let landscape = Landscape::new(query);
-    let search = Search::new(prepared, &landscape, request, config);
+    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
+    let search = Search::new(prepared, &landscape, sizes, request, config);
     let (mut findings, mut stages) = search.run();
-    if findings.first().is_some_and(|best| search.fits_better_mirrored(best)) {
+    if findings.accepted.first().is_some_and(|best| search.fits_better_mirrored(best)) {
         stages.push(("mirrored", 1.0));
-        findings.clear();
+        findings.accepted.clear();
     }
-    if let Some(best) = findings.first_mut().filter(|best| !best.growth.whole) {
-        best.growth.reach_all();
-    }
-    let outlined = findings.first().is_some_and(|best| best.outlined);
-    let least = (!outlined).then(|| search.least_told());
-    let answer = search.answer(findings, map, query, least, stages);
-    // Where the noise is heavy, pairs say little even under the true pose: then the outline may still tell.
-    let unconfirmed = answer.verdict == Verdict::NoMatch && answer.stages.iter().any(|stage| stage.0 == "settled_nats");
-    let answer = match unconfirmed.then(|| search.by_outline()).flatten() {
-        Some(found) => search.answer(vec![found], map, query, None, answer.stages),
-        None => answer,
-    };
-    // Under a noise that is told far too small, the right pose has no pair; an outline of strangers has none either.
+    let answer = search.answer(findings, stages);
+    // Where no pair is probable enough to be reported, there is nothing to answer with.
     if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
 }
 
@@ -135,14 +140,17 @@ pub(crate) fn pairs_under(
         return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
     }
     let landscape = Landscape::new(query);
-    let search = Search::new(prepared, &landscape, request, config);
+    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
+    let search = Search::new(prepared, &landscape, sizes, request, config);
     let pose = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let place = search.query.points.first().copied().unwrap_or_default();
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
     let model = Model { sigma, ..search.model };
     let growth = hold(search.query, search.map, &seed, &model);
-    search.answer(vec![Finding::new(growth, seed)], map, query, None, Vec::new())
+    let mut finding = Finding::new(growth, seed);
+    search.settle(&mut finding);
+    search.answer(Findings { accepted: vec![finding], others: Vec::new() }, Vec::new())
 }
 
 pub(super) struct Search<'a> {
@@ -151,7 +159,8 @@ pub(super) struct Search<'a> {
     seeds: &'a SeedIndex,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
-    pub(super) noise_m: Option<f64>,
+    noise_m: Option<f64>,
+    sizes: Option<Diameters>,
 }
 
 pub(super) type Stages = Vec<(&'static str, f64)>;
@@ -162,18 +171,26 @@ struct Log {
     effort: Effort,
     refined: usize,
     grown: u32,
-    /// Most evidence of a grown pose, accepted or not, nats.
+    /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
     best: f64,
+    settled: f64,
 }
 
 impl Default for Log {
     fn default() -> Self {
-        Self { seeds: 0, effort: Effort::default(), refined: 0, grown: 0, best: f64::NEG_INFINITY }
+        let none = f64::NEG_INFINITY;
+        Self { seeds: 0, effort: Effort::default(), refined: 0, grown: 0, best: none, settled: none }
     }
 }
 
 impl<'a> Search<'a> {
-    fn new(prepared: &'a VerifiedMap, query: &'a Landscape, request: &Request, config: &VerifiedConfig) -> Self {
+    fn new(
+        prepared: &'a VerifiedMap,
+        query: &'a Landscape,
+        sizes: Option<Diameters>,
+        request: &Request,
+        config: &VerifiedConfig,
+    ) -> Self {
         let map = &prepared.landscape;
         // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
         let common = SEED_SIGMA * map.spacing;
@@ -190,12 +207,20 @@ impl<'a> Search<'a> {
             },
             config: *config,
             noise_m: request.noise_m,
+            sizes,
         }
     }
 
+    /// Evidence that a grown pose must exceed, nats.
     fn threshold(&self) -> f64 {
         let (poses, share) = self.offered();
         self.config.threshold(poses, share)
+    }
+
+    /// Evidence from which on another pose counts as a rival, accepted or not, nats.
+    pub(super) fn pattern(&self) -> f64 {
+        let (poses, share) = self.offered();
+        pattern(poses, share)
     }
 
     /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
@@ -204,10 +229,9 @@ impl<'a> Search<'a> {
         (poses(self.query.len(), self.map.len(), self.model.scale), share)
     }
 
-    /// What the settled pairs of a pose that seeds found must say together.
-    fn least_told(&self) -> f64 {
-        let (poses, share) = self.offered();
-        self.config.least_told(poses, share)
+    /// The same once it is settled.
+    fn settled_threshold(&self) -> f64 {
+        SETTLED * self.threshold()
     }
 
     pub(super) fn admits(&self, pose: &Placement) -> bool {
@@ -215,30 +239,28 @@ impl<'a> Search<'a> {
     }
 
     /// Rounds of seeds until a pose is accepted, then the outline.
-    fn run(&self) -> (Vec<Finding<'a>>, Stages) {
+    fn run(&self) -> (Findings<'a>, Stages) {
         let mut log = Log::default();
-        let mut findings = Vec::new();
+        let mut findings = Findings::default();
         let mut longest = Vec::new();
         for (index, plan) in ROUNDS.into_iter().enumerate() {
             let seeds = self.seeds_of(index, &mut longest);
             let (hypotheses, rest) = self.round(&seeds, plan, &mut log);
-            log.grown += self.grow_distinct(&hypotheses, &mut findings);
-            log.best = findings.iter().map(|finding| finding.overlap.log_odds).fold(log.best, f64::max);
-            self.keep_accepted(&mut findings);
-            if !findings.is_empty() {
+            log.grown += self.grow_distinct(&hypotheses, &mut findings.accepted);
+            self.sift(&mut findings, &mut log);
+            if !findings.accepted.is_empty() {
                 self.doubt(&mut findings, &rest, &mut log);
-                log.best = findings.iter().map(|finding| finding.overlap.log_odds).fold(log.best, f64::max);
-                break;
+            } else if index == 1 {
+                // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
+                findings.accepted.extend(self.by_outline());
+                self.sift(&mut findings, &mut log);
             }
-            // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
-            let outline = (index == 1).then(|| self.by_outline()).flatten();
-            findings.extend(outline);
-            if !findings.is_empty() {
+            if !findings.accepted.is_empty() {
                 break;
             }
         }
-        findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
-        let stages = self.stages(&log, findings.len());
+        findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
     }
 
@@ -258,19 +280,20 @@ impl<'a> Search<'a> {
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
-    fn doubt(&self, findings: &mut Vec<Finding<'a>>, rest: &[Contender], log: &mut Log) {
-        log.grown += self.look_for_rivals(rest, findings);
+    fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender], log: &mut Log) {
+        log.grown += self.look_for_rivals(rest, &mut findings.accepted);
         // A pose found with few seeds has shown little of where else the query might lie.
         if log.seeds < FIRST_FRUITS {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
             let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
-            log.grown += self.grow_distinct(&more, findings);
+            log.grown += self.grow_distinct(&more, &mut findings.accepted);
         }
-        self.keep_accepted(findings);
+        self.sift(findings, log);
         let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * self.threshold();
-        findings.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
+        findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
+        self.sift(findings, log);
     }
 
     /// Hypotheses of one round, and the candidates that were not refined.
@@ -282,13 +305,39 @@ impl<'a> Search<'a> {
         (hypotheses, rest)
     }
 
-    fn keep_accepted(&self, findings: &mut Vec<Finding>) {
-        let threshold = self.threshold();
-        findings.retain(|Finding { overlap, .. }| overlap.log_odds > threshold && self.admits(&overlap.pose));
-        findings.retain(|finding| self.turns_are_fixed(finding));
+    /// Tells findings with enough evidence, grown and settled, from the others.
+    fn sift(&self, findings: &mut Findings<'a>, log: &mut Log) {
+        for mut finding in std::mem::take(&mut findings.accepted) {
+            if !self.admits(&finding.overlap.pose) || !self.turns_are_fixed(&finding) {
+                continue;
+            }
+            log.best = log.best.max(finding.overlap.log_odds);
+            if finding.overlap.log_odds > self.threshold() {
+                let evidence = self.settle(&mut finding);
+                log.settled = log.settled.max(evidence);
+                if evidence > self.settled_threshold() {
+                    findings.accepted.push(finding);
+                    continue;
+                }
+            }
+            findings.others.push(finding);
+        }
+    }
+
+    /// Looks closely at a finding, over all that it reaches; returns its evidence.
+    fn settle(&self, finding: &mut Finding) -> f64 {
+        let Finding { growth, settled, .. } = finding;
+        let settled = settled.get_or_insert_with(|| {
+            if !growth.whole {
+                growth.reach_all();
+            }
+            settle(growth, self.noise_m, self.sizes.as_ref())
+        });
+        settled.evidence
     }
 
     fn stages(&self, log: &Log, verified: usize) -> Stages {
+        let known = |nats: f64| if nats.is_finite() { nats } else { f64::NAN };
         vec![
             ("query_fruits", self.query.len() as f64),
             ("map_fruits", self.map.len() as f64),
@@ -299,7 +348,9 @@ impl<'a> Search<'a> {
             ("refined", log.refined as f64),
             ("grown", f64::from(log.grown)),
             ("threshold_nats", self.threshold()),
-            ("best_nats", if log.grown > 0 { log.best } else { f64::NAN }),
+            ("best_nats", known(log.best)),
+            ("settled_threshold_nats", self.settled_threshold()),
+            ("settled_nats", known(log.settled)),
             ("verified", verified as f64),
         ]
     }
@@ -331,8 +382,8 @@ impl<'a> Search<'a> {
         } else {
             hold(self.query, self.map, &seed, &model)
         };
-        let mut finding = Finding { outlined: true, ..Finding::new(growth, seed) };
+        let mut finding = Finding::new(growth, seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
-        Some(finding).filter(|found| self.admits(&found.overlap.pose) && self.turns_are_fixed(found))
+        Some(finding)
     }
 }

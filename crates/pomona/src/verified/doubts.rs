@@ -4,7 +4,7 @@ use super::decision::{Finding, Search};
 use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::single;
-use super::overlap::Overlap;
+use super::overlap::{Landing, Overlap};
 use super::placement::{Moments, Placement};
 use super::search::{Contender, Starts, refined};
 use nalgebra::{Matrix3, Vector3};
@@ -15,8 +15,11 @@ pub(super) const RIVAL_CANDIDATES: usize = 24;
 /// Two hypotheses that put a fruit within this many spacings of one place are the same.
 const SAME: f64 = 0.4;
 
-/// A rival with this share of the best evidence makes the answer ambiguous.
-const RIVAL: f64 = 0.55;
+/// No other pose may have this share of the best evidence.
+const RIVAL: f64 = 0.5;
+
+/// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
+const BENT: f64 = 0.05;
 
 /// Fruits within this many standard deviations of one line fix no turn about it.
 const FLAT: f64 = 3.0;
@@ -146,19 +149,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether another overlap has nearly as much evidence, and explains the same fruits of the query by different
-    /// fruits of the map.
+    /// Whether another optimum has nearly as much evidence, and puts most fruits of the overlap elsewhere.
     pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
-        if other.log_odds <= RIVAL * best.log_odds {
+        if other.log_odds <= self.pattern().max(RIVAL * best.log_odds) {
             return false;
         }
-        let apart: Vec<bool> = best
-            .predictions
-            .iter()
-            .zip(&other.predictions)
-            .filter_map(|(x, y)| Some((x.as_ref()?.place - y.as_ref()?.place).norm() > 0.5 * self.map.spacing))
-            .collect();
-        let claimed = other.predictions.iter().flatten().count().max(1);
-        2 * apart.iter().filter(|&&apart| apart).count() > claimed.min(apart.len().max(claimed / 2))
+        let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
+            let bent = BENT * best.pose.scale * (p - other.middle).norm();
+            at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
+        };
+        let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
+        2 * apart.iter().filter(|&&apart| apart).count() > apart.len()
     }
 }

@@ -5,12 +5,14 @@
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
 //!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
-//! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`).
+//! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
+//!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
-//!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
+//!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
+mod beliefs;
 mod chance;
 mod codes;
 mod conclusion;
@@ -18,6 +20,7 @@ mod cut;
 mod decision;
 mod displacement;
 mod doubts;
+mod evidence;
 mod extent;
 #[cfg(test)]
 mod fixture;

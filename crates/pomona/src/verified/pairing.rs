@@ -1,5 +1,6 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
+use super::beliefs::{Beliefs, Edge};
 use super::landscape::{Landscape, SHARE_OF_ROWS};
 use super::overlap::Landing;
 use super::placement::Placement;
@@ -35,15 +36,6 @@ pub(crate) struct Pairing {
     pub(crate) gain: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Edge {
-    query: u32,
-    map: u32,
-    /// Likelihood ratio of "the same fruit" against "hidden there, new here".
-    ratio: f64,
-    distance: f64,
-}
-
 /// Probabilities of all edges of an overlap.
 #[derive(Debug, Clone)]
 pub(crate) struct Marginals {
@@ -73,7 +65,7 @@ impl Marginals {
         size: &(impl Fn(u32, u32) -> f64 + Sync),
     ) -> Self {
         let edges = edges_of(query, map, predictions, pose, share, size);
-        let probabilities = belief_propagation(&edges, query.len(), map.len());
+        let Beliefs { probabilities, .. } = Beliefs::new(&edges, query.len(), map.len());
         Self { edges, probabilities }
     }
 
@@ -83,12 +75,6 @@ impl Marginals {
             map: edge.map,
             probability,
         })
-    }
-
-    /// What the pairs say together for "the same fruit", nats: their log-odds where these are in favour, as far as each
-    /// is believed.
-    pub(crate) fn told(&self) -> f64 {
-        self.edges.iter().zip(&self.probabilities).map(|(edge, &p)| p * edge.ratio.ln().max(0.0)).sum()
     }
 
     /// The one-to-one pairs that gain most expected right answers.
@@ -123,49 +109,65 @@ fn edges_of(
 ) -> Vec<Edge> {
     let scale = pose.scale;
     let volume_scale = scale.powi(3);
-    let of = |row: usize, edges: &mut Vec<Edge>| {
+    meetings(query, map, predictions, pose, FAR, |meeting| {
+        let Meeting { query: row, map: partner, distance, density, support } = *meeting;
+        let seen = (share * support).max(LEAST_SEEN);
+        // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
+        let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
+        let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
+        let new = (1.0 - seen) * (companions * crowding).max(map.floor);
+        let ratio = seen / (1.0 - seen) * density / new * size(row, partner);
+        (ratio > LEAST_RATIO).then_some(Edge { query: row, map: partner, ratio, distance })
+    })
+}
+
+/// A fruit of the map near the place where one of the query is expected.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meeting {
+    pub(super) query: u32,
+    pub(super) map: u32,
+    pub(super) distance: f64,
+    /// Of the partner's place, were both one fruit, per cubic metre.
+    pub(super) density: f64,
+    /// How surely the map's visit would have shown a fruit there.
+    pub(super) support: f64,
+}
+
+/// What `kept` makes of every meeting within the gate of the noise and within `far` spacings, by rows of the query.
+pub(super) fn meetings<T: Send>(
+    query: &Landscape,
+    map: &Landscape,
+    predictions: &[Option<Landing>],
+    pose: &Placement,
+    far: f64,
+    kept: impl Fn(&Meeting) -> Option<T> + Sync,
+) -> Vec<T> {
+    let of = |row: usize, found: &mut Vec<T>| {
         let Some(Landing { place, variance }) = predictions[row] else { return };
-        let seen = (share * map.support(&place)).max(LEAST_SEEN);
-        let first = edges.len();
+        let support = map.support(&place);
         let own = query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
-        let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
+        let gate = GATE.max(FAR_GATE.min(far * map.spacing / variance.sqrt()));
         let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
-        map.near(&place, gate * (widest * variance).sqrt(), |partner| {
+        let mut partners = Vec::new();
+        map.near(&place, gate * (widest * variance).sqrt(), |partner| partners.push(partner));
+        // Two cells of the grid may share a bucket, which then is visited twice.
+        partners.sort_unstable();
+        partners.dedup();
+        found.extend(partners.into_iter().filter_map(|partner| {
             let offset = map.points[partner as usize] - place;
             let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
             let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
-            if mahalanobis2 <= gate * gate {
-                let distance = offset.norm();
-                // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
-                let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
-                let crowding = 0.5 * (query.crowding[row] + map.crowding[partner as usize]);
-                let new = (1.0 - seen) * (companions * crowding).max(map.floor);
-                let ratio = seen / (1.0 - seen) * density / new * size(row as u32, partner);
-                if ratio > LEAST_RATIO {
-                    edges.push(Edge { query: row as u32, map: partner, ratio, distance });
-                }
-            }
-        });
-        // Two cells of the grid may share a bucket, which then is visited twice.
-        edges[first..].sort_unstable_by_key(|edge| edge.map);
-        let mut last = None;
-        let mut kept = first;
-        for i in first..edges.len() {
-            if last != Some(edges[i].map) {
-                last = Some(edges[i].map);
-                edges[kept] = edges[i];
-                kept += 1;
-            }
-        }
-        edges.truncate(kept);
+            let meeting = Meeting { query: row as u32, map: partner, distance: offset.norm(), density, support };
+            (mahalanobis2 <= gate * gate).then(|| kept(&meeting)).flatten()
+        }));
     };
     let rows: Vec<usize> = (0..predictions.len()).collect();
     let in_part = |rows: &[usize]| {
-        let mut edges = Vec::new();
+        let mut found = Vec::new();
         for &row in rows {
-            of(row, &mut edges);
+            of(row, &mut found);
         }
-        edges
+        found
     };
     rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(in_part).collect()
 }
@@ -202,76 +204,3 @@ const LEAST_SEEN: f64 = 0.02;
 
 /// Variance along the longest axis over the mean variance, at the most.
 const WIDEST: f64 = 3.0;
-
-/// Marginal probability of each edge under one-to-one association.
-fn belief_propagation(edges: &[Edge], n_query: usize, n_map: usize) -> Vec<f64> {
-    const ITERATIONS: usize = 40;
-    let mut to_query = vec![1.0; edges.len()];
-    let mut to_map = vec![0.0; edges.len()];
-    for _ in 0..ITERATIONS {
-        let mut sums = vec![1.0; n_query];
-        for (edge, back) in edges.iter().zip(&to_query) {
-            sums[edge.query as usize] += edge.ratio * back;
-        }
-        for ((edge, back), out) in edges.iter().zip(&to_query).zip(&mut to_map) {
-            *out = edge.ratio / (sums[edge.query as usize] - edge.ratio * back).max(1e-12);
-        }
-        let mut sums = vec![1.0; n_map];
-        for (edge, message) in edges.iter().zip(&to_map) {
-            sums[edge.map as usize] += message;
-        }
-        let mut change = 0.0f64;
-        for ((edge, message), back) in edges.iter().zip(&to_map).zip(&mut to_query) {
-            let next = 1.0 / (sums[edge.map as usize] - message).max(1e-12);
-            change = change.max((next - *back).abs());
-            *back = next;
-        }
-        if change < 1e-5 {
-            break;
-        }
-    }
-    let mut sums = vec![1.0; n_query];
-    for (edge, back) in edges.iter().zip(&to_query) {
-        sums[edge.query as usize] += edge.ratio * back;
-    }
-    edges.iter().zip(&to_query).map(|(edge, back)| edge.ratio * back / sums[edge.query as usize]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Marginals by summing over all one-to-one sets of pairs.
-    fn exact(edges: &[Edge]) -> Vec<f64> {
-        let mut sums = vec![0.0; edges.len()];
-        let mut total = 0.0;
-        for set in 0u32..1 << edges.len() {
-            let chosen: Vec<usize> = (0..edges.len()).filter(|i| set >> i & 1 == 1).collect();
-            let clash = chosen.iter().enumerate().any(|(at, &i)| {
-                chosen[at + 1..].iter().any(|&j| edges[i].query == edges[j].query || edges[i].map == edges[j].map)
-            });
-            if clash {
-                continue;
-            }
-            let weight: f64 = chosen.iter().map(|&i| edges[i].ratio).product();
-            total += weight;
-            for i in chosen {
-                sums[i] += weight;
-            }
-        }
-        sums.iter().map(|sum| sum / total).collect()
-    }
-
-    #[test]
-    fn marginals_are_exact_on_a_tree_and_close_on_a_loop() {
-        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
-        let tree = [edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)];
-        for (found, truth) in belief_propagation(&tree, 2, 2).iter().zip(exact(&tree)) {
-            assert!((found - truth).abs() < 1e-6, "{found} {truth}");
-        }
-        let cycle = [edge(0, 0, 5.0), edge(0, 1, 2.0), edge(1, 0, 1.0), edge(1, 1, 3.0)];
-        for (found, truth) in belief_propagation(&cycle, 2, 2).iter().zip(exact(&cycle)) {
-            assert!((found - truth).abs() < 0.05, "{found} {truth}");
-        }
-    }
-}

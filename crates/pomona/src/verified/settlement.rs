@@ -10,8 +10,9 @@
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
-use super::cut::{Cell, surroundings, total};
+use super::cut::{Cell, Cut, key_of, surroundings, total};
 use super::displacement::{displacement, shared_by_neighbours};
+use super::evidence::evidence;
 use super::growth::{Growth, Partner};
 use super::landscape::{Landscape, SHARE_OF_ROWS};
 use super::overlap::{Landing, Overlap};
@@ -47,6 +48,8 @@ pub(crate) struct Settled {
     pub(crate) overlap: Overlap,
     /// Pairs by their probabilities.
     pub(crate) marginals: Marginals,
+    /// What speaks for the pose when every fruit is predicted without its own partner, nats ([`super::evidence`]).
+    pub(crate) evidence: f64,
 }
 
 /// Mean partner of a fruit, and the probability that it has one.
@@ -58,7 +61,7 @@ struct Settlement<'a> {
     scale: Scale,
     expected: KnownNoise,
     cells: Vec<Cell>,
-    cell_of: &'a [u32],
+    cut: &'a Cut,
     edge: f64,
     pose: Placement,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
@@ -89,13 +92,14 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diame
     settlement.predict();
     settlement.measure();
     let marginals = settlement.marginals(cue.as_ref());
+    let evidence = settlement.evidence();
     let overlap = Overlap {
         pose: settlement.pose,
         sigma: settlement.sigma,
         predictions: settlement.predictions,
         ..growth.overlap()
     };
-    Settled { overlap, marginals }
+    Settled { overlap, marginals, evidence }
 }
 
 impl<'a> Settlement<'a> {
@@ -118,7 +122,7 @@ impl<'a> Settlement<'a> {
                 None => KnownNoise::Guess(growth.model.sigma),
             },
             cells,
-            cell_of: &growth.cut.cell_of,
+            cut: growth.cut,
             edge: growth.edge,
             pose: growth.pose,
             sigma: growth.sigma,
@@ -134,7 +138,7 @@ impl<'a> Settlement<'a> {
     /// From the mean partner to where the patch puts the fruit.
     fn residual(&self, row: usize) -> Target {
         let (target, weight) = self.targets[row]?;
-        let pose = &self.cells[self.cell_of[row] as usize].pose;
+        let pose = &self.cells[self.cut.cell_of[row] as usize].pose;
         Some((target - pose.apply(&self.query.points[row]), weight))
     }
 
@@ -152,7 +156,7 @@ impl<'a> Settlement<'a> {
                 })
             })
             .collect();
-        let at = |row: usize| footings[self.cell_of[row] as usize].map(|footing| self.prediction(row, &footing));
+        let at = |row: usize| footings[self.cut.cell_of[row] as usize].map(|footing| self.prediction(row, &footing));
         self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
     }
 
@@ -164,7 +168,7 @@ impl<'a> Settlement<'a> {
         let looseness = near.looseness(&p) + near.share_held(self.holds[0]) * wide.looseness(&p);
         let noise = self.sigma * self.sigma;
         let (shift, unexplained) = displacement(self.query, row, (self.shared, noise), |other| self.residual(other));
-        let mut place = self.cells[self.cell_of[row] as usize].pose.apply(&p) + shift;
+        let mut place = self.cells[self.cut.cell_of[row] as usize].pose.apply(&p) + shift;
         if let Some((residual, weight)) = self.residual(row) {
             // Of a linear fit: the residual without the own partner is r / (1 - h), h the leverage.
             let leverage = (weight * looseness).min(MAX_LEVERAGE);
@@ -204,6 +208,17 @@ impl<'a> Settlement<'a> {
     fn marginals(&self, cue: Option<&Cue>) -> Marginals {
         let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
         Marginals::new(self.query, self.map, &self.predictions, &self.pose, self.share, &size)
+    }
+
+    /// What the overlap says for the pose, nats.
+    fn evidence(&self) -> f64 {
+        let support = |p: &Vector3<f64>| {
+            let place = self.pose.apply_inverse(p);
+            let cell = self.cut.index.get(&key_of(&place, self.edge));
+            if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support(&place) } else { 0.0 }
+        };
+        let there: Vec<f64> = self.map.points.iter().map(support).collect();
+        evidence(self.query, self.map, &self.predictions, &self.pose, &there)
     }
 
     /// Common pose, surroundings and patches from the mean partners.

@@ -1,0 +1,110 @@
+//! Who belongs to whom where several claim one: all one-to-one sets of pairs at once, by belief propagation (Williams and
+//! Lau 2014).
+
+/// A fruit of the query and one of the map that may be the same.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edge {
+    pub(super) query: u32,
+    pub(super) map: u32,
+    /// Likelihood ratio of "the same fruit" against both being alone.
+    pub(super) ratio: f64,
+    pub(super) distance: f64,
+}
+
+/// What all one-to-one sets of pairs say, each weighing the product of its edges' ratios.
+#[derive(Debug)]
+pub(super) struct Beliefs {
+    /// Of each edge: the share of the sets that hold it.
+    pub(super) probabilities: Vec<f64>,
+    /// Logarithm of the sum over all sets, by Bethe's approximation (Vontobel 2013): exact where no edges form a loop.
+    pub(super) log_sum: f64,
+}
+
+/// Rounds at the most, and the change of a message below which the rounds end.
+const ROUNDS: usize = 40;
+const SETTLED: f64 = 1e-5;
+
+impl Beliefs {
+    pub(super) fn new(edges: &[Edge], n_query: usize, n_map: usize) -> Self {
+        let mut to_query = vec![1.0; edges.len()];
+        let mut to_map = vec![0.0; edges.len()];
+        let mut of_map = vec![1.0; n_map];
+        for _ in 0..ROUNDS {
+            let of_query = sums(edges, &to_query, n_query);
+            for ((edge, back), out) in edges.iter().zip(&to_query).zip(&mut to_map) {
+                *out = edge.ratio / (of_query[edge.query as usize] - edge.ratio * back).max(1e-12);
+            }
+            of_map = vec![1.0; n_map];
+            for (edge, message) in edges.iter().zip(&to_map) {
+                of_map[edge.map as usize] += message;
+            }
+            let mut change = 0.0f64;
+            for ((edge, message), back) in edges.iter().zip(&to_map).zip(&mut to_query) {
+                let next = 1.0 / (of_map[edge.map as usize] - message).max(1e-12);
+                change = change.max((next - *back).abs());
+                *back = next;
+            }
+            if change < SETTLED {
+                break;
+            }
+        }
+        let of_query = sums(edges, &to_query, n_query);
+        let probability = |(edge, back): (&Edge, &f64)| edge.ratio * back / of_query[edge.query as usize];
+        let logarithms = |sums: &[f64]| sums.iter().map(|sum| sum.ln()).sum::<f64>();
+        let shared: f64 = to_map.iter().zip(&to_query).map(|(there, back)| (there * back).ln_1p()).sum();
+        Self {
+            probabilities: edges.iter().zip(&to_query).map(probability).collect(),
+            log_sum: logarithms(&of_query) + logarithms(&of_map) - shared,
+        }
+    }
+}
+
+/// Of each fruit of the query: it alone, and with each of its partners as far as they are free.
+fn sums(edges: &[Edge], to_query: &[f64], n_query: usize) -> Vec<f64> {
+    let mut sums = vec![1.0; n_query];
+    for (edge, back) in edges.iter().zip(to_query) {
+        sums[edge.query as usize] += edge.ratio * back;
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Marginals, and the logarithm of the sum, by going through all one-to-one sets of pairs.
+    fn exact(edges: &[Edge]) -> (Vec<f64>, f64) {
+        let mut sums = vec![0.0; edges.len()];
+        let mut total = 0.0;
+        for set in 0u32..1 << edges.len() {
+            let chosen: Vec<usize> = (0..edges.len()).filter(|i| set >> i & 1 == 1).collect();
+            let clash = chosen.iter().enumerate().any(|(at, &i)| {
+                chosen[at + 1..].iter().any(|&j| edges[i].query == edges[j].query || edges[i].map == edges[j].map)
+            });
+            if clash {
+                continue;
+            }
+            let weight: f64 = chosen.iter().map(|&i| edges[i].ratio).product();
+            total += weight;
+            for i in chosen {
+                sums[i] += weight;
+            }
+        }
+        (sums.iter().map(|sum| sum / total).collect(), total.ln())
+    }
+
+    fn assert_close(edges: &[Edge], within: f64) {
+        let (found, (marginals, sum)) = (Beliefs::new(edges, 2, 2), exact(edges));
+        for (found, truth) in found.probabilities.iter().zip(marginals) {
+            assert!((found - truth).abs() < within, "{found} {truth}");
+        }
+        assert!((found.log_sum - sum).abs() < 3.0 * within, "{} {sum}", found.log_sum);
+    }
+
+    #[test]
+    fn beliefs_are_exact_on_a_tree_and_close_on_a_loop() {
+        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
+        assert_close(&[edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)], 1e-5);
+        assert_close(&[edge(0, 0, 5.0), edge(0, 1, 2.0), edge(1, 0, 1.0), edge(1, 1, 3.0)], 0.05);
+    }
+}

@@ -1,0 +1,87 @@
+//! How much a settled overlap says for its pose: the log-likelihood ratio of "both visits saw these trees" to "two
+//! unrelated rows", signed, every fruit predicted without its own partner.
+//!
+//! It is the evidence of [`super::overlap`] with the sum over all one-to-one sets of pairs in place of the nearest
+//! partner, and leave-one-out predictions in place of fitted ones:
+//!
+//! ```text
+//! S = ln sum over sets (product over pairs p u N / (rho (1 - p u) (1 - p v)))
+//!   + sum over both visits ln(1 - p u) + p sum over the query u
+//! ```
+//!
+//! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
+//! when it grew, below zero where nothing was selected.
+
+use super::beliefs::{Beliefs, Edge};
+use super::decision::DETECTION;
+use super::landscape::Landscape;
+use super::overlap::Landing;
+use super::pairing::{Meeting, meetings};
+use super::placement::Placement;
+
+/// Steps of expectation and maximisation of the share that is seen again, from [`DETECTION`].
+const STEPS: usize = 4;
+
+/// Least and largest share of fruits seen again.
+const SHARES: (f64, f64) = (0.1, 0.95);
+
+/// Pairs less likely than this against both being alone are left out.
+const LEAST_RATIO: f64 = 1e-3;
+
+/// Evidence of an overlap, nats.
+///
+/// `there` has, for each fruit of the map, how surely the query would have shown it; 0 outside the overlap.
+pub(super) fn evidence(
+    query: &Landscape,
+    map: &Landscape,
+    predictions: &[Option<Landing>],
+    pose: &Placement,
+    there: &[f64],
+) -> f64 {
+    let here: Vec<f64> = predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
+    let met = meetings(query, map, predictions, pose, 0.0, |meeting| Some(*meeting));
+    let due: f64 = here.iter().sum();
+    let mut share = DETECTION;
+    let mut evidence = 0.0;
+    for _ in 0..STEPS {
+        let edge = |meeting: &Meeting| edge(map, meeting, share, there[meeting.map as usize]);
+        let edges: Vec<Edge> = met.iter().filter_map(edge).collect();
+        let beliefs = Beliefs::new(&edges, query.len(), map.len());
+        let alone: f64 = here.iter().chain(there).map(|support| (1.0 - share * support).ln()).sum();
+        evidence = beliefs.log_sum + alone + share * due;
+        let found: f64 = beliefs.probabilities.iter().sum();
+        share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
+    }
+    evidence
+}
+
+fn edge(map: &Landscape, meeting: &Meeting, share: f64, back: f64) -> Option<Edge> {
+    let seen = share * meeting.support;
+    let strangers = map.density[meeting.map as usize];
+    let ratio = seen * meeting.density / (strangers * (1.0 - seen) * (1.0 - share * back));
+    (ratio > LEAST_RATIO).then_some(Edge { query: meeting.query, map: meeting.map, ratio, distance: meeting.distance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::fixture::visits;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn the_true_pose_has_evidence_and_the_same_pose_moved_along_has_less_than_none() {
+        let (query, map) = visits(0.02);
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let at = |shift: Vector3<f64>| {
+            let pose = Placement { translation: query.centre - map.centre + shift, ..Placement::identity() };
+            let land = |p: &Vector3<f64>| Some(Landing { place: pose.apply(p), variance: 0.02 * 0.02 });
+            let predictions: Vec<_> = query.points.iter().map(land).collect();
+            let there: Vec<f64> = map.points.iter().map(|p| query.support(&pose.apply_inverse(p))).collect();
+            evidence(&query, &map, &predictions, &pose, &there)
+        };
+        assert!(at(Vector3::zeros()) > 300.0);
+        for step in [0.3, 0.5, 1.0] {
+            assert!(at(Vector3::x() * step) < 0.0);
+        }
+    }
+}
