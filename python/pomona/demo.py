@@ -81,9 +81,9 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
     sessions = (_write_visit(folder, first_date, scene.map), _write_visit(folder, second_date, scene.query))
 
     first = add_session(orchard, load_session(sessions[0]))
-    known = OrchardMap(orchard).fruits()
     second = add_session(orchard, load_session(sessions[1]))
-    if second.match is None or not second.is_added:
+    known = second.known
+    if known is None or second.match is None or not second.is_added:
         raise RuntimeError("the second visit of the demo was not found in the map of the first")
     tell(f"added both to a map: {second.n_matched} fruits known again, {second.n_new} new")
 

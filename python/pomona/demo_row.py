@@ -134,8 +134,8 @@ def _added(orchard: Path, session: Path, visits: list[Path], folder: Path) -> De
     loaded = load_session(session)
     cloud = loaded.cloud
     sizes_mm = 1000 * float(np.nanmedian(cloud.diameters_m)) if cloud.diameters_m is not None else float("nan")
-    known = OrchardMap(orchard).fruits() if orchard.exists() else None
     added = add_session(orchard, loaded)
+    known = added.known
     if known is None or added.match is None or not added.is_added:
         return DemoVisit(session, len(cloud), added.fruit_ids, sizes_mm, added.match)
     day = visits[-1].name

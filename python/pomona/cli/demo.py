@@ -78,6 +78,7 @@ def _lines_of_row(made: RowDemo) -> list[str]:
         f"  {made.orchard}  the map; opens in QGIS",
         "go on with",
         f"  pomona match {made.visits[-1].session} {made.visits[0].session}",
+        f"  pomona growth {made.orchard} -o {made.orchard.parent / 'growth'}",
         f"  pomona map info {made.orchard}",
     ]
 

@@ -48,6 +48,8 @@ class Added:
         session looked and were not seen.
     match : Match, optional
         How the session was found in the map; None for the first session.
+    known : FruitCloud, optional
+        The fruits that `match` is with: those of the map that may still hang, before the session came.
     changes : tuple of Change
         Observations of other sessions that now are of another fruit.
     """
@@ -57,6 +59,7 @@ class Added:
     n_new: int
     n_missed: int
     match: Match | None
+    known: FruitCloud | None = None
     changes: tuple[Change, ...] = ()
 
     @property
@@ -186,12 +189,12 @@ def _add(
             raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)
         if found.status.value != "Found":
-            return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found)
+            return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found, known)
         evidence = read_evidence(connection)
         ids = np.array(known.ids, np.int64)
         matches = matches_with_visits(evidence, new_visit(session), found, ids, settings)
         placement = Placement(settings, found.log_odds, found.noise_m)
-        return _join(connection, session, evidence, matches, placement, found)
+        return replace(_join(connection, session, evidence, matches, placement), match=found, known=known)
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:
@@ -206,7 +209,6 @@ def _join(
     evidence: Evidence,
     matches: Mapping[int, VisitPair],
     placement: Placement | None = None,
-    found: Match | None = None,
 ) -> Added:
     """Write the session and all that follows from it with the others."""
     visit = new_visit(session)
@@ -235,7 +237,7 @@ def _join(
     settle(connection, together, settlement)
     write_changes(connection, "added", session.name, settlement.changes)
     update_layers(connection)
-    return _told(settlement, own, found)
+    return _told(settlement, own)
 
 
 def _worth_recognising(fruits: FruitCloud) -> FruitCloud:
@@ -245,7 +247,7 @@ def _worth_recognising(fruits: FruitCloud) -> FruitCloud:
     return fruits.select(may_hang) if may_hang.any() else fruits
 
 
-def _told(settlement: Settlement, own: int, found: Match | None) -> Added:
+def _told(settlement: Settlement, own: int) -> Added:
     """Say what became of a session that is there now."""
     conclusion = settlement.conclusion
     looks = conclusion.looks
@@ -257,7 +259,7 @@ def _told(settlement: Settlement, own: int, found: Match | None) -> Added:
         n_matched=n_matched,
         n_new=n_seen - n_matched,
         n_missed=int((looks.in_view[:, own] & ~looks.seen[:, own]).sum()),
-        match=found,
+        match=None,
         changes=tuple(settlement.changes),
     )
 
