@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import date
@@ -11,7 +9,8 @@ from pathlib import Path
 from statistics import median
 
 from pomona.errors import PomonaError
-from pomona.reading import number_in, read_given_text, shown
+from pomona.growth.table_lines import table_lines
+from pomona.reading import number_in, shown
 
 __all__ = ["Measurement", "read_calipers"]
 
@@ -59,19 +58,14 @@ def read_calipers(path: Path) -> tuple[Measurement, ...]:
         One line: a column that is missing, a unit that is not known, a size that is no number or not above 0, a fruit
         measured twice on a day, sizes that no fruit has.
     """
-    rows = csv.reader(io.StringIO(read_given_text(path, _EXPECTED), newline=""))
-    header = [name.strip() for name in next(rows, [])]
+    lines = table_lines(path, _EXPECTED)
+    header = [name.strip() for name in next(lines)[1]]
     name_column = next((name for name in NAMES if name in header), None)
     if name_column is None:
         raise PomonaError(f"{path}: found the header {shown(','.join(header))}, expected {_EXPECTED}")
     columns = _columns(path, header)
     found: dict[tuple[str, date | None], Measurement] = {}
-    for cells in rows:
-        if not any(map(str.strip, cells)):
-            continue
-        where = f"{path}: line {rows.line_num}"
-        if len(cells) != len(header):
-            raise PomonaError(f"{where}: found {len(cells)} cells, expected {len(header)} as in the header")
+    for where, cells in lines:
         for one in _of_line(where, dict(zip(header, cells, strict=True)), name_column, columns):
             if (one.name, one.day) in found:
                 raise PomonaError(f"{where}: found fruit {shown(one.name)} a second time{_on(one.day)}, expected once")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
@@ -14,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.reading import number_in, read_given_text, shown
+from pomona.growth.table_lines import table_lines
+from pomona.reading import number_in, shown
 
 __all__ = ["CALENDAR", "Calendar", "DegreeDays", "SeasonClock", "read_temperatures"]
 
@@ -135,17 +134,12 @@ def read_temperatures(path: Path, days: Sequence[date]) -> dict[date, float]:
 
 
 def _rows(path: Path) -> Iterator[tuple[str, date, float]]:
-    rows = csv.reader(io.StringIO(read_given_text(path, _EXPECTED), newline=""))
-    header = [name.strip().lower() for name in next(rows, [])]
+    lines = table_lines(path, _EXPECTED)
+    header = [name.strip().lower() for name in next(lines)[1]]
     columns = next((names for names in (("mean_c",), ("min_c", "max_c")) if set(names) <= set(header)), None)
     if "date" not in header or columns is None:
         raise PomonaError(f"{path}: found the header {shown(','.join(header))}, expected {_EXPECTED}")
-    for cells in rows:
-        if not any(map(str.strip, cells)):
-            continue
-        where = f"{path}: line {rows.line_num}"
-        if len(cells) != len(header):
-            raise PomonaError(f"{where}: found {len(cells)} cells, expected {len(header)} as in the header")
+    for where, cells in lines:
         row = dict(zip(header, cells, strict=True))
         yield where, _day(where, row["date"]), float(np.mean([_degrees_c(where, name, row[name]) for name in columns]))
 
