@@ -10,6 +10,7 @@ from pomona.detect.from_file import FileDetector
 from pomona.detect.onnx import OnnxDetector
 from pomona.detect.opening import open_detector
 from pomona.detect.shipped import SHIPPED, model_named
+from pomona.errors import PomonaWarning
 from pomona.recording import open_recording
 from recording_maker import make_recording
 
@@ -86,3 +87,15 @@ def test_the_shipped_model_looks_where_there_are_no_boxes(row):
     assert found.signature.family == "pomona"
     assert found.selection.min_score == 0.5
     assert 0 < named.selection.min_score < 1
+
+
+def test_pictures_without_colour_are_told_where_the_shipped_model_looks(row):
+    import cv2
+
+    (row / "detections.csv").unlink()
+    grey = np.tile(np.arange(640, dtype=np.uint8)[None, :, None], (480, 1, 3))
+    assert cv2.imwrite(str(row / "left" / "0000.png"), grey)
+    with pytest.warns(PomonaWarning, match="the pictures have no colour, and the detector that is inside finds few"):
+        open_detector(None, None, open_recording(row))
+    # A model of one's own may have learnt from such pictures: no warning, which would be an error here.
+    open_detector(None, model_named(SHIPPED), open_recording(row))

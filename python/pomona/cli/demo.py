@@ -62,7 +62,7 @@ def _as_lines(made: Demo) -> list[str]:
 def _share(score: PairScore) -> str:
     if score.precision is None:
         return "no pairs"
-    shares = f"{score.precision:.3f} precision, {score.recall:.3f} recall"
+    shares = f"{score.precision:.3f} precision, {score.recall:.3f} recall of what both visits found"
     return f"{shares} ({score.true} true, {score.false} false, {score.missed} missed)"
 
 

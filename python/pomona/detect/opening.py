@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, TypeGuard, Unpack
 
+from pomona.detect.colour_check import check_colour
 from pomona.detect.detections import Detector
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MaskDetector
 from pomona.detect.own import OwnDetector
-from pomona.detect.shipped import SHIPPED, model_named
+from pomona.detect.shipped import SHIPPED, is_shipped, model_named
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Recording
 from pomona.recording.boxes_beside import boxes_beside
@@ -95,7 +96,10 @@ def open_detector(
         raise PomonaError(f"{recording.path}: found {found} pictures, expected left ones: a model looks at them")
     from pomona.detect.onnx import OnnxDetector
 
-    return OnnxDetector.open(model_named(model or SHIPPED), **given)  # type: ignore[arg-type] # the same names and types, None left out
+    name = SHIPPED if model is None else model
+    if is_shipped(name):
+        check_colour(recording)
+    return OnnxDetector.open(model_named(name), **given)  # type: ignore[arg-type] # the same names and types, None left out
 
 
 def _says_what_it_is(detector: Detector) -> TypeGuard[FoundBoxes]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["EXACT", "SHIPPED", "model_named"]
+__all__ = ["EXACT", "SHIPPED", "is_shipped", "model_named"]
 
 MODELS = Path(__file__).parent / "model"
 
@@ -15,6 +15,11 @@ EXACT = "shipped-fp32"
 """Name of the same in 32 bits: slower, and what `pomona train` begins with."""
 
 FILES = {SHIPPED: MODELS / "fruits_int8.onnx", EXACT: MODELS / "fruits.onnx"}
+
+
+def is_shipped(model: str | Path) -> bool:
+    """Tell the name of a shipped model from a file."""
+    return str(model) in FILES
 
 
 def model_named(model: str | Path) -> Path:
