@@ -12,7 +12,7 @@ from pomona.detect.detections import Detections
 from pomona.errors import PomonaError
 from pomona.likes import BOXES_DRAWN
 
-__all__ = ["draw_boxes", "drawn_name"]
+__all__ = ["draw_boxes", "drawn_name", "write_png"]
 
 COLOUR = (255, 64, 255)
 """BGR: no fruit and no leaf has it."""
@@ -32,7 +32,14 @@ def draw_boxes(path: Path, picture: NDArray[np.uint8], found: Detections) -> Non
         cv2.rectangle(drawn, corners[:2], corners[2:], COLOUR, 1)
         place = (corners[0], max(corners[1] - 2, 8))
         cv2.putText(drawn, f"{score:.2f}", place, cv2.FONT_HERSHEY_SIMPLEX, 0.35, COLOUR, 1, cv2.LINE_AA)
-    done, encoded = cv2.imencode(".png", drawn)
+    write_png(path, drawn)
+
+
+def write_png(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write a picture, (H, W, 3) uint8 BGR, whole or not at all."""
+    import cv2
+
+    done, encoded = cv2.imencode(".png", picture)
     if not done:
         raise PomonaError(f"{path}: cannot be encoded as PNG")
     with whole_file(path) as partial:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.atomic import whole_file
+from pomona.detect.drawn_boxes import write_png
 from pomona.errors import PomonaError
 from pomona.recording import Recording
 from pomona.survey.lettering import colour_of, lettering, write_on
@@ -55,7 +55,7 @@ def draw_same_fruits(path: Path, one: Seen, other: Seen) -> int:
     if not common:
         raise PomonaError(f"{path}: found no two frames with a fruit in common, expected some")
     drawn = [_drawn(seen, frame, common) for seen, frame in zip((one, other), frames, strict=True)]
-    _write_png(path, np.vstack(drawn))
+    write_png(path, np.vstack(drawn))
     return len(common)
 
 
@@ -85,13 +85,3 @@ def _drawn(seen: Seen, frame: int, common: set[int]) -> NDArray[np.uint8]:
             cv2.rectangle(picture, low, high, colour_of(name), 2)
             write_on(picture, (low[0], low[1] - 4 * size), str(name), colour_of(name), size)
     return picture
-
-
-def _write_png(path: Path, picture: NDArray[np.uint8]) -> None:
-    import cv2
-
-    done, encoded = cv2.imencode(".png", picture)
-    if not done:
-        raise PomonaError(f"{path}: cannot be encoded as PNG")
-    with whole_file(path) as partial:
-        partial.write_bytes(encoded.tobytes())
