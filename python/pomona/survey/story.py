@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
@@ -80,8 +81,8 @@ class Survey:
 
     def __repr__(self) -> str:
         where = f" in the longest of {len(self.parts)} parts" if len(self.parts) > 1 else ""
-        skipped = f", {len(self.skipped)} frames skipped" if self.skipped else ""
-        return f"Survey({len(self.cloud)} fruits{where}, from {self.detections} boxes{skipped})"
+        skipped = f", {amount(len(self.skipped), 'frame')} skipped" if self.skipped else ""
+        return f"Survey({amount(len(self.cloud), 'fruit')}{where}, from {amount(self.detections, 'box')}{skipped})"
 
     def _repr_html_(self) -> str:
         rows = [(number, *part.facts.values()) for number, part in enumerate(self.parts, start=1)]
@@ -257,7 +258,7 @@ def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:
     first = next(iter(skipped.values()))
     if len(skipped) == len(recording):
         raise PomonaError(first)
-    message = f"{recording.path}: skipped {len(skipped)} of {len(recording)} frames, first {first}"
+    message = f"{recording.path}: skipped {len(skipped)} of {amount(len(recording), 'frame')}, first {first}"
     warnings.warn(message, PomonaWarning, stacklevel=3)
 
 
