@@ -28,6 +28,8 @@ __all__ = [
     "PARQUET_MARK",
     "PICTURE",
     "RENDERED",
+    "REPORT",
+    "REPORT_MARK",
     "SCANNED",
     "THINNING",
     "VIDEO",
@@ -60,6 +62,9 @@ MODEL_MARK = b"pomona_training"
 
 PARQUET_MARK = b"fruits written by pomona"
 """In the footer of the Parquet files that are written here."""
+
+REPORT_MARK = b"<!-- season report written by pomona -->"
+"""In the first lines of the reports that are written here."""
 
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
@@ -209,6 +214,10 @@ def _is_model(path: Path) -> bool:
     return MODEL_MARK in _tail(path)
 
 
+def _is_report(path: Path) -> bool:
+    return REPORT_MARK in _head(path)
+
+
 def _has_drawn_boxes(folder: Path) -> bool:
     return all(path.name.endswith(BOXES_DRAWN) for path in folder.iterdir())
 
@@ -296,6 +305,7 @@ RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
 CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
+REPORT = Like("a report of a season", _is_report)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
