@@ -278,6 +278,7 @@ def _is_demo(folder: Path) -> bool:
     tells: dict[str, Callable[[Path], bool]] = {"orchard.gpkg": is_of_demo, "????-??-??.gpkg": is_of_demo}
     tells |= {f"pairs{dated}.csv": PAIRS.tells for dated in ("", "_????-??-??")}
     tells |= {f"match{dated}.png": PICTURE.tells for dated in ("", "_????-??-??")}
+    tells |= {"report.html": REPORT.tells}
     return all(is_kind(path) for name, is_kind in tells.items() for path in folder.glob(name))
 
 

@@ -1,4 +1,4 @@
-"""`pomona demo`: the main job in half a minute."""
+"""`pomona demo`: the whole story, on drawn visits or on recordings."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pomona.likes import DEMO
 if TYPE_CHECKING:
     from pomona.demo import Demo
     from pomona.demo_row import DemoVisit, RowDemo
+    from pomona.demo_season import DemoSeason
     from pomona.evaluate import PairScore
 
 
@@ -26,7 +27,7 @@ def demo(
         Path("out/demo"), "-o", "--output", help="Folder for the files it makes."
     ),
 ) -> None:
-    """Find the fruits of an orchard again weeks later: visits, one map, pictures."""
+    """Find the fruits of an orchard again weeks later: visits, one map; of recordings growth and a report too."""
     from pomona.cli.progress import working
     from pomona.demo import run_demo
     from pomona.demo_row import run_row_demo
@@ -73,7 +74,9 @@ def _lines_of_row(made: RowDemo) -> list[str]:
     return [
         f"{amount(len(made.visits), 'visit')}, {amount(made.n_identities, 'identity')} in the map",
         *found_again,
+        *([] if made.season is None else _lines_of_season(made.season)),
         "look at",
+        *([] if made.season is None else [f"  {made.season.report}  the season in a browser: open this first"]),
         f"  {made.same_fruits}  the same fruits on the last two dates",
         *pictures,
         f"  {made.orchard}  the map; opens in QGIS",
@@ -81,6 +84,19 @@ def _lines_of_row(made: RowDemo) -> list[str]:
         f"  pomona match {made.visits[-1].session} {made.visits[0].session}",
         f"  pomona growth {made.orchard} -o {made.orchard.parent / 'growth'}",
         f"  pomona map info {made.orchard}",
+    ]
+
+
+def _lines_of_season(season: DemoSeason) -> list[str]:
+    from pomona.demo_season import LARGE_MM
+
+    then, large = season.mean_then_mm, season.n_large_then
+    return [
+        f"  identities over all pairs of visits  {_share(season.identities)}",
+        f"  growth: {amount(season.n_hanging, 'fruit')} hang, {season.mean_mm:.1f} mm on average, "
+        f"{season.rate_mm_per_day:+.2f} mm a day",
+        f"  on {season.harvest}: {then.mean:.1f} mm on average ({then.low:.1f} to {then.high:.1f}, 90 %); "
+        f"{large.mean:.0f} fruits of {LARGE_MM:.0f} mm or more ({large.low:.0f} to {large.high:.0f})",
     ]
 
 
