@@ -9,7 +9,7 @@ FUZZ_SEED ?= 1
 NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop demo test test-rust test-python lint format bench experiments fuzz audit wheel docs clean help
+.PHONY: all install develop demo test test-rust test-python lint format animation bench experiments fuzz audit wheel docs clean help
 
 all: lint docs test ## what CI runs
 
@@ -24,7 +24,7 @@ install: $(UV) ## build pomona and install it with its tools into .venv
 develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
 	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install
 
-demo: install ## the main job in a minute: three recordings of a row, one map, every fruit found again
+demo: install ## the whole story in three minutes: three recordings of a row, one map, growth, a report to open
 	$(RUN) pomona demo examples/row
 
 test: test-rust test-python ## all tests
@@ -48,6 +48,9 @@ format: install ## rewrite the sources in the house's format
 	cargo fmt --all
 	$(RUN) ruff check --fix .
 	$(RUN) ruff format .
+
+animation: demo ## the animation at the top of the README, out of the demo; needs chromium
+	$(RUN) python examples/animation.py out/demo
 
 bench: install ## accuracy and speed; writes benchmarks/results
 	$(RUN) python -m benchmarks

@@ -17,6 +17,7 @@ NAMES = (
     "diameters",
     "kinect",
     "season",
+    "season_map",
     "growth",
     "seasons",
     "clouds",

@@ -114,7 +114,7 @@ def draw_apples(told: tuple[list[str], SeasonGrowth], by_hand: Apples):
         at = np.array(found.days, dtype="datetime64[D]")
         axes.fill_between(at, found.foretold.lows_mm[row], found.foretold.highs_mm[row], color="#0072b2", alpha=0.2)
         axes.plot(at, found.foretold.sizes_mm[row], color="#0072b2", label="curve, 90 %")
-        axes.plot(at[:-1], found.fruits.diameters_mm[row], ".", color="#3c3c3c", label="boxes")
+        axes.plot(at[: len(found.fruits.days)], found.fruits.diameters_mm[row], ".", color="#3c3c3c", label="boxes")
         days = sorted(by_hand[name])
         axes.plot(
             [datetime.fromordinal(day) for day in days],

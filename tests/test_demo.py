@@ -96,6 +96,20 @@ def test_recordings_go_in_and_fruits_found_again_come_out(two_visits: Path, tmp_
     assert made.same_fruits.stat().st_size > 100_000
     assert second.picture is not None
     assert second.picture.stat().st_size > 10_000
+    season = made.season
+    assert season is not None
+    assert season.identities.precision is not None
+    assert season.identities.precision > 0.9
+    assert season.identities.recall is not None
+    assert season.identities.recall > 0.9
+    assert season.n_hanging <= made.n_identities
+    assert season.harvest.isoformat() == "2024-09-26"
+    assert season.mean_then_mm.low < season.mean_then_mm.mean < season.mean_then_mm.high
+    assert season.mean_mm < season.mean_then_mm.mean < season.mean_mm + 14 * 0.6
+    assert 0 < season.n_large_then.mean <= season.n_hanging
+    page = season.report.read_text(encoding="utf-8")
+    assert page.startswith("<!")
+    assert "orchard.gpkg" in page
 
 
 def test_a_row_with_a_visit_without_its_truth_is_refused_before_anything_is_made(

@@ -33,12 +33,12 @@ def test_boxes_that_are_named_or_lie_in_the_folder(row):
     detector = open_detector(None, None, recording)
     assert isinstance(detector, FileDetector)
     assert detector.path == row / "detections.csv"
-    assert detector.description.endswith("detections.csv: 3 boxes with ids in 1 frames")
+    assert detector.description.endswith("detections.csv: 3 boxes with ids in 1 frame")
     assert json.loads(json.dumps(detector.configuration)) == {"detections": str((row / "detections.csv").resolve())}
     (row / "other.txt").write_text("1,-1,10,20,30,40,0.5\n")
     other = open_detector(row / "other.txt", None, recording)
     assert [len(other(frame)) for frame in recording.frames()] == [1]
-    assert other.description.endswith("other.txt: 1 boxes in 1 frames")
+    assert other.description.endswith("other.txt: 1 box in 1 frame")
 
 
 def test_a_model_with_settings(row):

@@ -240,7 +240,7 @@ def test_check_finds_an_identity_that_does_not_follow(season: Path, tmp_path: Pa
     connection.execute(swap, (one, other))
     connection.execute(swap, (other, -1))
     connection.close()
-    line = f"fruit {one} has 1 observations that from what the sessions saw are of fruit {other}"
+    line = f"fruit {one} has 1 observation that from what the sessions saw belong to fruit {other}"
     assert line in problems(path)
 
 

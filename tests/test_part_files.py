@@ -98,7 +98,7 @@ def test_the_summary_says_which_file_holds_what(tmp_path: Path, recording: Recor
     assert [part["output"] for part in told["parts"]] == [*reversed(told["output"]), None]
     assert [line.replace(f"{tmp_path}/", "") for line in as_lines(told, found)] == [
         "row.gpkg: 2 fruits in the longest of 3 parts (5 in all, some maybe twice), median diameter 70.0 mm, "
-        "from 100 boxes in 1 frames",
+        "from 100 boxes in 1 frame",
         "  row-part1.gpkg: frames 0 to 4, 3 fruits",
         "  row.gpkg: frames 5 to 13, 2 fruits: covered",
         "  not written: frames 14 to 17, 0 fruits: covered",

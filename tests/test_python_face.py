@@ -70,7 +70,7 @@ def test_short_answers(match: Match, visits: tuple[Path, Path], tmp_path: Path) 
     assert repr(FruitCloud(np.zeros((0, 3)))) == "FruitCloud(fruits: 0)"
     assert repr(index) == f"Index({len(cloud)} fruits, verified, metric)"
     assert repr(whole) == f"OrchardMap('{orchard}', map)"
-    assert repr(whole.observations()) == f"Observations({len(cloud)} of {len(cloud)} fruits in 1 sessions)"
+    assert repr(whole.observations()) == f"Observations({len(cloud)} of {len(cloud)} fruits in 1 session)"
     for answer in (match, cloud, index, whole):
         assert len(repr(answer)) < 200
         html = answer._repr_html_()

@@ -309,7 +309,7 @@ def test_euroc_pictures_without_a_partner_are_left_out_and_told(euroc):
     table = euroc / "mav0" / "cam1" / "data.csv"
     lines = table.read_text().splitlines()
     table.write_text("\n".join(lines[:2] + lines[3:]))
-    with pytest.warns(PomonaWarning, match="1 pictures of cam0 and cam1 have no partner"):
+    with pytest.warns(PomonaWarning, match="1 picture of cam0 and cam1 without a partner"):
         assert open_recording(euroc).numbers == (0, 2)
 
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.cloud import FruitCloud
 from pomona.demo import growth_mm, remove_own
+from pomona.demo_season import DemoSeason, told_season
 from pomona.errors import PomonaError
 from pomona.evaluate import PairScore, score_placed_pairs
 from pomona.likes import DEMO_NAME
@@ -77,16 +79,19 @@ class RowDemo:
         Fruits in the map.
     same_fruits : Path
         Pictures of the last two visits with the fruits that both show.
+    season : DemoSeason or None
+        What follows from all visits together; None where only one is in the map.
     """
 
     orchard: Path
     visits: list[DemoVisit]
     n_identities: int
     same_fruits: Path
+    season: DemoSeason | None
 
 
 def run_row_demo(row: Path, folder: Path, tell: Callable[[str], None] = lambda _: None) -> RowDemo:
-    """Scan the visits to a row, add them to a map in turn, draw and judge each match.
+    """Scan the visits to a row, add them to a map in turn, judge each match, and tell growth and report of the season.
 
     Parameters
     ----------
@@ -116,7 +121,13 @@ def run_row_demo(row: Path, folder: Path, tell: Callable[[str], None] = lambda _
         tell(_line(made[-1], visit.name))
     same = folder / "same_fruits.png"
     draw_same_fruits(same, *seen[-2:])
-    return RowDemo(orchard, made, len(OrchardMap(orchard).fruits()), same)
+    truths = {
+        f"{DEMO_NAME}{visit.name}": visit / TRUTH
+        for visit, one in zip(visits, made, strict=True)
+        if one.fruit_ids.any()
+    }
+    season = told_season(orchard, truths, folder / "report.html") if len(truths) > 1 else None
+    return RowDemo(orchard, made, len(OrchardMap(orchard).fruits()), same, season)
 
 
 def _visits_in(row: Path) -> list[Path]:
@@ -157,7 +168,7 @@ def _score(match: Match, clouds: tuple[FruitCloud, FruitCloud], truth: tuple[Pat
 
 
 def _line(visit: DemoVisit, day: str) -> str:
-    found = f"{day}: {visit.n_fruits} fruits, median diameter {visit.diameter_mm:.0f} mm"
+    found = f"{day}: {amount(visit.n_fruits, 'fruit')}, median diameter {visit.diameter_mm:.0f} mm"
     if visit.match is None:
         return found
     return f"{found}; {visit.match.status.value}: {len(visit.match.pairs)} of them known"

@@ -28,14 +28,16 @@ __all__ = [
     "PARQUET_MARK",
     "PICTURE",
     "RENDERED",
+    "REPORT",
+    "REPORT_MARK",
     "SCANNED",
-    "SEASON",
     "THINNING",
     "VIDEO",
     "VISITS",
     "Database",
     "Like",
     "database_of",
+    "drawn_season",
     "is_like",
     "is_of_demo",
     "visits_of_season",
@@ -60,6 +62,9 @@ MODEL_MARK = b"pomona_training"
 
 PARQUET_MARK = b"fruits written by pomona"
 """In the footer of the Parquet files that are written here."""
+
+REPORT_MARK = b"<!-- season report written by pomona -->"
+"""In the first lines of the reports that are written here."""
 
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
@@ -209,6 +214,10 @@ def _is_model(path: Path) -> bool:
     return MODEL_MARK in _tail(path)
 
 
+def _is_report(path: Path) -> bool:
+    return REPORT_MARK in _head(path)
+
+
 def _has_drawn_boxes(folder: Path) -> bool:
     return all(path.name.endswith(BOXES_DRAWN) for path in folder.iterdir())
 
@@ -234,11 +243,19 @@ def visits_of_season(folder: Path) -> set[str]:
         return set()
 
 
-def _has_season(folder: Path) -> bool:
-    """Tell a folder in which every file with one of our names is told of by a truth of ours."""
-    names = {path.name for path in folder.iterdir()}
-    ours = visits_of_season(folder)
-    return {name for name in names if DATED.fullmatch(name)} <= ours and ("truth.json" not in names or bool(ours))
+def drawn_season(name: str, seed: int) -> Like:
+    """Say what a drawn season may replace: itself, drawn otherwise; another season or seed it may not."""
+
+    def tells(folder: Path) -> bool:
+        names = {path.name for path in folder.iterdir()}
+        if not {name for name in names if DATED.fullmatch(name)} <= visits_of_season(folder):
+            return False
+        if "truth.json" not in names:
+            return True
+        truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+        return bool(visits_of_season(folder)) and (truth["season"], truth["seed"]) == (name, seed)
+
+    return Like(f"a folder of the season {name} with seed {seed}", tells, is_folder=True)
 
 
 def is_of_demo(path: Path) -> bool:
@@ -261,6 +278,7 @@ def _is_demo(folder: Path) -> bool:
     tells: dict[str, Callable[[Path], bool]] = {"orchard.gpkg": is_of_demo, "????-??-??.gpkg": is_of_demo}
     tells |= {f"pairs{dated}.csv": PAIRS.tells for dated in ("", "_????-??-??")}
     tells |= {f"match{dated}.png": PICTURE.tells for dated in ("", "_????-??-??")}
+    tells |= {"report.html": REPORT.tells}
     return all(is_kind(path) for name, is_kind in tells.items() for path in folder.glob(name))
 
 
@@ -286,9 +304,9 @@ VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
-SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
 CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
+REPORT = Like("a report of a season", _is_report)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {

@@ -18,11 +18,13 @@ from pomona.cli import (
     info,
     map,
     match,
+    report,
     scan,
     synth,
     thinning,
     train,
     validate,
+    view,
 )
 from pomona.cli.terminal import say, tell
 from pomona.cli.verbs import Verbs
@@ -65,6 +67,8 @@ app.add_typer(map.app, name="map")
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)
+app.command()(view.view)
+app.command()(report.report)
 app.command()(export.export)
 app.command()(config.config)
 app.add_typer(evaluate.app, name="evaluate")

@@ -1,4 +1,4 @@
-"""`pomona demo`: the main job in half a minute."""
+"""`pomona demo`: the whole story, on drawn visits or on recordings."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import DEMO
@@ -14,6 +15,7 @@ from pomona.likes import DEMO
 if TYPE_CHECKING:
     from pomona.demo import Demo
     from pomona.demo_row import DemoVisit, RowDemo
+    from pomona.demo_season import DemoSeason
     from pomona.evaluate import PairScore
 
 
@@ -25,7 +27,7 @@ def demo(
         Path("out/demo"), "-o", "--output", help="Folder for the files it makes."
     ),
 ) -> None:
-    """Find the fruits of an orchard again weeks later: visits, one map, pictures."""
+    """Find the fruits of an orchard again weeks later: visits, one map; of recordings growth and a report too."""
     from pomona.cli.progress import working
     from pomona.demo import run_demo
     from pomona.demo_row import run_row_demo
@@ -45,8 +47,8 @@ def _told(line: str) -> None:
 def _as_lines(made: Demo) -> list[str]:
     first, second = (path.stem for path in made.sessions)
     return [
-        f"{made.match.status.value}: {len(made.match.pairs)} fruits of {second} known from {first}, "
-        f"{made.n_identities} identities in the map",
+        f"{made.match.status.value}: {amount(len(made.match.pairs), 'fruit')} of {second} known from {first}, "
+        f"{amount(made.n_identities, 'identity')} in the map",
         f"  against the truth  {_share(made.score)}",
         f"  growth             {made.growth_mm:+.1f} mm in diameter, median",
         "look at",
@@ -70,9 +72,11 @@ def _lines_of_row(made: RowDemo) -> list[str]:
     found_again = [line for visit in made.visits[1:] for line in _lines_of_visit(visit)]
     pictures = [f"  {visit.picture}  fruits found again, new and missed" for visit in made.visits if visit.picture]
     return [
-        f"{len(made.visits)} visits, {made.n_identities} identities in the map",
+        f"{amount(len(made.visits), 'visit')}, {amount(made.n_identities, 'identity')} in the map",
         *found_again,
+        *([] if made.season is None else _lines_of_season(made.season)),
         "look at",
+        *([] if made.season is None else [f"  {made.season.report}  the season in a browser: open this first"]),
         f"  {made.same_fruits}  the same fruits on the last two dates",
         *pictures,
         f"  {made.orchard}  the map; opens in QGIS",
@@ -83,11 +87,25 @@ def _lines_of_row(made: RowDemo) -> list[str]:
     ]
 
 
+def _lines_of_season(season: DemoSeason) -> list[str]:
+    from pomona.demo_season import LARGE_MM
+
+    then, large = season.mean_then_mm, season.n_large_then
+    return [
+        f"  identities over all pairs of visits  {_share(season.identities)}",
+        f"  growth: {amount(season.n_hanging, 'fruit')} hang, {season.mean_mm:.1f} mm on average, "
+        f"{season.rate_mm_per_day:+.2f} mm a day",
+        f"  on {season.harvest}: {then.mean:.1f} mm on average ({then.low:.1f} to {then.high:.1f}, 90 %); "
+        f"{large.mean:.0f} fruits of {LARGE_MM:.0f} mm or more ({large.low:.0f} to {large.high:.0f})",
+    ]
+
+
 def _lines_of_visit(visit: DemoVisit) -> list[str]:
     day, match = visit.session.stem, visit.match
     if match is None or visit.score is None:
         return [f"  {day}: {'no match' if match is None else match.status.value}"]
     return [
-        f"  {day}: {len(match.pairs)} of {visit.n_fruits} fruits known, {visit.growth_mm:+.1f} mm since, median",
+        f"  {day}: {len(match.pairs)} of {amount(visit.n_fruits, 'fruit')} known, "
+        f"{visit.growth_mm:+.1f} mm since, median",
         f"    against the truth  {_share(visit.score)}",
     ]

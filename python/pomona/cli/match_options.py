@@ -81,11 +81,14 @@ def call_flags(
 def _parse_up(texts: list[str]) -> list[list[float]]:
     if len(texts) > 2:
         raise PomonaError(f"--up: found {len(texts)} directions, expected one for both clouds or query then map")
-    directions = []
-    for text in texts:
-        try:
-            x, y, z = (float(number) for number in text.split(","))
-        except ValueError:
-            raise PomonaError(f"--up: found {text!r}, expected three numbers X,Y,Z") from None
-        directions.append([x, y, z])
+    directions = [direction(text) for text in texts]
     return directions if len(directions) == 2 else directions * 2
+
+
+def direction(text: str) -> list[float]:
+    """Read a direction given as three numbers."""
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError:
+        raise PomonaError(f"--up: found {text!r}, expected three numbers X,Y,Z") from None
+    return [x, y, z]

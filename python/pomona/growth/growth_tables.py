@@ -19,6 +19,7 @@ __all__ = [
     "CURVE_COLUMNS",
     "FRUIT_COLUMNS",
     "SERIES_COLUMNS",
+    "class_lines",
     "used_classes",
     "write_table",
     "write_tables",
@@ -63,7 +64,7 @@ def write_tables(folder: Path, growth: SeasonGrowth, *, pack_kg: float) -> tuple
         "curves.csv": (CURVE_COLUMNS, _curves(growth)),
         "fruits.csv": (FRUIT_COLUMNS, _fruits(growth)),
         "blocks.csv": (BLOCK_COLUMNS, _blocks(growth)),
-        "classes.csv": (CLASS_COLUMNS, _class_lines(growth, pack_kg)),
+        "classes.csv": (CLASS_COLUMNS, class_lines(growth, pack_kg)),
     }
     for name, (columns, lines) in tables.items():
         write_table(folder / name, columns, lines)
@@ -133,7 +134,7 @@ def _blocks(growth: SeasonGrowth) -> Iterator[Line]:
         yield *about, *current, mean[row, -1], sigma[row, -1], *forecast
 
 
-def _class_lines(growth: SeasonGrowth, pack_kg: float) -> list[Line]:
+def class_lines(growth: SeasonGrowth, pack_kg: float) -> list[Line]:
     """Count fruits, kilograms and packs by size class, on the last visit and at the harvest; empty ends left out."""
     counts, masses_kg = (_with_interval(growth.foretold.summaries[name]) for name in ("counts", "masses_kg"))
     limits: list[float | None] = [None, *growth.limits_mm.tolist(), None]

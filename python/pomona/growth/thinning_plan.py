@@ -13,7 +13,7 @@ from pomona.growth.fruit_drop import FruitDrop, drop_of
 from pomona.growth.season_clock import CALENDAR
 from pomona.growth.season_growth import SeasonGrowth
 
-__all__ = ["ThinningPlan", "plan_thinning"]
+__all__ = ["ThinningPlan", "plan_thinning", "rates_are_known"]
 
 KEEP, DROPS, THIN = "keep", "drops", "thin"
 
@@ -32,6 +32,9 @@ class ThinningPlan:
         At the last visit, and between the last two days; NaN for a fruit that one of them did not measure.
     drop : FruitDrop
         Of the M fruits.
+    places : (M,) float64
+        Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. NaN
+        for what drops.
     actions : tuple of M str
         `keep`, `drops` or `thin`.
     """
@@ -42,6 +45,7 @@ class ThinningPlan:
     sizes_mm: NDArray[np.float64]
     rates_mm_per_day: NDArray[np.float64]
     drop: FruitDrop
+    places: NDArray[np.float64]
     actions: tuple[str, ...]
 
 
@@ -62,19 +66,25 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     fruits = growth.fruits
     rows = np.flatnonzero(fruits.hanging)
     rates, noise = _rates(growth)
-    if np.isnan(rates[rows]).all():
+    if not rates_are_known(growth):
         raise PomonaError(f"{fruits.path}: found no fruit that was measured on both of the last two days of visits")
     drop = drop_of(rates[rows], noise)
     clusters = clusters_of(fruits.cloud.positions[rows])
     sizes_mm = growth.foretold.sizes_mm[rows, len(fruits.days) - 1]
     drops = np.nan_to_num(drop.probabilities) > 0.5
-    thin = np.zeros(len(rows), dtype=bool)
-    if target_per_tree is not None:
-        for tree in range(len(fruits.trees.names)):
-            of_tree = np.flatnonzero((fruits.trees.numbers[rows] == tree) & ~drops)
-            thin[_surplus(of_tree, clusters, sizes_mm, target_per_tree)] = True
+    places = np.full(len(rows), np.nan)
+    for tree in range(len(fruits.trees.names)):
+        of_tree = np.flatnonzero((fruits.trees.numbers[rows] == tree) & ~drops)
+        given_first = _order_of_thinning(of_tree, clusters, sizes_mm)
+        places[given_first] = np.arange(len(of_tree), 0, -1)
+    thin = np.zeros(len(rows), dtype=bool) if target_per_tree is None else places > target_per_tree
     actions = tuple(DROPS if gone else THIN if taken else KEEP for gone, taken in zip(drops, thin, strict=True))
-    return ThinningPlan(rows, clusters, np.bincount(clusters)[clusters], sizes_mm, rates[rows], drop, actions)
+    return ThinningPlan(rows, clusters, np.bincount(clusters)[clusters], sizes_mm, rates[rows], drop, places, actions)
+
+
+def rates_are_known(growth: SeasonGrowth) -> bool:
+    """Tell whether any hanging fruit was measured on both of the last two days, as `plan_thinning` needs."""
+    return not bool(np.isnan(_rates(growth)[0][growth.fruits.hanging]).all())
 
 
 def _rates(growth: SeasonGrowth) -> tuple[NDArray[np.float64], float]:
@@ -99,12 +109,12 @@ def _mean_of(sizes_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def _surplus(
-    fruits: NDArray[np.int64], clusters: NDArray[np.int64], sizes_mm: NDArray[np.float64], target: int
+def _order_of_thinning(
+    fruits: NDArray[np.int64], clusters: NDArray[np.int64], sizes_mm: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Choose what a tree bears beyond its target: out of the fullest clusters, the smallest first."""
+    """Put the fruits of a tree in the order in which it gives them: out of the fullest clusters, the smallest first."""
     ordered = fruits[np.lexsort((-sizes_mm[fruits], clusters[fruits]))]
     starts = np.flatnonzero(np.diff(clusters[ordered], prepend=-1))
     # 0 is the largest fruit of its cluster: the higher the place, the fuller is the cluster that it leaves.
     place = np.arange(len(ordered)) - np.repeat(starts, np.diff(starts, append=len(ordered)))
-    return ordered[np.lexsort((sizes_mm[ordered], -place))][: max(0, len(fruits) - target)]
+    return ordered[np.lexsort((sizes_mm[ordered], -place))]

@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
+from pomona.amounts import amount
 from pomona.orchard.evidence import read_evidence
 from pomona.orchard.settling import FruitRow, fruit_rows, settlement_of
 from pomona.store.cells import COLUMNS
@@ -79,8 +80,8 @@ def _unsettled(connection: sqlite3.Connection) -> Iterator[str]:
     settlement = settlement_of(connection, evidence)
     for change in settlement.changes:
         yield (
-            f"fruit {change.from_fruit_id} has {change.n_observations} observations that from what the sessions saw "
-            f"are of fruit {change.to_fruit_id}"
+            f"fruit {change.from_fruit_id} has {amount(change.n_observations, 'observation')} that from what the "
+            f"sessions saw belong to fruit {change.to_fruit_id}"
         )
     if not settlement.changes:
         yield from _misjudged(connection, fruit_rows(connection, evidence, settlement))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.reading import number_in, read_text, shown, whole_number
 from pomona.recording.calibration.rectification import rectified
@@ -115,7 +116,7 @@ def _simultaneous(root: Path, left_ns: NDArray[np.int64], right_ns: NDArray[np.i
     if len(left) == 0:
         raise PomonaError(f"{root}: found no time that is in both cam0 and cam1, expected pairs of one trigger")
     if alone:
-        message = f"{root}: {alone} pictures of cam0 and cam1 have no partner of the same time and are left out"
+        message = f"{root}: {amount(alone, 'picture')} of cam0 and cam1 without a partner of the same time, left out"
         warnings.warn(message, PomonaWarning, stacklevel=3)
     return np.stack([left, right], axis=1)
 

@@ -1,0 +1,37 @@
+"""`pomona view`: the orchard over a season in a browser, as the map is now."""
+
+from __future__ import annotations
+
+import typer
+
+from pomona.cli.page_wishes import Calipers, Classes, Harvest, OrchardMapFile, PackKg, Target, Temperature, Up
+from pomona.cli.terminal import say
+
+
+def view(
+    orchard: OrchardMapFile,
+    port: int = typer.Option(8123, min=0, max=65535, help="0 takes any free one."),
+    host: str = typer.Option("127.0.0.1", metavar="ADDRESS", help="Where to listen; other machines can look then."),
+    harvest: Harvest = None,
+    temperature: Temperature = None,
+    calipers: Calipers = None,
+    classes: Classes = None,
+    target: Target = None,
+    pack_kg: PackKg = 13.0,
+    up: Up = None,
+) -> None:
+    """Show a map in the browser: the row in 3D, every fruit and its growth, what to decide. Ctrl-C ends it.
+
+    Only this machine can look, and nothing is written. When a visit is added the page shows it after a reload.
+    """
+    from pomona.cli.page_wishes import page_wishes
+    from pomona.cli.progress import working
+    from pomona.viewer.page_server import listening, page_app, serve
+
+    wishes = page_wishes(harvest, temperature, calipers, classes, target, pack_kg, up)
+    with listening(host, port) as taken:
+        with working(f"telling {orchard}"):
+            app = page_app(orchard, wishes)
+        address, number = taken.getsockname()[:2]
+        say(f"http://{f'[{address}]' if ':' in address else address}:{number}/")
+        serve(app, taken)

@@ -1,0 +1,117 @@
+"""The page on a port of this machine: five addresses, all for reading, of one map."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pomona.errors import PomonaError
+from pomona.viewer.built_page import built_page
+from pomona.viewer.season_page import Wishes, season_document
+from pomona.viewer.visitors import why_refused
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI, Request, Response
+
+__all__ = ["listening", "page_app", "serve"]
+
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+class _ServedSeason:
+    """The document of a map, told anew when the file has changed."""
+
+    def __init__(self, path: Path, wishes: Wishes) -> None:
+        self._path, self._wishes = path, wishes
+        self._lock = threading.Lock()
+        self._told_of: tuple[int, int] | None = None
+        self._text = b""
+
+    def text(self) -> bytes:
+        with self._lock:
+            about = self._path.stat()
+            if self._told_of != (about.st_mtime_ns, about.st_size):
+                self._text = json.dumps(season_document(self._path, self._wishes), allow_nan=False).encode()
+                self._told_of = (about.st_mtime_ns, about.st_size)
+            return self._text
+
+
+def page_app(path: Path, wishes: Wishes) -> FastAPI:
+    """Make the application that serves one map.
+
+    Raises
+    ------
+    PomonaError
+        When the map cannot be told, see `season_document`, or the extra `view` is not installed.
+    """
+    try:
+        from fastapi import FastAPI, Response
+    except ImportError:
+        raise PomonaError("the live page needs fastapi and uvicorn: pip install fastapi uvicorn") from None
+    season, page = _ServedSeason(path, wishes), built_page()
+    season.text()
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+
+    def season_json() -> Response:
+        try:
+            return Response(season.text(), media_type="application/json")
+        except (PomonaError, OSError) as error:
+            return Response(json.dumps({"error": str(error)}), 503, media_type="application/json")
+
+    kinds = {"/": (page.html, "text/html"), "/page.js": (page.script, "text/javascript")}
+    kinds["/page.css"] = (page.style, "text/css")
+    for address, (text, kind) in kinds.items():
+        app.add_api_route(address, _constant(Response(text, media_type=kind)), methods=["GET", "HEAD"])
+    app.add_api_route("/season.json", season_json, methods=["GET", "HEAD"])
+    app.middleware("http")(_guarded)
+    return app
+
+
+def _constant(response: Response) -> Callable[[], Response]:
+    return lambda: response
+
+
+async def _guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
+    from fastapi import Response
+
+    refused = why_refused(request.headers)
+    response = await answer(request) if refused is None else Response(refused, 403, media_type="text/plain")
+    response.headers.update(HEADERS)
+    return response
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """Take a port, any free one for 0.
+
+    Raises
+    ------
+    PomonaError
+        When it is taken, or the address is none of this machine's.
+    """
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        taken = socket.socket(family, kind)
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        taken.bind(address)
+    except OSError as error:
+        raise PomonaError(f"--host {host} --port {port}: cannot be listened on: {error.strerror}") from None
+    return taken
+
+
+def serve(app: Any, taken: socket.socket) -> None:
+    """Answer until Ctrl-C."""
+    import uvicorn
+
+    uvicorn.Server(uvicorn.Config(app, log_config=None, server_header=False)).run(sockets=[taken])

@@ -1,0 +1,109 @@
+"""What the page is told of a map: one document, the same for the server and for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import __version__
+from pomona.errors import PomonaError
+from pomona.growth.bearing_trees import bearing_trees
+from pomona.growth.measured import measured_fruits
+from pomona.growth.season_growth import grow_season
+from pomona.growth.size_classes import FIVE_MM
+from pomona.orchard import OrchardMap
+from pomona.viewer.told_calipers import calipers_told
+from pomona.viewer.told_fruits import FruitsTold, trees_told
+from pomona.viewer.told_growth import growth_told
+from pomona.viewer.told_thinning import thinning_told
+
+__all__ = ["Wishes", "season_document"]
+
+FORMAT = 1
+"""Of the document; the page says so when it is another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wishes:
+    """What is asked of the page besides the map.
+
+    Attributes
+    ----------
+    harvest : date or None
+        Day to foretell.
+    temperature, calipers : Path or None
+        Tables as `pomona growth` and `pomona validate` take them.
+    limits_mm : (C - 1,) float64
+        Of the size classes.
+    target : int or None
+        Fruits that a tree shall keep.
+    pack_kg : float
+        Kilograms that a pack holds.
+    up : (3,) float64 or None
+        The vertical in the map.
+    """
+
+    harvest: date | None = None
+    temperature: Path | None = None
+    calipers: Path | None = None
+    limits_mm: NDArray[np.float64] = field(default_factory=FIVE_MM.copy)
+    target: int | None = None
+    pack_kg: float = 13.0
+    up: NDArray[np.float64] | None = None
+
+
+def season_document(path: Path, wishes: Wishes) -> dict[str, Any]:
+    """Tell a map as plain values for JSON; the same map and wishes give the same document.
+
+    Raises
+    ------
+    PomonaError
+        When the file is no map, has no fruits, or a table that was given is wrong. What a map cannot tell, as growth of
+        one visit, is told as the reason why not.
+    """
+    orchard = OrchardMap(path)
+    if orchard.kind != "map":
+        raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
+    cloud, visits = orchard.fruits(), orchard.visits()
+    if not len(cloud):
+        raise PomonaError(f"{path}: found no fruits, expected a map with some")
+    trees = bearing_trees(cloud)
+    fruits = FruitsTold.of(cloud, trees.numbers, path, wishes.up)
+    return {
+        "format": FORMAT,
+        "program": f"pomona {__version__}",
+        "name": path.name,
+        "visits": [{"name": v.name, "date": v.date, "n_fruits": v.n_fruits, "n_matched": v.n_matched} for v in visits],
+        "map_from_page": np.linalg.inv(fruits.page_from_map).tolist(),
+        "trees": trees_told(fruits, trees),
+        "fruits": fruits.as_columns(),
+        "sights": fruits.sights(orchard.observations(), [visit.name for visit in visits]),
+        **_grown(path, wishes, fruits),
+        "calipers": calipers_told(path, wishes.calipers, fruits),
+    }
+
+
+def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
+    """Tell growth and what follows from it; of a map that cannot have any, why."""
+    try:
+        measured = measured_fruits(path)
+    except PomonaError as reason:
+        return _no_growth(str(reason))
+    if len(set(measured.days)) < 2:
+        return _no_growth(f"sizes of one day only, {measured.days[0]}: add another visit")
+    growth = grow_season(path, harvest=wishes.harvest, temperature=wishes.temperature, limits_mm=wishes.limits_mm)
+    return {
+        "growth": growth_told(growth, fruits, wishes.pack_kg),
+        "thinning": thinning_told(growth, fruits, wishes.target),
+        "no_growth": None,
+    }
+
+
+def _no_growth(reason: str) -> Mapping[str, Any]:
+    return {"growth": None, "thinning": None, "no_growth": reason}

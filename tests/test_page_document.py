@@ -1,0 +1,86 @@
+"""What the page is told of a map."""
+
+import base64
+import json
+import zlib
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from growth_maker import FRUITS_OF_TREE, grow_row
+from pomona.orchard import OrchardMap
+from pomona.viewer.packed_columns import packed
+from pomona.viewer.season_page import Wishes, season_document
+
+
+def unpacked(column: dict) -> np.ndarray:
+    """As the page does it."""
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(column["bytes"])), np.uint8).reshape(4, column["n"])
+    folded = planes.T.copy().view("<u4").ravel().astype(np.int64)
+    codes = np.cumsum(np.where(folded % 2, -(folded + 1) // 2, folded // 2))
+    return np.where(codes == 0, np.nan, column["low"] + (codes - 1) * column["step"])
+
+
+def texts(column: str) -> list[str]:
+    return json.loads(zlib.decompress(base64.b64decode(column)))
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg").path
+
+
+@pytest.mark.parametrize(
+    "values",
+    [[], [np.nan], [3.0], [1.0, np.nan, -2.5, 4.0], [1e12, -1e12, 0.0], np.arange(70_000) / 10.0],
+)
+def test_columns_come_back_to_the_nearest_step(values: list[float]) -> None:
+    column = packed(values, 0.1)
+    found = unpacked(column)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(values))
+    np.testing.assert_allclose(found, values, atol=0.51 * column["step"])
+
+
+def test_all_fruits_are_told_where_the_map_has_them(row: Path) -> None:
+    told = season_document(row, Wishes(up=np.array([0.0, 0.0, 1.0])))
+    orchard = OrchardMap(row)
+    ids, seen = texts(told["fruits"]["ids"]), orchard.observations()
+    assert sorted(ids, key=int) == list(orchard.fruits().ids)
+    placed = np.stack([unpacked(told["sights"][axis]) for axis in "xyz"] + [np.ones(len(seen))])
+    in_map = (np.array(told["map_from_page"]) @ placed)[:3].T
+    fruit, visit = (unpacked(told["sights"][name]).astype(int) for name in ("fruit", "visit"))
+    names = [one["name"] for one in told["visits"]]
+    found = {(ids[f], names[v]): place for f, v, place in zip(fruit, visit, in_map, strict=True)}
+    for fruit_id, session, place in zip(seen.fruit_ids, seen.sessions, seen.positions_in_map, strict=True):
+        np.testing.assert_allclose(found[str(fruit_id), session], place, atol=0.001)
+
+
+def test_growth_and_thinning_are_those_of_their_verbs(row: Path) -> None:
+    told = season_document(row, Wishes(harvest=date(2024, 9, 1), target=20))
+    growth, thinning = told["growth"], told["thinning"]
+    n = 3 * FRUITS_OF_TREE
+    assert unpacked(growth["median_mm"]).reshape(n, -1).shape == (n, len(growth["days"]))
+    assert growth["days"][-1] == growth["harvest"] == "2024-09-01"
+    assert sum(one["n_fruits"] for one in growth["classes"] if one["date"] == "2024-09-01") == pytest.approx(n, abs=1)
+    assert growth["blocks"][0]["n_fruits"] == n
+    place = unpacked(thinning["place"])
+    stays = place[~np.isnan(place)]
+    assert (stays > 20).sum() == sum(max(0, count - 20) for count in np.bincount(_trees(told)[~np.isnan(place)]))
+
+
+def _trees(told: dict) -> np.ndarray:
+    return unpacked(told["fruits"]["tree"]).astype(int)
+
+
+def test_a_map_of_one_visit_says_why_there_is_no_growth(tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (50,)).path
+    told = season_document(path, Wishes())
+    assert told["growth"] is None
+    assert told["thinning"] is None
+    assert "one day" in told["no_growth"]
+
+
+def test_the_same_map_is_told_the_same(row: Path) -> None:
+    assert json.dumps(season_document(row, Wishes())) == json.dumps(season_document(row, Wishes()))

@@ -1,0 +1,111 @@
+/** Colours of fruits that all eyes tell apart: viridis for numbers, those of Okabe and Ito for kinds. */
+import { actionOf } from "./facts";
+import type { Page } from "./page";
+import { STATES } from "./told/season";
+import { day, number } from "./words";
+
+export type ColourBy = "growth" | "size" | "state" | "date" | "plan";
+export type Rgb = readonly [number, number, number];
+
+export interface Ramp {
+  readonly kind: "ramp";
+  readonly title: string;
+  readonly low: string;
+  readonly high: string;
+}
+
+export interface Swatches {
+  readonly kind: "swatches";
+  readonly title: string;
+  readonly swatches: readonly { readonly name: string; readonly rgb: Rgb; readonly isRing: boolean }[];
+}
+
+export interface Scheme {
+  readonly legend: Ramp | Swatches;
+  readonly of: (fruit: number, time: number) => Rgb;
+}
+
+export const VIRIDIS: readonly Rgb[] = [
+  [72, 30, 112],
+  [69, 55, 129],
+  [57, 86, 140],
+  [45, 112, 142],
+  [33, 144, 141],
+  [41, 175, 127],
+  [92, 200, 99],
+  [160, 218, 57],
+  [253, 231, 37],
+];
+const UNKNOWN: Rgb = [150, 150, 150];
+const GREEN: Rgb = [0, 158, 115];
+const SKY: Rgb = [86, 180, 233];
+const ORANGE: Rgb = [230, 159, 0];
+const VERMILION: Rgb = [213, 94, 0];
+const OF_STATE = { new: SKY, seen: GREEN, missed: ORANGE, gone: VERMILION } as const;
+const OF_ACTION = { keep: GREEN, thin: VERMILION, drops: ORANGE, "": UNKNOWN } as const;
+/** Shares of fruits that a ramp leaves beyond its ends: one odd fruit does not bleach the others. */
+const ENDS = [0.02, 0.98] as const;
+
+export function ramp(share: number): Rgb {
+  if (Number.isNaN(share)) return UNKNOWN;
+  const at = Math.min(1, Math.max(0, share)) * (VIRIDIS.length - 1);
+  const [low, part] = [VIRIDIS[Math.floor(at)], at - Math.floor(at)];
+  const high = VIRIDIS[Math.min(VIRIDIS.length - 1, Math.floor(at) + 1)];
+  return [0, 1, 2].map((i) => Math.round(low[i] + part * (high[i] - low[i]))) as unknown as Rgb;
+}
+
+export function schemeOf(page: Page): Scheme {
+  return SCHEMES[page.colour.value](page);
+}
+
+const SCHEMES: Record<ColourBy, (page: Page) => Scheme> = {
+  growth: ({ season }) => {
+    const rates = season.growth?.rate ?? new Float64Array();
+    const [low, high] = spanOf(rates);
+    return {
+      legend: { kind: "ramp", title: "growth, mm a day", low: number(low, 2), high: number(high, 2) },
+      of: (fruit) => ramp((rates[fruit] - low) / (high - low)),
+    };
+  },
+  size: ({ season, history }) => {
+    const [low, high] = spanOf(season.growth?.medianMm ?? season.sights.diameterMm);
+    return {
+      legend: { kind: "ramp", title: "diameter, mm", low: number(low, 0), high: number(high, 0) },
+      of: (fruit, time) => ramp((history.sizeAt(fruit, time) - low) / (high - low)),
+    };
+  },
+  state: ({ history }) => ({
+    legend: {
+      kind: "swatches",
+      title: "on this date",
+      swatches: STATES.map((name) => ({ name, rgb: OF_STATE[name], isRing: name === "missed" || name === "gone" })),
+    },
+    of: (fruit, time) => OF_STATE[history.stateAt(fruit, time)],
+  }),
+  date: ({ history }) => {
+    const last = Math.max(1, history.times.length - 1);
+    return {
+      legend: { kind: "ramp", title: "first seen", low: day(history.times[0]), high: day(history.times[last] ?? history.times[0]) },
+      of: (fruit) => ramp(history.first[fruit] / last),
+    };
+  },
+  plan: (page) => ({
+    legend: {
+      kind: "swatches",
+      title: "what to do",
+      swatches: [
+        { name: "keep", rgb: GREEN, isRing: false },
+        { name: "thin", rgb: VERMILION, isRing: false },
+        { name: "will drop", rgb: ORANGE, isRing: false },
+      ],
+    },
+    of: (fruit) => OF_ACTION[actionOf(page.season, fruit, page.target.value)],
+  }),
+};
+
+function spanOf(values: Float64Array): [number, number] {
+  const known = values.filter((value) => !Number.isNaN(value)).sort();
+  if (known.length === 0) return [0, 1];
+  const [low, high] = ENDS.map((share) => known[Math.floor(share * (known.length - 1))]);
+  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+}

@@ -1,0 +1,61 @@
+/** What is known of each fruit now: the same facts for the row, the table, the card and the export. */
+import type { Page } from "./page";
+import { STATES, type Season, type State } from "./told/season";
+
+export type Action = "keep" | "thin" | "drops" | "";
+
+export interface Facts {
+  readonly id: string;
+  readonly tree: string;
+  readonly state: State;
+  readonly stateProbability: number;
+  readonly sights: number;
+  readonly sizeMm: number;
+  readonly lowMm: number;
+  readonly highMm: number;
+  readonly rate: number;
+  readonly forecastMm: number;
+  readonly forecastLowMm: number;
+  readonly forecastHighMm: number;
+  readonly dropProbability: number;
+  readonly action: Action;
+}
+
+export function factsOf({ season, target }: Page, fruit: number): Facts {
+  const { growth, thinning, sights } = season;
+  const [now, then] = [growth ? growth.nVisits - 1 : 0, growth ? growth.times.length - 1 : 0];
+  const curve = (rows: Float64Array | undefined, at: number): number =>
+    growth && rows ? rows[fruit * growth.times.length + at] : NaN;
+  const later = (rows: Float64Array | undefined): number => (growth?.harvest ? curve(rows, then) : NaN);
+  return {
+    id: season.ids[fruit],
+    tree: season.trees[season.tree[fruit]].name,
+    state: STATES[season.state[fruit]],
+    stateProbability: season.stateProbability[fruit],
+    sights: sights.starts[fruit + 1] - sights.starts[fruit],
+    sizeMm: growth ? curve(growth.medianMm, now) : lastMeasured(season, fruit),
+    lowMm: curve(growth?.lowMm, now),
+    highMm: curve(growth?.highMm, now),
+    rate: growth ? growth.rate[fruit] : NaN,
+    forecastMm: later(growth?.medianMm),
+    forecastLowMm: later(growth?.lowMm),
+    forecastHighMm: later(growth?.highMm),
+    dropProbability: thinning ? thinning.dropProbability[fruit] : NaN,
+    action: actionOf(season, fruit, target.value),
+  };
+}
+
+/** What to do with a fruit when each tree shall keep so many: `pomona thinning` says in which order they go. */
+export function actionOf({ thinning, state }: Season, fruit: number, target: number | null): Action {
+  if (thinning === null || STATES[state[fruit]] === "gone") return "";
+  const place = thinning.place[fruit];
+  if (Number.isNaN(place)) return Number.isNaN(thinning.clusterSize[fruit]) ? "" : "drops";
+  return target !== null && place > target ? "thin" : "keep";
+}
+
+function lastMeasured({ sights }: Season, fruit: number): number {
+  for (let row = sights.starts[fruit + 1] - 1; row >= sights.starts[fruit]; row--) {
+    if (!Number.isNaN(sights.diameterMm[row])) return sights.diameterMm[row];
+  }
+  return NaN;
+}

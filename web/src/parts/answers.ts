@@ -1,0 +1,67 @@
+/** The four questions of a grower, answered before any click: how many, how big, how fast, what to do. */
+import { element, replaceAll, type Child } from "../elements";
+import type { Page } from "../page";
+import { advice } from "./advice";
+import { hangingRows, sizesNow } from "../summary";
+import { fullDay, mm, number, whole } from "../words";
+
+export function answers(page: Page): HTMLElement {
+  const root = element("section", { class: "answers", "aria-label": "At a glance" });
+  const show = (): void => replaceAll(root, howMany(page), howBig(page), howFast(page), whatToDo(page));
+  page.target.watch(show);
+  return root;
+}
+
+function answer(question: string, said: string, unit: string, ...more: Child[]): HTMLElement {
+  const big = element("p", { class: "said" }, element("strong", {}, said), unit ? ` ${unit}` : null);
+  return element("div", { class: "card answer" }, element("h2", { class: "label" }, question), big, ...more);
+}
+
+const line = (text: string): HTMLElement => element("p", { class: "soft" }, text);
+
+function howMany({ season }: Page): HTMLElement {
+  const hanging = hangingRows(season);
+  const named = season.trees.filter((tree) => tree.name).length;
+  const gone = season.n - hanging.length;
+  const where = named > 0 ? `on ${named} trees, ${whole(hanging.length / named)} a tree` : "no single trees known";
+  const lost = gone > 0 ? `${whole(gone)} more were seen and are gone` : "none is gone so far";
+  return answer("How many", whole(hanging.length), "fruits hang", line(where), line(lost));
+}
+
+function howBig({ season }: Page): HTMLElement {
+  const all = season.growth?.blocks[0];
+  const sizes = sizesNow(season);
+  if (sizes.length === 0) return answer("How big", "–", "", line("no diameters in this map"));
+  const middle = `the middle eight of ten: ${number(quantile(sizes, 0.1), 0)} to ${number(quantile(sizes, 0.9), 0)} mm`;
+  if (!season.growth || !all) return answer("How big", number(mean(sizes), 1), "mm on average", line(middle));
+  const now = season.growth.nVisits - 1;
+  const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90 %) on ${fullDay(season.growth.times[now])}`;
+  return answer("How big", number(all.mean_mm[now], 1), "mm on average", line(sure), line(middle));
+}
+
+function howFast({ season }: Page): HTMLElement {
+  const growth = season.growth;
+  if (!growth) return answer("How fast", "–", "", line(season.noGrowth ?? ""));
+  const [low, rate, high] = growth.blocks[0].rate_mm_per_day;
+  const sure = line(`${number(low, 2)} to ${number(high, 2)} mm (90 %)`);
+  const last = growth.times.length - 1;
+  const then = growth.harvest === null ? line("--harvest DATE foretells a day") : line(
+    `${mm(growth.blocks[0].mean_mm[last])} on ${fullDay(growth.harvest)}: ${number(growth.blocks[0].low_mm[last], 1)} to ${number(growth.blocks[0].high_mm[last], 1)}`,
+  );
+  return answer("How fast", number(rate, 2), "mm a day", sure, then);
+}
+
+function whatToDo(page: Page): HTMLElement {
+  const [first, ...others] = advice(page);
+  const said = element("p", { class: "said" }, element("strong", {}, first));
+  const more = others.slice(0, 3).map((one) => line(one));
+  return element("div", { class: "card answer" }, element("h2", { class: "label" }, "What to do"), said, ...more);
+}
+
+const mean = (values: readonly number[]): number => values.reduce((sum, value) => sum + value, 0) / values.length;
+
+function quantile(values: readonly number[], share: number): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.round(share * (sorted.length - 1))];
+}
+

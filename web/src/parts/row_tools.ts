@@ -1,0 +1,57 @@
+/** What the row is coloured by, from where it is looked at, and what the colours mean. */
+import { schemeOf, VIRIDIS, type ColourBy, type Ramp, type Swatches } from "../colours";
+import { choice, element, replaceAll } from "../elements";
+import type { Page } from "../page";
+import type { Orbit, View } from "../scene/orbit";
+
+const VIEWS: readonly (readonly [View, string])[] = [
+  ["side", "Side"],
+  ["above", "Above"],
+  ["free", "3D"],
+];
+
+export function rowTools(page: Page, orbit: Orbit): HTMLElement {
+  const colours = choice("Colour", colourNames(page), (by) => page.colour.set(by));
+  const views = choice("View", VIEWS, (view) => {
+    orbit.see(view);
+    views.show(view);
+  });
+  views.show("free");
+  page.colour.watch(colours.show);
+  return element("div", { class: "row-tools" }, element("span", { class: "label" }, "Colour"), colours.root, views.root);
+}
+
+function colourNames({ season }: Page): (readonly [ColourBy, string])[] {
+  const always: (readonly [ColourBy, string])[] = [
+    ["size", "Size"],
+    ["state", "State"],
+    ["date", "Date"],
+  ];
+  const grown: (readonly [ColourBy, string])[] = season.growth ? [["growth", "Growth"]] : [];
+  const planned: (readonly [ColourBy, string])[] = season.thinning ? [["plan", "Thinning"]] : [];
+  return [...grown, ...always, ...planned];
+}
+
+export function legend(page: Page): HTMLElement {
+  const root = element("div", { class: "legend" });
+  page.colour.watch(() => {
+    const { legend } = schemeOf(page);
+    replaceAll(root, element("span", { class: "label" }, legend.title), legend.kind === "ramp" ? ramp(legend) : swatches(legend));
+  });
+  return root;
+}
+
+function ramp({ low, high }: Ramp): HTMLElement {
+  const bar = element("span", { class: "ramp", "aria-hidden": "true" });
+  bar.style.background = `linear-gradient(to right, ${VIRIDIS.map((rgb) => `rgb(${rgb.join(",")})`).join(",")})`;
+  return element("span", { class: "ends" }, low, bar, high);
+}
+
+function swatches({ swatches }: Swatches): HTMLElement {
+  const items = swatches.map(({ name, rgb, isRing }) => {
+    const dot = element("span", { class: isRing ? "dot ring" : "dot", "aria-hidden": "true" });
+    dot.style.color = `rgb(${rgb.join(",")})`;
+    return element("span", { class: "swatch" }, dot, name);
+  });
+  return element("span", { class: "swatches" }, ...items);
+}

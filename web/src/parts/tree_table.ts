@@ -1,0 +1,45 @@
+/** The same four answers tree by tree; a click looks at one tree. */
+import { element, replaceAll } from "../elements";
+import type { Page } from "../page";
+import { treeSummaries, type TreeSummary } from "../summary";
+import { day, number, whole } from "../words";
+
+export function treeTable(page: Page): HTMLElement {
+  const { season, filter, target } = page;
+  const body = element("tbody");
+  const growth = season.growth;
+  const heads = ["Tree", "Fruits", "mm now", "mm a day"];
+  if (growth?.harvest) heads.push(`mm on ${day(growth.harvest)}`);
+  const isPlanned = (): boolean => season.thinning !== null && target.value !== null;
+  const head = element("tr");
+  const show = (): void => {
+    const titles = isPlanned() ? [...heads, "To thin"] : heads;
+    replaceAll(head, ...titles.map((title) => element("th", { scope: "col" }, title)));
+    const trees = treeSummaries(page);
+    const most = Math.max(...trees.map((tree) => tree.fruits));
+    replaceAll(body, ...trees.map((tree) => lineOf(page, tree, most, isPlanned())));
+  };
+  filter.watch(show);
+  target.watch(show);
+  const table = element("table", { class: "plain" }, element("thead", {}, head), body);
+  return element("section", { class: "card trees" }, element("h2", {}, "Tree by tree"), element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Tree by tree" }, table));
+}
+
+function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPlanned: boolean): HTMLElement {
+  const { growth } = season;
+  const now = growth ? growth.nVisits - 1 : 0;
+  const isChosen = filter.value.tree === tree.tree;
+  const pick = (): void => filter.set({ ...filter.value, tree: isChosen ? null : tree.tree });
+  const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, tree.label);
+  const bar = element("span", { class: "bar", "aria-hidden": "true" });
+  bar.style.width = `${(64 * tree.fruits) / Math.max(1, most)}px`;
+  const cells = [
+    element("td", {}, bar, whole(tree.fruits)),
+    element("td", {}, number(tree.block?.mean_mm[now] ?? NaN, 1)),
+    element("td", {}, number(tree.block?.rate_mm_per_day[1] ?? NaN, 2)),
+  ];
+  if (growth?.harvest) cells.push(element("td", {}, number(tree.block?.mean_mm[growth.times.length - 1] ?? NaN, 1)));
+  if (isPlanned) cells.push(element("td", {}, whole(tree.thin)));
+  return element("tr", { class: isChosen ? "chosen" : "" }, element("th", { scope: "row" }, button), ...cells);
+}
+

@@ -1,0 +1,102 @@
+/** A camera that looks at a point of the row from around it; z is up. */
+import { Signal } from "../signal";
+
+export type View = "side" | "above" | "free";
+
+export interface Extent {
+  readonly low: readonly [number, number, number];
+  readonly high: readonly [number, number, number];
+}
+
+export interface Looking {
+  readonly target: readonly [number, number, number];
+  /** Radians: 0 looks along y, from the side; elevation is the height of the camera over the target. */
+  readonly azimuth: number;
+  readonly elevation: number;
+  readonly distance: number;
+}
+
+export const FIELD_OF_VIEW_DEG = 28;
+const STRAIGHT_DOWN = Math.PI / 2 - 1e-3;
+const MARGIN = 1.12;
+const ANGLES: Record<View, readonly [number, number]> = {
+  side: [0, 0.1],
+  above: [0, STRAIGHT_DOWN],
+  free: [-0.4, 0.22],
+};
+
+export class Orbit {
+  readonly looking = new Signal<Looking>({ target: [0, 0, 0], azimuth: 0, elevation: 0, distance: 1 });
+
+  constructor(
+    private readonly extent: Extent,
+    private aspect = 2,
+  ) {}
+
+  setAspect(aspect: number): void {
+    this.aspect = aspect;
+  }
+
+  /** Shows the whole row: from as near as its box fits into the picture. */
+  see(view: View): void {
+    const [azimuth, elevation] = ANGLES[view];
+    const target = middleOf(this.extent);
+    const [sinA, cosA, sinE, cosE] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+    const slope = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const distances = cornersOf(this.extent).map(([x, y, z]) => {
+      const [dx, dy, dz] = [x - target[0], y - target[1], z - target[2]];
+      const [right, inwards] = [dx * cosA + dy * sinA, dy * cosA - dx * sinA];
+      const [up, nearer] = [inwards * sinE + dz * cosE, dz * sinE - inwards * cosE];
+      return nearer + MARGIN * Math.max(Math.abs(right) / this.aspect, Math.abs(up)) / slope;
+    });
+    this.looking.set({ target, azimuth, elevation, distance: Math.max(...distances) });
+  }
+
+  turn(byAzimuth: number, byElevation: number): void {
+    const { azimuth, elevation, ...rest } = this.looking.value;
+    const raised = Math.min(STRAIGHT_DOWN, Math.max(-0.3, elevation + byElevation));
+    this.looking.set({ ...rest, azimuth: azimuth + byAzimuth, elevation: raised });
+  }
+
+  /** Moves the target to the right and upwards in the picture, in shares of its height. */
+  shift(right: number, up: number): void {
+    const { target, azimuth, elevation, distance } = this.looking.value;
+    const seen = 2 * distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const [r, u] = [right * seen, up * seen];
+    const flat = u * Math.sin(elevation);
+    const moved: [number, number, number] = [
+      target[0] + r * Math.cos(azimuth) - flat * Math.sin(azimuth),
+      target[1] + r * Math.sin(azimuth) + flat * Math.cos(azimuth),
+      target[2] + u * Math.cos(elevation),
+    ];
+    this.looking.set({ ...this.looking.value, target: moved });
+  }
+
+  zoom(factor: number): void {
+    const now = this.looking.value;
+    this.looking.set({ ...now, distance: Math.min(1e4, Math.max(0.2, now.distance * factor)) });
+  }
+
+  lookAt(target: readonly [number, number, number], distance: number): void {
+    this.looking.set({ ...this.looking.value, target, distance });
+  }
+}
+
+/** Where the camera is. */
+export function eyeOf({ target, azimuth, elevation, distance }: Looking): [number, number, number] {
+  const flat = distance * Math.cos(elevation);
+  return [
+    target[0] + flat * Math.sin(azimuth),
+    target[1] - flat * Math.cos(azimuth),
+    target[2] + distance * Math.sin(elevation),
+  ];
+}
+
+function cornersOf({ low, high }: Extent): [number, number, number][] {
+  const ends = [low, high];
+  return ends.flatMap(([x]) => ends.flatMap(([, y]) => ends.map(([, , z]) => [x, y, z] as [number, number, number])));
+}
+
+function middleOf({ low, high }: Extent): [number, number, number] {
+  return [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
+}

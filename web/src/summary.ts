@@ -1,0 +1,55 @@
+/** Counts of what hangs, of all and by tree. */
+import { actionOf } from "./facts";
+import type { Page } from "./page";
+import type { Block } from "./told/document";
+import { STATES, type Season } from "./told/season";
+
+const GONE = STATES.indexOf("gone");
+
+export function hangingRows({ n, state }: Season): number[] {
+  return Array.from({ length: n }, (_, i) => i).filter((fruit) => state[fruit] !== GONE);
+}
+
+/** Diameters of what hangs, by the curves where there are some, else as the last visits measured them. */
+export function sizesNow({ growth, sights, ...season }: Season): number[] {
+  const of = (fruit: number): number => {
+    if (growth) return growth.medianMm[fruit * growth.times.length + growth.nVisits - 1];
+    return sights.diameterMm.subarray(sights.starts[fruit], sights.starts[fruit + 1]).findLast((mm) => mm > 0) ?? NaN;
+  };
+  return hangingRows({ growth, sights, ...season })
+    .map(of)
+    .filter((mm) => !Number.isNaN(mm));
+}
+
+export interface TreeSummary {
+  readonly tree: number;
+  readonly label: string;
+  readonly fruits: number;
+  readonly gone: number;
+  readonly drops: number;
+  readonly thin: number;
+  readonly clustersToThin: number;
+  /** What is known of its mean; null where no fruit of it was measured. */
+  readonly block: Block | null;
+}
+
+export function treeSummaries({ season, target }: Page): TreeSummary[] {
+  const counts = season.trees.map(() => ({ fruits: 0, gone: 0, drops: 0, thin: 0, clusters: new Set<number>() }));
+  for (let fruit = 0; fruit < season.n; fruit++) {
+    const count = counts[season.tree[fruit]];
+    if (season.state[fruit] === GONE) count.gone++;
+    else count.fruits++;
+    const action = actionOf(season, fruit, target.value);
+    if (action === "drops") count.drops++;
+    if (action === "thin") {
+      count.thin++;
+      count.clusters.add(season.thinning?.cluster[fruit] ?? 0);
+    }
+  }
+  const blocks = season.growth?.blocks ?? [];
+  return season.trees.map(({ name, label }, tree) => {
+    const { clusters, ...count } = counts[tree];
+    const block = blocks.find((one) => (name ? one.kind === "tree" && one.name === name : one.kind === "all")) ?? null;
+    return { tree, label, ...count, clustersToThin: clusters.size, block };
+  });
+}

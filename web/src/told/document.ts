@@ -1,0 +1,97 @@
+/** The document as it comes: `pomona/viewer/season_page.py` writes it. */
+import type { Packed } from "./columns";
+
+export const FORMAT = 1;
+
+export interface Told {
+  readonly format: number;
+  readonly program: string;
+  readonly name: string;
+  readonly visits: readonly { name: string; date: string; n_fruits: number; n_matched: number }[];
+  readonly map_from_page: readonly (readonly number[])[];
+  readonly trees: readonly { name: string; middle: readonly [number, number, number] }[];
+  readonly fruits: {
+    readonly ids: string;
+    readonly tree: Packed;
+    readonly state: Packed;
+    readonly state_probability: Packed;
+    readonly fruit_probability: Packed;
+  };
+  readonly sights: Readonly<Record<"fruit" | "visit" | "x" | "y" | "z" | "diameter_mm" | "probability", Packed>>;
+  readonly growth: ToldGrowth | null;
+  readonly thinning: ToldThinning | null;
+  readonly no_growth: string | null;
+  readonly calipers: Calipers | null;
+}
+
+export interface Block {
+  readonly kind: "all" | "row" | "tree";
+  readonly name: string;
+  readonly n_fruits: number;
+  readonly mean_mm: readonly number[];
+  readonly low_mm: readonly number[];
+  readonly high_mm: readonly number[];
+  /** Low end, mean and high end. */
+  readonly rate_mm_per_day: readonly [number, number, number];
+}
+
+/** A line of `classes.csv`. */
+export interface SizeClass {
+  readonly date: string;
+  readonly from_mm: number | null;
+  readonly below_mm: number | null;
+  readonly n_fruits: number;
+  readonly n_fruits_low: number;
+  readonly n_fruits_high: number;
+  readonly kg: number;
+  readonly packs: number;
+  readonly packs_low: number;
+  readonly packs_high: number;
+}
+
+export interface ToldGrowth {
+  readonly days: readonly string[];
+  readonly n_visits: number;
+  readonly harvest: string | null;
+  readonly curve: string;
+  readonly clock: string;
+  readonly noise_mm: number;
+  readonly scales: Readonly<Record<string, number>>;
+  readonly median_mm: Packed;
+  readonly low_mm: Packed;
+  readonly high_mm: Packed;
+  readonly rate_mm_per_day: Packed;
+  readonly rate_sigma_mm_per_day: Packed;
+  readonly odd: Packed;
+  readonly blocks: readonly Block[];
+  readonly pack_kg: number;
+  readonly classes: readonly SizeClass[];
+}
+
+export interface ToldThinning {
+  readonly target: number | null;
+  readonly fast_mm_per_day: number;
+  readonly from: string;
+  readonly to: string;
+  readonly cluster: Packed;
+  readonly cluster_size: Packed;
+  readonly rate_mm_per_day: Packed;
+  readonly drop_probability: Packed;
+  readonly place: Packed;
+}
+
+export interface Agreement {
+  readonly n: number;
+  readonly bias_mm: number;
+  readonly rmse_mm: number;
+  readonly low_mm: number | null;
+  readonly high_mm: number | null;
+}
+
+export interface Calipers {
+  readonly file: string;
+  readonly unseen: readonly string[];
+  readonly all: Agreement;
+  readonly visits: readonly ({ name: string } & Agreement)[];
+  readonly pairs: readonly { fruit: number; name: string; date: string; measured_mm: number; caliper_mm: number }[];
+}
