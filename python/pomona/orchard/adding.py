@@ -20,7 +20,14 @@ from pomona.orchard.fruit_ids import Change
 from pomona.orchard.recognising import matches_with_visits
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
-from pomona.orchard.writing import Placement, insert_matches, insert_observations, insert_session, update_layers
+from pomona.orchard.writing import (
+    Placement,
+    insert_crops,
+    insert_matches,
+    insert_observations,
+    insert_session,
+    update_layers,
+)
 from pomona.settings import Settings
 from pomona.store import schema
 from pomona.store.failures import WrongContentError
@@ -221,6 +228,7 @@ def _join(
     connection.execute("PRAGMA defer_foreign_keys = ON")
     session_id = insert_session(connection, session, frame, placement)
     observation_ids = insert_observations(connection, session_id, fruit_ids, session.cloud.transformed(frame))
+    insert_crops(connection, session_id, observation_ids, session.crops)
     added = replace(
         visit,
         session_id=session_id,
