@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import threading
@@ -113,21 +114,24 @@ async def _guarded(request: Request, answer: Callable[[Request], Awaitable[Respo
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """Take a port, any free one for 0.
+    """Take a port, any free one for 0, so that whoever is told of it can ask at once.
 
     Raises
     ------
     PomonaError
         When it is taken, or the address is none of this machine's.
     """
-    try:
-        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        taken = socket.socket(family, kind)
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        taken.bind(address)
-    except OSError as error:
-        raise PomonaError(f"--host {host} --port {port}: cannot be listened on: {error.strerror}") from None
-    return taken
+    with contextlib.ExitStack() as undone:
+        try:
+            family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            taken = undone.enter_context(socket.socket(family, kind))
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            taken.bind(address)
+            taken.listen()
+        except OSError as error:
+            raise PomonaError(f"--host {host} --port {port}: cannot be listened on: {error.strerror}") from None
+        undone.pop_all()
+        return taken
 
 
 def serve(app: Any, taken: socket.socket) -> None:
