@@ -26,6 +26,7 @@ NAMES = (
     "shipped",
     "disturbed",
     "endurance",
+    "page",
     "speed",
     "readme",
 )

@@ -141,7 +141,8 @@ def test_pictures_are_served_and_a_new_visit_is_told(tmp_path: Path) -> None:
 def add_with_crop(path: Path) -> None:
     fruits = OrchardMap(path).fruits()
     grown_m = fruits.diameters_m + np.random.default_rng(1).normal(0.008, 0.001, len(fruits))
-    session = Session("later", date(2024, 7, 1).isoformat(), "drawn", FruitCloud(fruits.positions, diameters_m=grown_m), crops={3: FruitCrop(0, webp(7))})
+    cloud = FruitCloud(fruits.positions, diameters_m=grown_m)
+    session = Session("later", date(2024, 7, 1).isoformat(), "drawn", cloud, crops={3: FruitCrop(0, webp(7))})
     assert add_session(path, session).is_added
 
 

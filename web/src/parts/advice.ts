@@ -1,12 +1,10 @@
 /** What a grower can do now, the most pressing first; one line each. */
 import type { Page } from "../page";
-import { hangingRows, treeSummaries, type TreeSummary } from "../summary";
+import { areFruitlets, hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
 import { day, fruits, percent, whole } from "../words";
 
-/** Fruits that are larger on average are not thinned any more. */
-const THINNED_BELOW_MM = 45;
 /** A tree that grows so much slower than all is worth a look. */
 const SLOW = 0.9;
 const MISSED = STATES.indexOf("missed");
@@ -35,8 +33,7 @@ function thin({ season, target }: Page, trees: readonly TreeSummary[]): string[]
     if (toThin > 0) return [`Thin ${fruits(toThin)}`, `on ${on} of ${trees.length} trees, ${kept}`, ...dropping];
     return ["Nothing to thin", kept, ...dropping];
   }
-  const isEarly = (season.growth?.blocks[0].mean_mm[season.growth.nVisits - 1] ?? 0) < THINNED_BELOW_MM;
-  return isEarly ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
+  return areFruitlets(season) ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
 }
 
 function harvest({ growth }: Season): string[] {

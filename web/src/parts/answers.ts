@@ -24,7 +24,7 @@ function howMany({ season }: Page): HTMLElement {
   const named = season.trees.filter((tree) => tree.name).length;
   const gone = season.n - hanging.length;
   const where = named > 0 ? `on ${named} trees, ${whole(hanging.length / named)} a tree` : "no single trees known";
-  const lost = gone > 0 ? `${whole(gone)} more were seen and are gone` : "none is gone so far";
+  const lost = gone > 0 ? gone === 1 ? "1 more was seen and is gone" : `${whole(gone)} more were seen and are gone` : "none is gone so far";
   return answer("How many", whole(hanging.length), "fruits hang", line(where), line(lost));
 }
 

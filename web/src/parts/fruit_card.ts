@@ -3,7 +3,8 @@ import { curveChart } from "../charts/curve";
 import { element, replaceAll, type Child } from "../elements";
 import { factsOf, type Facts } from "../facts";
 import type { Page } from "../page";
-import { day, fullDay, mm, number, percent } from "../words";
+import { isTimeToThin } from "../summary";
+import { day, mm, number, percent } from "../words";
 import { portrait, sightPicture } from "./crops";
 
 const SAID = {
@@ -52,7 +53,8 @@ function steps({ selected, season }: Page, fruit: number): HTMLElement {
   );
 }
 
-function factList({ season }: Page, fruit: number, facts: Facts): HTMLElement {
+function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
+  const { season } = page;
   const lines: [string, Child][] = [
     ["State", `${SAID[facts.state]}, ${percent(facts.stateProbability)} sure`],
     ["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)],
@@ -62,9 +64,9 @@ function factList({ season }: Page, fruit: number, facts: Facts): HTMLElement {
   }
   const harvest = season.growth?.harvest;
   if (harvest && !Number.isNaN(facts.forecastMm)) {
-    lines.push([fullDay(harvest), withRange(facts.forecastMm, facts.forecastLowMm, facts.forecastHighMm)]);
+    lines.push([day(harvest), withRange(facts.forecastMm, facts.forecastLowMm, facts.forecastHighMm)]);
   }
-  if (facts.action !== "" && season.thinning) {
+  if (facts.action !== "" && isTimeToThin(page)) {
     const drop = Number.isNaN(facts.dropProbability) ? "" : `, drops with ${percent(facts.dropProbability)}`;
     lines.push(["Thinning", `${PLANNED[facts.action]}${drop}`]);
   }

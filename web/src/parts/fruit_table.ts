@@ -4,29 +4,32 @@ import { factsOf, type Facts } from "../facts";
 import { passing } from "../filter";
 import type { Page } from "../page";
 import { watchAll } from "../signal";
+import { isTimeToThin } from "../summary";
 import { day, number, percent } from "../words";
 
 const ROW_PX = 32;
 const SPARE_ROWS = 6;
 
 interface Column {
+  /** Of its widest cell, in ems. */
+  readonly width: number;
   readonly title: string;
   readonly say: (facts: Facts) => string;
   readonly order: (facts: Facts) => number | string;
 }
 
 export function fruitTable(page: Page): HTMLElement {
-  const columns = columnsOf(page);
+  let columns = columnsOf(page);
   let sortedBy = 0;
   let isFalling = false;
   let rows: number[] = [];
   const body = element("div", { class: "lines", role: "rowgroup" });
-  const scroller = element("div", { class: "scroller", tabindex: 0, role: "table", "aria-label": "Fruits", "aria-colcount": columns.length });
+  const scroller = element("div", { class: "scroller", tabindex: 0, role: "table", "aria-label": "Fruits" });
   const head = element("div", { class: "line head", role: "row" });
   scroller.append(element("div", { role: "rowgroup", class: "heads" }, head), body);
 
   const sort = (): void => {
-    const { order } = columns[sortedBy];
+    const { order } = columns[sortedBy] ?? columns[0];
     const keys = new Map(rows.map((fruit) => [fruit, order(factsOf(page, fruit))]));
     rows.sort((a, b) => (isFalling ? -1 : 1) * compared(keys.get(a), keys.get(b)) || a - b);
   };
@@ -37,6 +40,8 @@ export function fruitTable(page: Page): HTMLElement {
     replaceAll(body, ...rows.slice(first, last).map((fruit, i) => lineOf(page, columns, fruit, first + i)));
   };
   const refresh = (): void => {
+    columns = columnsOf(page);
+    scroller.style.setProperty("--columns", columns.map(({ width }) => `minmax(${width}em, 1fr)`).join(" "));
     rows = passing(page);
     sort();
     scroller.setAttribute("aria-rowcount", String(rows.length + 1));
@@ -71,33 +76,33 @@ export function fruitTable(page: Page): HTMLElement {
   return scroller;
 }
 
-function columnsOf({ season }: Page): Column[] {
-  const { growth, thinning } = season;
+function columnsOf(page: Page): Column[] {
+  const { growth } = page.season;
   const columns: Column[] = [
-    { title: "Fruit", say: (one) => one.id, order: (one) => Number(one.id) },
-    { title: "Tree", say: (one) => one.tree, order: (one) => one.tree },
-    { title: "State", say: (one) => one.state, order: (one) => one.state },
-    { title: "sure", say: (one) => percent(one.stateProbability), order: (one) => one.stateProbability },
-    { title: "Visits", say: (one) => String(one.sights), order: (one) => one.sights },
-    { title: "mm now", say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
+    { width: 5, title: "Fruit", say: (one) => one.id, order: (one) => Number(one.id) },
+    { width: 5, title: "Tree", say: (one) => one.tree, order: (one) => one.tree },
+    { width: 5, title: "State", say: (one) => one.state, order: (one) => one.state },
+    { width: 4.6, title: "sure", say: (one) => percent(one.stateProbability), order: (one) => one.stateProbability },
+    { width: 4.4, title: "Visits", say: (one) => String(one.sights), order: (one) => one.sights },
+    { width: 5.4, title: "mm now", say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
   ];
   if (growth) {
     columns.push(
-      { title: "90 %", say: (one) => range(one.lowMm, one.highMm), order: (one) => one.lowMm },
-      { title: "mm a day", say: (one) => number(one.rate, 2), order: (one) => one.rate },
+      { width: 7.6, title: "90 %", say: (one) => range(one.lowMm, one.highMm), order: (one) => one.lowMm },
+      { width: 6, title: "mm a day", say: (one) => number(one.rate, 2), order: (one) => one.rate },
     );
   }
   if (growth?.harvest) {
     const say = (one: Facts): string => number(one.forecastMm, 1);
     columns.push(
-      { title: `${day(growth.harvest)}, mm`, say, order: (one) => one.forecastMm },
-      { title: "90 %", say: (one) => range(one.forecastLowMm, one.forecastHighMm), order: (one) => one.forecastLowMm },
+      { width: 6.2, title: `mm, ${day(growth.harvest)}`, say, order: (one) => one.forecastMm },
+      { width: 7.6, title: "90 %", say: (one) => range(one.forecastLowMm, one.forecastHighMm), order: (one) => one.forecastLowMm },
     );
   }
-  if (thinning) {
+  if (isTimeToThin(page)) {
     columns.push(
-      { title: "drops", say: (one) => percent(one.dropProbability), order: (one) => one.dropProbability },
-      { title: "To do", say: (one) => one.action, order: (one) => one.action },
+      { width: 4.8, title: "drops", say: (one) => percent(one.dropProbability), order: (one) => one.dropProbability },
+      { width: 5, title: "To do", say: (one) => one.action, order: (one) => one.action },
     );
   }
   return columns;

@@ -2,8 +2,10 @@
 import { element, replaceAll } from "../elements";
 import { ANY } from "../filter";
 import type { Page } from "../page";
-import { treeSummaries, type TreeSummary } from "../summary";
+import { areFruitlets, treeSummaries, type TreeSummary } from "../summary";
 import { fullDay, number, whole } from "../words";
+
+const LATE = "These fruits are past the size at which one thins, and the rule below is one of fruitlets.";
 
 export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTMLElement {
   const plan = page.season.thinning;
@@ -24,6 +26,7 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     const trees = treeSummaries(page);
     replaceAll(body, ...trees.map(lineOf), totalOf(trees));
   });
+  const late = areFruitlets(page.season) ? null : element("p", { class: "late" }, LATE);
   const heads = ["Tree", "Fruits", "will drop", "stay", "to thin", "clusters to visit"];
   const head = element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name)));
   const table = element("table", { class: "plain" }, element("thead", {}, head), body);
@@ -31,6 +34,7 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     "section",
     { class: "card" },
     element("h2", {}, "Thinning"),
+    late,
     element("p", { class: "target" }, element("label", { for: "target" }, "Each tree shall keep "), input, slider, show, list),
     element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Thinning by tree" }, table),
     element("p", { class: "soft" }, rule(plan.fast, plan.from, plan.to)),

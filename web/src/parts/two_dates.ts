@@ -33,7 +33,7 @@ export function twoDates(page: Page): HTMLElement {
   const last = history.times.length - 1;
   const dates: Dates = { first: new Signal(last - 1), second: new Signal(last) };
   const said = element("p", { class: "soft", role: "status" });
-  const head = element("div", { class: "row-tools" }, pick(page, "Above", dates.first), pick(page, "Below", dates.second), key());
+  const head = element("div", { class: "row-tools" }, pick(page, "Date above", dates.first), pick(page, "Date below", dates.second), key());
   const holder = element("div", { class: "row-view tall" });
   const root = element("section", { class: "card row-card", "aria-label": "Two dates" }, head, holder, said);
 
@@ -69,9 +69,9 @@ export function twoDates(page: Page): HTMLElement {
 
 function pick({ season }: Page, label: string, chosen: Signal<number>): HTMLElement {
   const options = season.visits.map((visit, v) => element("option", { value: v }, fullDay(visit.time)));
-  const select = element("select", { change: () => chosen.set(Number(select.value)) }, ...options);
+  const select = element("select", { "aria-label": label, change: () => chosen.set(Number(select.value)) }, ...options);
   chosen.watch((v) => (select.value = String(v)));
-  return element("label", {}, element("span", { class: "label" }, `${label} `), select);
+  return select;
 }
 
 function key(): HTMLElement {
@@ -100,6 +100,7 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
   const { season, history, selected } = page;
   const [a, b] = [dates.first.value, dates.second.value];
   const [placeA, placeB] = [history.placeAt(history.times[a]), history.placeAt(history.times[b])];
+  const [sizeA, sizeB] = [history.sizeAt(history.times[a]), history.sizeAt(history.times[b])];
   const { positions, diameters, colours } = stage.fruits;
   const counts: Counts = { both: 0, first: 0, second: 0, growthMm: 0, measured: 0 };
   const strokes: Stroke[] = [];
@@ -116,8 +117,8 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
     const rgb = inA && inB ? BOTH : inA ? FIRST_ONLY : SECOND_ONLY;
     colours.set([...rgb, inA ? look : LOOKS.hidden], 4 * fruit);
     colours.set([...rgb, inB ? look : LOOKS.hidden], 4 * other);
-    diameters[fruit] = history.sizeAt(fruit, history.times[a]) / 1000;
-    diameters[other] = history.sizeAt(fruit, history.times[b]) / 1000;
+    diameters[fruit] = sizeA(fruit) / 1000;
+    diameters[other] = sizeB(fruit) / 1000;
     if (inA && inB) counts.both++;
     else if (inA) counts.first++;
     else if (inB) counts.second++;
