@@ -19,6 +19,7 @@ NAMES = (
     "season",
     "growth",
     "seasons",
+    "mapscale",
     "clouds",
     "odometry",
     "tracking",
