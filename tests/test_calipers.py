@@ -101,7 +101,7 @@ def test_fruits_that_no_visit_saw_are_told(pomona: Pomona, row: GrownRow, tmp_pa
     table.write_text(f"label,date,diameter_mm\napple 3,{row.day(50)},30\n\x1b[2J,{row.day(50)},30\n")
     code, _, told = pomona("validate", row.path, "--calipers", table)
     assert (code, told.count("\n")) == (0, 1)
-    assert r"1 fruits were not measured by any visit near: \x1b[2J" in told
+    assert r"1 fruit measured by no visit near: \x1b[2J" in told
 
 
 @pytest.mark.parametrize(

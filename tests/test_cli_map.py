@@ -172,7 +172,7 @@ def test_remove_undoes_add(orchard: Path, tmp_path: Path) -> None:
     told = run("remove", path, "september")
     assert (told.returncode, told.stderr) == (1, f"pomona: {path}: nothing is removed without --yes\n")
     assert told.stdout.startswith("september: ")
-    assert told.stdout.endswith("; 1 session stays\n")
+    assert told.stdout.endswith("; left: 1 session\n")
     told = run("remove", path, "september", "--json")
     assert (told.returncode, json.loads(told.stdout)["removed"], json.loads(told.stdout)["n_left"]) == (1, False, 1)
     assert path.read_bytes() == before

@@ -8,8 +8,8 @@ from pomona import PomonaError
 from pomona.detect import Detections
 from pomona.detect.picture_boxes import boxes_within, read_boxes, table_of
 from pomona.detect.training.cache import Sample, cached
-from pomona.detect.training.crops import SIDE_PX, PictureCrop, drawn_crop
 from pomona.detect.training.labels import Labelled
+from pomona.detect.training.shown_crops import SIDE_PX, PictureCrop, drawn_crop
 from pomona.detect.training.targets import STRIDE, targets_of
 
 HEADER = "image,xmin,ymin,xmax,ymax"

@@ -11,6 +11,7 @@ from bag_maker import START_NS, STEP_NS, image, info, write_bag
 from pomona.recording import open_recording
 from pomona.recording.checks.readable import checked, is_blank
 from pomona.recording.checks.swapped import check_sides
+from pomona.recording.pictures import UnreadablePictureError
 from test_recording_video import write_calibration
 
 SIZE = (320, 240)
@@ -65,6 +66,19 @@ def write_bag_of(folder, frames):
             entries.append(info(f"/{side}/camera_info", at, shift, f=300.0, size=SIZE))
             entries.append(image(f"/{side}/image_rect", at, picture, "bgr8"))
     return write_bag(folder, entries, "mcap")
+
+
+def test_a_damaged_png_is_named_and_its_decoder_mutters_nothing(tmp_path, capfd):
+    folder = write_folder(tmp_path / "row", pairs(2))
+    picture = folder / "left" / "0001.png"
+    content = bytearray(picture.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    picture.write_bytes(content)
+    frames = list(open_recording(folder).frames())
+    assert frames[0].read_left().shape == (SIZE[1], SIZE[0], 3)
+    with pytest.raises(UnreadablePictureError, match=r"0001\.png: the PNG is damaged: a checksum is wrong"):
+        frames[1].read_left()
+    assert capfd.readouterr().err == ""
 
 
 WRITERS = {"folder": write_folder, "video": write_video_of, "bag": write_bag_of}

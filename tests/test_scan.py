@@ -136,9 +136,19 @@ def test_no_detections_are_a_valid_empty_session(pomona, row, tmp_path):
     assert done.returncode == 0
     assert "found no boxes in 3 frames, so no fruits: check the file of the boxes" in done.stderr
     assert "0 fruits, from 0 boxes" in done.stdout
+    assert "no fruit was found: there is nothing to add to a map" in done.stdout
     session = load_session(tmp_path / "empty.gpkg")
     assert len(session.cloud) == 0
     assert len(session.trajectory) == 3
+
+
+def test_one_of_each_is_told_as_one(pomona, tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09")
+    boxes = (folder / "detections.csv").read_text().splitlines()
+    (folder / "detections.csv").write_text("\n".join(boxes[:2]) + "\n")
+    done = pomona("scan", folder, "-o", tmp_path / "one.gpkg")
+    assert "one.gpkg: 1 fruit, median diameter" in done.stdout
+    assert "from 1 box in 1 frame\n" in done.stdout
 
 
 def test_boxes_without_depth_are_counted(pomona, row, tmp_path):

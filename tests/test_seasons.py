@@ -249,9 +249,22 @@ def test_the_command_leaves_visits_alone_that_it_did_not_write(tmp_path, monkeyp
     mine = tmp_path / "2024-07-01.csv"
     mine.write_text("x,y,z\n0,0,0\n")
     assert run_pomona(monkeypatch, *SHORT, "-o", str(tmp_path)) == 2
-    assert "is not a folder of a drawn season" in capsys.readouterr().err
+    assert "is not a folder of the season easy with seed 0" in capsys.readouterr().err
     assert run_pomona(monkeypatch, *SHORT, "-o", str(tmp_path), "--visits", "2", "--force") == 0
     assert mine.read_text() == "x,y,z\n0,0,0\n"
+
+
+def test_another_season_is_not_replaced_without_a_word(tmp_path, monkeypatch, capsys) -> None:
+    folder = tmp_path / "season"
+    arguments = (*SHORT, "-o", str(folder), "--visits", "2")
+    assert run_pomona(monkeypatch, *arguments, "--seed", "1") == 0
+    before = (folder / "truth.json").read_bytes()
+    capsys.readouterr()
+    assert run_pomona(monkeypatch, *arguments, "--seed", "2") == 2
+    assert "is not a folder of the season easy with seed 2" in capsys.readouterr().err
+    assert (folder / "truth.json").read_bytes() == before
+    assert run_pomona(monkeypatch, *arguments, "--seed", "2", "--force") == 0
+    assert json.loads((folder / "truth.json").read_text())["seed"] == 2
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.errors import PomonaError
 from pomona.evaluate import PairScore, score_pairs
 from pomona.likes import DEMO_DATES, DEMO_RECORDING, DEMO_SEED, is_of_demo
@@ -76,7 +77,7 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
     remove_own(orchard)
 
     scene = scene_pair(DEMO_CELL, DEMO_SEED)
-    tell(f"drew a row of five trees as two visits saw it: {len(scene.map)} fruits, then {len(scene.query)}")
+    tell(f"drew a row of five trees as two visits saw it: {amount(len(scene.map), 'fruit')}, then {len(scene.query)}")
     first_date, second_date = DEMO_DATES
     sessions = (_write_visit(folder, first_date, scene.map), _write_visit(folder, second_date, scene.query))
 
@@ -85,7 +86,7 @@ def run_demo(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Demo
     known = second.known
     if known is None or second.match is None or not second.is_added:
         raise RuntimeError("the second visit of the demo was not found in the map of the first")
-    tell(f"added both to a map: {second.n_matched} fruits known again, {second.n_new} new")
+    tell(f"added both to a map: {amount(second.n_matched, 'fruit')} known again, {second.n_new} new")
 
     write_pairs(pairs, second.match, scene.query, known)
     save_picture(draw_match(scene.query, known, second.match, up_in_map=scene.up), picture)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.cloud import FruitCloud
 from pomona.demo import growth_mm, remove_own
 from pomona.errors import PomonaError
@@ -157,7 +158,7 @@ def _score(match: Match, clouds: tuple[FruitCloud, FruitCloud], truth: tuple[Pat
 
 
 def _line(visit: DemoVisit, day: str) -> str:
-    found = f"{day}: {visit.n_fruits} fruits, median diameter {visit.diameter_mm:.0f} mm"
+    found = f"{day}: {amount(visit.n_fruits, 'fruit')}, median diameter {visit.diameter_mm:.0f} mm"
     if visit.match is None:
         return found
     return f"{found}; {visit.match.status.value}: {len(visit.match.pairs)} of them known"

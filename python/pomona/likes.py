@@ -30,13 +30,13 @@ __all__ = [
     "PICTURE",
     "RENDERED",
     "SCANNED",
-    "SEASON",
     "THINNING",
     "VIDEO",
     "VISITS",
     "Database",
     "Like",
     "database_of",
+    "drawn_season",
     "is_like",
     "is_of_demo",
     "visits_of_season",
@@ -235,11 +235,19 @@ def visits_of_season(folder: Path) -> set[str]:
         return set()
 
 
-def _has_season(folder: Path) -> bool:
-    """Tell a folder in which every file with one of our names is told of by a truth of ours."""
-    names = {path.name for path in folder.iterdir()}
-    ours = visits_of_season(folder)
-    return {name for name in names if DATED.fullmatch(name)} <= ours and ("truth.json" not in names or bool(ours))
+def drawn_season(name: str, seed: int) -> Like:
+    """Say what a drawn season may replace: itself, drawn otherwise; another season or seed it may not."""
+
+    def tells(folder: Path) -> bool:
+        names = {path.name for path in folder.iterdir()}
+        if not {name for name in names if DATED.fullmatch(name)} <= visits_of_season(folder):
+            return False
+        if "truth.json" not in names:
+            return True
+        truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+        return bool(visits_of_season(folder)) and (truth["season"], truth["seed"]) == (name, seed)
+
+    return Like(f"a folder of the season {name} with seed {seed}", tells, is_folder=True)
 
 
 def is_of_demo(path: Path) -> bool:
@@ -288,7 +296,6 @@ VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
-SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
 CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
+from pomona.amounts import amount
 from pomona.cards import as_card
 from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
 from pomona.core_settings import core_settings
@@ -87,8 +88,8 @@ class Match:
 
     def __repr__(self) -> str:
         if not self:
-            return f"Match({self.status}: {self.n_query} fruits, {self.n_map} in the map)"
-        found = f"{len(self.pairs)} of {self.n_query} fruits again among {self.n_map}"
+            return f"Match({self.status}: {amount(self.n_query, 'fruit')}, {self.n_map} in the map)"
+        found = f"{len(self.pairs)} of {amount(self.n_query, 'fruit')} again among {self.n_map}"
         return f"Match({self.status}: {found}, log-odds {self.log_odds:.0f})"
 
     def _repr_html_(self) -> str:
@@ -148,7 +149,7 @@ class Index:
         return len(self._map)
 
     def __repr__(self) -> str:
-        return f"Index({len(self)} fruits, {self._kind})"
+        return f"Index({amount(len(self), 'fruit')}, {self._kind})"
 
     def _repr_html_(self) -> str:
         return as_card("Index", {"fruits": len(self), "method": self._kind})

@@ -51,6 +51,8 @@ class Scan:
         One of so many frames is taken.
     kept : Kept or None
         Where looks are kept.
+    crops : bool
+        Whether to keep a small picture of each fruit.
     """
 
     recording: Recording
@@ -60,6 +62,7 @@ class Scan:
     config: Mapping[str, Any]
     every: int
     kept: Kept | None
+    crops: bool = True
 
     def run(self, progress: Progress | None = None, stop: Callable[[], bool] | None = None) -> Survey:
         """Find the fruits; see `pomona.survey.scan`."""
@@ -68,6 +71,7 @@ class Scan:
             self.boxes,
             depth=self.looks["depth"],
             **self.choices,
+            crops=self.crops,
             config=self.config,
             keep=self.kept,
             progress=progress,
@@ -107,6 +111,7 @@ def scan(
     first: int | None = None,
     last: int | None = None,
     keep: str | Path | None = None,
+    crops: bool = True,
     config: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
@@ -136,6 +141,8 @@ def scan(
         Take one of so many frames, from one frame number to another.
     keep : str or Path, optional
         Keep here what each frame showed, and go on from it.
+    crops : bool
+        Keep a small picture of each fruit in the session.
     config : mapping, optional
         Values of the core's tables that differ from `pomona.default_config()`.
     progress, stop : callable, optional
@@ -170,6 +177,7 @@ def scan(
         first=first,
         last=last,
         keep=None if keep is None else Path(keep),
+        crops=crops,
         config=config or {},
         **of_model,
     )
@@ -192,6 +200,7 @@ def prepared(
     first: int | None,
     last: int | None,
     keep: Path | None,
+    crops: bool,
     config: Mapping[str, Any],
     **of_model: Unpack[ModelSettings],
 ) -> Scan:
@@ -210,7 +219,7 @@ def prepared(
     looks = {"detector": boxes.configuration, "depth": depth}
     kept = None if keep is None else Kept(keep, {**_made_from(taken, boxes), **looks})
     check_sides(taken)
-    return Scan(taken, boxes, looks, {"odometry": odometry, "retrack": retrack}, config, every, kept)
+    return Scan(taken, boxes, looks, {"odometry": odometry, "retrack": retrack}, config, every, kept, crops)
 
 
 def _boxes_given(detections: object) -> Path | Detector | None:

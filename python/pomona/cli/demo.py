@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import DEMO
@@ -45,8 +46,8 @@ def _told(line: str) -> None:
 def _as_lines(made: Demo) -> list[str]:
     first, second = (path.stem for path in made.sessions)
     return [
-        f"{made.match.status.value}: {len(made.match.pairs)} fruits of {second} known from {first}, "
-        f"{made.n_identities} identities in the map",
+        f"{made.match.status.value}: {amount(len(made.match.pairs), 'fruit')} of {second} known from {first}, "
+        f"{amount(made.n_identities, 'identity')} in the map",
         f"  against the truth  {_share(made.score)}",
         f"  growth             {made.growth_mm:+.1f} mm in diameter, median",
         "look at",
@@ -70,7 +71,7 @@ def _lines_of_row(made: RowDemo) -> list[str]:
     found_again = [line for visit in made.visits[1:] for line in _lines_of_visit(visit)]
     pictures = [f"  {visit.picture}  fruits found again, new and missed" for visit in made.visits if visit.picture]
     return [
-        f"{len(made.visits)} visits, {made.n_identities} identities in the map",
+        f"{amount(len(made.visits), 'visit')}, {amount(made.n_identities, 'identity')} in the map",
         *found_again,
         "look at",
         f"  {made.same_fruits}  the same fruits on the last two dates",
@@ -88,6 +89,7 @@ def _lines_of_visit(visit: DemoVisit) -> list[str]:
     if match is None or visit.score is None:
         return [f"  {day}: {'no match' if match is None else match.status.value}"]
     return [
-        f"  {day}: {len(match.pairs)} of {visit.n_fruits} fruits known, {visit.growth_mm:+.1f} mm since, median",
+        f"  {day}: {len(match.pairs)} of {amount(visit.n_fruits, 'fruit')} known, "
+        f"{visit.growth_mm:+.1f} mm since, median",
         f"    against the truth  {_share(visit.score)}",
     ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import BOXES, DRAWN_BOXES
@@ -51,7 +52,7 @@ def detect(
     if json:
         say_json({"output": str(output), "model": str(detector.path), "n_boxes": _counts(found)})
     else:
-        say(*(f"{name}: {count} fruits" for name, count in _counts(found).items()))
+        say(*(f"{name}: {amount(count, 'fruit')}" for name, count in _counts(found).items()))
 
 
 def _counts(found: dict[str, Detections]) -> dict[str, int]:

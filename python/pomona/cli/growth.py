@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import GROWN
@@ -86,13 +87,13 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
     found = _summary(grown)
     scales = [abs(scale - 1.0) for scale in found["visit_scales"].values()]
     lines = [
-        f"{output}: {len(grown.fruits.ids)} fruits on {len(grown.fruits.days)} visits, "
+        f"{output}: {amount(len(grown.fruits.ids), 'fruit')} on {amount(len(grown.fruits.days), 'visit')}, "
         f"{grown.fruits.days[0]} to {grown.fruits.days[-1]}",
         f"  curve: {found['curve']} over {found['time']}; a size is sure to {found['noise_mm']:.1f} mm, "
         f"a visit's sizes are off together by up to {100 * max(scales):.1f} %",
     ]
     if found["n_outliers"]:
-        lines.append(f"  {found['n_outliers']} fruits are outliers, see fruits.csv")
+        lines.append(f"  outliers: {amount(found['n_outliers'], 'fruit')}, see fruits.csv")
     forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
     lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
     return lines + [_line_of_block(block) for block in found["blocks"]]

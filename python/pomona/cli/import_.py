@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Verbs
 
@@ -31,4 +32,4 @@ def import_kinect_apples(
 
     for capture in import_captures(source, output, date or DATE):
         colour = "depth and colour" if capture.has_colour else "depth only, no colour picture in the data set"
-        say(f"{capture.folder}: {capture.boxes} boxes, {colour}")
+        say(f"{capture.folder}: {amount(capture.boxes, 'box')}, {colour}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.match_options import (
     Method,
     Scale,
@@ -82,11 +83,12 @@ def map_add(
             f"{orchard}: is not there, and a map starts in metres: found --unit free, expected m, cm or mm"
         )
     if date is not None and len(sessions) > 1:
-        raise PomonaError(f"--date: found it with {len(sessions)} sessions, expected one; each has a day of its own")
+        found = amount(len(sessions), "session")
+        raise PomonaError(f"--date: found it with {found}, expected one; each has a day of its own")
     visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
-    with working(f"adding {sum(len(visit.cloud) for visit in visits)} fruits to {orchard.name}"):
+    with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
         answers = add_sessions(orchard, visits, settings=settings, new_part=new_part, waiting=_waiting(orchard))
     told = list(zip(visits, answers, strict=True))
     if json:
@@ -200,8 +202,9 @@ def _removed_as_text(session: str, removed: Removed | None) -> str:
     if removed is None:
         return f"{session}: no session of that name in the map, which stays as it was"
     return (
-        f"{session}: {removed.n_observations} observations go, {removed.n_gone} fruits that nobody else saw with them, "
-        f"{removed.n_changed} fall back; {removed.n_left} {'session stays' if removed.n_left == 1 else 'sessions stay'}"
+        f"{session}: takes away {amount(removed.n_observations, 'observation')}, with them "
+        f"{amount(removed.n_gone, 'fruit')} that nobody else saw; {amount(removed.n_changed, 'fruit')} fall back; "
+        f"left: {amount(removed.n_left, 'session')}"
     )
 
 
@@ -257,20 +260,20 @@ def _added_as_lines(visit: Session, added: Added) -> list[str]:
 
 
 def _change_as_text(change: Change) -> str:
-    count = "1 observation" if change.n_observations == 1 else f"{change.n_observations} observations"
+    count = amount(change.n_observations, "observation")
     return f"  fruit {change.from_fruit_id}: {count} {_EVENTS[change.event]} fruit {change.to_fruit_id}"
 
 
 def _added_as_text(visit: Session, added: Added) -> str:
     match = added.match
     if match is None:
-        return f"{visit.name}: starts the map with {added.n_new} fruits"
+        return f"{visit.name}: starts the map with {amount(added.n_new, 'fruit')}"
     if not added.is_added:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
     if match.status.value != "Found":
-        return f"{visit.name}: {match.status.value}, starts a part of its own with {added.n_new} fruits"
+        return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
     return (
-        f"{visit.name}: {added.n_matched} of {len(visit.cloud)} fruits recognised, {added.n_new} new, "
+        f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
         f"{added.n_missed} in view and not seen"
     )
 
@@ -327,7 +330,8 @@ def _info_as_lines(info: dict[str, Any]) -> list[str]:
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (header, *rows)]
     return [
         f"{info['path']}: {info['kind']}, format {info['format_version']}",
-        f"{info['n_fruits']} fruits ({states}), {info['n_observations']} observations in {len(rows)} sessions",
+        f"{amount(info['n_fruits'], 'fruit')} ({states}), {amount(info['n_observations'], 'observation')} "
+        f"in {amount(len(rows), 'session')}",
         "",
         *(line.rstrip() for line in table),
     ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.match_options import (
     Method,
     PlotView,
@@ -71,7 +72,7 @@ def match(
     read_unit = unit or (Unit.free if settings.call["scale"] == Scale.free else Unit.m)
     in_query = FruitCloud.read(query, unit=(query_unit or read_unit).value)
     in_map = FruitCloud.read(map, unit=read_unit.value)
-    with working(f"matching {len(in_query)} fruits with {len(in_map)}"):
+    with working(f"matching {amount(len(in_query), 'fruit')} with {len(in_map)}"):
         answer = settings.match(in_query, in_map)
     if output is not None:
         write_pairs(output, answer, in_query, in_map)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.pairs import PAIR_COLUMNS
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def _describe_pairs(match: Match) -> list[str]:
         _line(
             "distances", f"median {np.median(distances_cm):.1f} cm, 90 % within {np.quantile(distances_cm, 0.9):.1f} cm"
         ),
-        _line("probability", f"median {np.median(match.probabilities):.3f}, {sure} pairs at 0.9 or more"),
+        _line("probability", f"median {np.median(match.probabilities):.3f}, {amount(sure, 'pair')} at 0.9 or more"),
         _line("noise", f"{100.0 * match.noise_m:.1f} cm per axis"),
         _line("log-odds", f"{match.log_odds:.1f} nats"),
     ]

@@ -66,6 +66,7 @@ def scan(
     keep: Annotated[Path | None, Writes(KEPT)] = typer.Option(
         None, metavar="DIR", help="Keep stage results here, and go on from them."
     ),
+    crops: bool = typer.Option(True, "--crops/--no-crops", help="Keep a small picture of each fruit in the session."),
     preview: Annotated[Path | None, Writes(VIDEO)] = typer.Option(
         None, metavar="MP4", help="Draw boxes, ids and depths on the video."
     ),
@@ -107,6 +108,7 @@ def scan(
         first=first,
         last=last,
         keep=keep,
+        crops=crops,
         config=overrides,
         family=family,
         min_score=min_score,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from pomona.amounts import amount
 from pomona.cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
         lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
+    if not found["n_fruits"]:
+        lines.append("  no fruit was found: there is nothing to add to a map")
     return [
         *lines,
         *_frames(survey.tally),
@@ -112,14 +115,14 @@ def _table(what: str, fates: Counter[Any]) -> list[str]:
 
 
 def _boxes(found: dict[str, Any]) -> str:
-    boxes = f"{found['n_boxes']} boxes in {found['n_frames']} frames"
+    boxes = f"{amount(found['n_boxes'], 'box')} in {amount(found['n_frames'], 'frame')}"
     return f"{boxes}, {found['n_skipped_frames']} of them skipped" if found["n_skipped_frames"] else boxes
 
 
 def _fruits(found: dict[str, Any]) -> str:
     n_parts = len(found["parts"])
     counts = [part["n_fruits"] for part in found["parts"] if part["output"] == found["output"][0]]
-    fruits = f"{counts[0]} fruits"
+    fruits = amount(counts[0], "fruit")
     if n_parts > 1:
         fruits += f" in the longest of {n_parts} parts"
     if found["n_fruits"] > counts[0]:
@@ -131,4 +134,4 @@ def _fruits(found: dict[str, Any]) -> str:
 def _part_in_words(part: dict[str, Any]) -> str:
     where = part["output"] or "not written"
     began = f": {part['began']}" if part["began"] else ""
-    return f"{where}: frames {part['first_frame']} to {part['last_frame']}, {part['n_fruits']} fruits{began}"
+    return f"{where}: frames {part['first_frame']} to {part['last_frame']}, {amount(part['n_fruits'], 'fruit')}{began}"

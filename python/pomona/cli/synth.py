@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.synth_video import synth_video
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Verbs, Writes
-from pomona.likes import SEASON, VISITS
+from pomona.likes import VISITS, Like, drawn_season
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pomona.synth.clouds import ScenePair
     from pomona.synth.seasons import SeasonPlan
 
@@ -54,10 +57,14 @@ def synth_clouds(
 app.command("video")(synth_video)
 
 
+def _of_season(given: Mapping[str, Any]) -> Like:
+    return drawn_season(given["season"], given["seed"])
+
+
 @app.command("season")
 def synth_season(
     season: str = typer.Argument("easy", help="Named season, easy or hard; the options change it."),
-    output: Annotated[Path, Writes(SEASON)] = typer.Option(
+    output: Annotated[Path, Writes(_of_season)] = typer.Option(
         ..., "-o", "--output", help="Folder to write to; made where it does not exist."
     ),
     seed: int = typer.Option(0, help="Which row and which visits to draw."),
@@ -90,7 +97,7 @@ def synth_season(
     drawn = draw_season(plan, seed)
     write_season(drawn, output)
     for visit in drawn.visits:
-        say(f"{visit.day}  {len(visit.cloud)} fruits, {visit.drive.side} side")
+        say(f"{visit.day}  {amount(len(visit.cloud), 'fruit')}, {visit.drive.side} side")
 
 
 def _given(options: dict[str, Any]) -> dict[str, Any]:

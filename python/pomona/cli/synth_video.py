@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Writes
 from pomona.likes import RENDERED
@@ -56,4 +57,4 @@ def synth_video(
     )
     with counting("rendering") as tell:
         done = film(filming, output, tell=tell)
-    say(f"{output}: {done} pairs of {width}x{height}")
+    say(f"{output}: {amount(done, 'pair')} of {width}x{height}")

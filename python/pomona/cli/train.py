@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import MODEL
@@ -59,7 +60,7 @@ def train(
         say_json({"output": str(output), **counts, **ap50, "min_score": made.min_score})
         return
     say(
-        f"{output}: trained on {made.n_pictures} pictures with {made.n_fruits} fruits",
+        f"{output}: trained on {amount(made.n_pictures, 'picture')} with {amount(made.n_fruits, 'fruit')}",
         f"  AP50 on the fifth kept apart: {made.before:.3f} before, {made.after:.3f} now",
         f"  counts are right from a score of {made.min_score:.2f} on, which it takes by itself",
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import CALIPER_PAIRS, PICTURE
@@ -51,7 +52,7 @@ def validate(
         raise PomonaError(f"{calipers}: found no day near the visits of {orchard}, expected one within 3 days of one")
     if unseen:
         names = ", ".join(unseen[:5]) + (", ..." if len(unseen) > 5 else "")
-        tell(f"pomona: warning: {calipers}: {len(unseen)} fruits were not measured by any visit near: {names}")
+        tell(f"pomona: warning: {calipers}: {amount(len(unseen), 'fruit')} measured by no visit near: {names}")
     if output is not None:
         _write_pairs(output, pairs)
     if plot is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pomona.amounts import amount
 from pomona.detect.coco import read_coco
 from pomona.detect.csv_table import read_csv
 from pomona.detect.detections import Detections
@@ -91,7 +92,7 @@ class FileDetector:
         """Say in one line what was read."""
         boxes = sum(map(len, self.by_frame.values()))
         ids = " with ids" if self.with_ids and boxes else ""
-        return f"{self.path}: {boxes} boxes{ids} in {len(self.by_frame)} frames"
+        return f"{self.path}: {amount(boxes, 'box')}{ids} in {amount(len(self.by_frame), 'frame')}"
 
 
 def _boxes(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.detect.detections import Detections
 from pomona.errors import PomonaError
 from pomona.recording import Calibration, Frame
@@ -79,7 +80,7 @@ class MaskDetector:
     @property
     def description(self) -> str:
         """Say in one line what is read."""
-        return f"{self.path}: instance masks of {len(self.pictures)} frames"
+        return f"{self.path}: instance masks of {amount(len(self.pictures), 'frame')}"
 
 
 def boxes_of(mask: NDArray[np.integer[Any]]) -> Detections:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.foretelling import NINETY
 from pomona.growth.growth_tables import used_classes
@@ -72,7 +73,8 @@ def draw_curves(growth: SeasonGrowth) -> Figure:
         )
     axes.plot([], [], ".", color=INK, label="sizes as measured")
     axes.set(ylabel="diameter, mm")
-    _say(figure, f"{int(growth.fruits.hanging.sum())} fruits over {n_visits} visits", _about(growth))
+    n_fruits = int(growth.fruits.hanging.sum())
+    _say(figure, f"{amount(n_fruits, 'fruit')} over {amount(n_visits, 'visit')}", _about(growth))
     axes.legend(frameon=False, labelcolor=INK, loc="upper left")
     _days_below(axes)
     return figure

@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.session import Session
 from pomona.orchard.settling import SettledPart, Settlement, settle, settlement_of
-from pomona.orchard.writing import Placement, insert_matches, insert_observations, insert_session, update_layers
+from pomona.orchard.writing import (
+    Placement,
+    insert_crops,
+    insert_matches,
+    insert_observations,
+    insert_session,
+    update_layers,
+)
 
 __all__ = ["Newcomer", "join"]
 
@@ -64,12 +71,13 @@ def _inserted(connection: sqlite3.Connection, settlement: Settlement, number: in
     frame = part.conclusion.frames[own]
     fruit_ids = part.fruit_ids_of(own)
     session_id = insert_session(connection, who.session, frame, who.placement, who.content_sha256)
-    cloud_in_map = who.session.cloud.transformed(frame)
+    observation_ids = insert_observations(connection, session_id, fruit_ids, who.session.cloud.transformed(frame))
+    insert_crops(connection, session_id, observation_ids, who.session.crops)
     return replace(
         part.evidence.visits[own],
         session_id=session_id,
         map_from_session=frame,
-        observation_ids=insert_observations(connection, session_id, fruit_ids, cloud_in_map),
+        observation_ids=observation_ids,
         fruit_ids=fruit_ids,
     )
 

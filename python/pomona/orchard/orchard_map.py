@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
+from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.orchard.fruit_ids import Change
@@ -90,7 +91,7 @@ class Observations:
 
     def __repr__(self) -> str:
         n_fruits, n_sessions = len(set(self.fruit_ids.tolist())), len(set(self.sessions))
-        return f"Observations({len(self)} of {n_fruits} fruits in {n_sessions} sessions)"
+        return f"Observations({len(self)} of {amount(n_fruits, 'fruit')} in {amount(n_sessions, 'session')})"
 
     def columns(self) -> dict[str, Any]:
         """Return them as a long table: fruit, session, date, label, x, y, z, diameter_m, probability."""

@@ -12,6 +12,7 @@ import numpy as np
 from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.fruit_crop import FruitCrop
 from pomona.store.values import FARTHEST_M, iso_date
 from pomona.trajectory import Trajectory
 
@@ -43,6 +44,8 @@ class Session:
         File name to SHA-256 of the inputs.
     program_version : str
         Version of the program that made the cloud.
+    crops : mapping of int to FruitCrop
+        Small pictures of fruits, by row of the cloud.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Session:
     configuration: Mapping[str, object] = field(default_factory=dict)
     input_hashes: Mapping[str, str] = field(default_factory=dict)
     program_version: str = __version__
+    crops: Mapping[int, FruitCrop] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.name.strip():

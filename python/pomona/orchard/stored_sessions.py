@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.fruit_crop import FruitCrop
+from pomona.orchard.crops import crops_of_session
 from pomona.orchard.session import Session
 from pomona.store.failures import WrongContentError, content
 from pomona.store.opening import snapshot
@@ -37,8 +39,20 @@ def read_session(path: str | Path) -> Session:
         about = only_session(connection)
         session_id = about.pop("id")
         cloud, trajectory = observed_cloud(connection, session_id, FruitCloud), _trajectory(connection, session_id)
+        crops = _crops_by_row(connection, session_id)
         with content("sessions"):
-            return Session(cloud=cloud, trajectory=trajectory, **about)
+            return Session(cloud=cloud, trajectory=trajectory, crops=crops, **about)
+
+
+def _crops_by_row(connection: sqlite3.Connection, session_id: int) -> dict[int, FruitCrop]:
+    """Return the small pictures of a session's fruits by their rows in its cloud."""
+    (ids,) = columns_of(connection, "observations", ("id",), OF_SESSION.format(session_id))
+    row_of = {observation_id: row for row, observation_id in enumerate(ids)}
+    crops = crops_of_session(connection, session_id)
+    strange = next((seen for seen in crops if seen not in row_of), None)
+    if strange is not None:
+        raise WrongContentError(f"crops: observation_id: found {strange}, expected an observation of its session")
+    return {row_of[seen]: crop for seen, crop in crops.items()}
 
 
 def session_in_map(connection: sqlite3.Connection, session_id: int, session_from_map: NDArray[np.float64]) -> Session:
@@ -52,8 +66,9 @@ def session_in_map(connection: sqlite3.Connection, session_id: int, session_from
         session_from_camera = session_from_map @ map_from_camera
         session_from_camera[:, :3, :3] /= np.cbrt(np.linalg.det(session_from_camera[:, :3, :3]))[:, None, None]
         trajectory = Trajectory(frames, times_s, session_from_camera)
+    crops = _crops_by_row(connection, session_id)
     with content("sessions"):
-        return Session(cloud=cloud, trajectory=trajectory, **about)
+        return Session(cloud=cloud, trajectory=trajectory, crops=crops, **about)
 
 
 def _trajectory(connection: sqlite3.Connection, session_id: int) -> Trajectory | None:

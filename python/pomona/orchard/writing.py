@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
+from pomona.fruit_crop import FruitCrop
 from pomona.identity import VisitPair
 from pomona.orchard.session import Session
 from pomona.settings import Settings
@@ -25,6 +26,7 @@ from pomona.trajectory import Trajectory
 __all__ = [
     "Placement",
     "covariance_cells",
+    "insert_crops",
     "insert_fruits",
     "insert_matches",
     "insert_observations",
@@ -60,6 +62,7 @@ def write_session(
     trajectory: Trajectory | None = None,
     configuration: Mapping[str, object] | None = None,
     input_hashes: Mapping[str, str] | None = None,
+    crops: Mapping[int, FruitCrop] | None = None,
 ) -> None:
     """Write one visit as a map with one session (GeoPackage); the file appears whole or not at all.
 
@@ -81,18 +84,23 @@ def write_session(
         Effective settings of the program that made the cloud, JSON values.
     input_hashes : mapping, optional
         File name to SHA-256 of the inputs.
+    crops : mapping of int to FruitCrop, optional
+        Small pictures of fruits, by row of the cloud.
 
     Raises
     ------
     PomonaError
         When the date is not one, the configuration is not JSON or the file cannot be written.
     """
-    session = Session(name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {})
+    session = Session(
+        name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {}, crops=crops or {}
+    )
     with whole_file(path) as partial, blank(partial, Path(path)) as connection:
         schema.create(connection, "session")
         session_id = insert_session(connection, session, np.eye(4))
         fruit_ids = insert_fruits(connection, session_id, session.date, cloud)
-        insert_observations(connection, session_id, fruit_ids, cloud)
+        observation_ids = insert_observations(connection, session_id, fruit_ids, cloud)
+        insert_crops(connection, session_id, observation_ids, session.crops)
         update_layers(connection)
 
 
@@ -185,6 +193,16 @@ def insert_observations(
             ),
         )
     return np.arange(last + 1, last + 1 + n)
+
+
+def insert_crops(
+    connection: sqlite3.Connection, session_id: int, observation_ids: NDArray[np.int64], crops: Mapping[int, FruitCrop]
+) -> None:
+    """Add the small pictures of fruits; `crops` go by row of the session, as `observation_ids` do."""
+    connection.executemany(
+        "INSERT INTO crops (session_id, observation_id, frame, picture) VALUES (?, ?, ?, ?)",
+        ((session_id, int(observation_ids[row]), crop.frame, crop.picture) for row, crop in sorted(crops.items())),
+    )
 
 
 def insert_matches(

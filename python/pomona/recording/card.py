@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pomona.amounts import amount
 from pomona.cards import as_card
 from pomona.recording.frame import Recording
 
@@ -16,7 +17,7 @@ class RecordingCard:
         pictures = " and ".join(found["pictures"])
         poses = "with poses" if found["poses"] else "no poses"
         size = f"{found['width']}x{found['height']}"
-        return f"{type(self).__name__}({str(self.path)!r}: {len(self)} frames of {size}, {pictures}, {poses})"
+        return f"{type(self).__name__}({str(self.path)!r}: {amount(len(self), 'frame')} of {size}, {pictures}, {poses})"
 
     def _repr_html_(self: Recording) -> str:
         found = self.description()

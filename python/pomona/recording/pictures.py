@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -142,9 +143,9 @@ def decoded_picture(
     import cv2
 
     content = encoded.tobytes()
-    kind = _cut_off(content)
-    if kind is not None:
-        raise UnreadablePictureError(f"{where}: the {kind} is cut off")
+    damage = _damage(content)
+    if damage is not None:
+        raise UnreadablePictureError(f"{where}: {damage}")
     found_px = encoded_size(content)
     if found_px is not None:
         _require_decodable(where, found_px, size_px, size_of)
@@ -184,15 +185,30 @@ def _decode(path: Path, flags: int, size_px: tuple[int, int] | None = None) -> N
     return decoded_picture(path, encoded, flags, size_px)
 
 
-def _cut_off(encoded: bytes) -> str | None:
-    """Name a PNG or JPEG that has no end: decoders fill the rest with zeros or grey, and only mutter on stderr."""
+def _damage(encoded: bytes) -> str | None:
+    """Say what is wrong with a PNG or JPEG where decoders fill in zeros or grey, and only mutter on stderr."""
     if encoded.startswith(PNG_BEGINS):
-        return None if b"IEND" in encoded[-32:] else "PNG"
+        if b"IEND" not in encoded[-32:]:
+            return "the PNG is cut off"
+        return None if _checksums_are_right(encoded) else "the PNG is damaged: a checksum is wrong"
     if encoded.startswith(b"\xff\xd8"):
         # The end of the image must come after the last start of a scan; thumbnails have ends of their own before it.
         end = encoded.rfind(b"\xff\xd9")
-        return "JPEG" if end < 0 or encoded.find(b"\xff\xda", end) >= 0 else None
+        return "the JPEG is cut off" if end < 0 or encoded.find(b"\xff\xda", end) >= 0 else None
     return None
+
+
+def _checksums_are_right(png: bytes) -> bool:
+    """Tell whether each chunk (length, name, content, CRC-32 of name and content) is as it was written."""
+    view, at = memoryview(png), len(PNG_BEGINS)
+    while at + 12 <= len(png):
+        end = at + 8 + int.from_bytes(view[at : at + 4])
+        if zlib.crc32(view[at + 4 : end]) != int.from_bytes(view[end : end + 4]):
+            return False
+        if png[at + 4 : at + 8] == b"IEND":
+            return True
+        at = end + 4
+    return False
 
 
 def _require_size(path: Path, picture: NDArray[Any], calibration: Calibration) -> None:

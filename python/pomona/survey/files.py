@@ -72,6 +72,7 @@ def write_survey(
             date=date,
             recording=str(recording.path.resolve()),
             trajectory=part.trajectory,
+            crops=part.crops,
             configuration=configuration,
             input_hashes=hashes,
         )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.fruit_crop import FruitCrop
 from pomona.survey.believing import Believing
+from pomona.survey.best_shots import BestShots
 from pomona.survey.pose_source import PoseSource
 from pomona.survey.registration import Fruits
 from pomona.survey.seeing import Look
@@ -64,6 +66,8 @@ class Part:
         Frames for which a fruit stays in view; None where boxes were not tracked.
     tally : Tally
         What became of its boxes and tracks.
+    crops : mapping of int to FruitCrop
+        Of each fruit, by its row in the cloud, as far as there are any.
     """
 
     cloud: FruitCloud
@@ -72,6 +76,7 @@ class Part:
     began: str | None = None
     frames_in_view: float | None = None
     tally: Tally = field(default_factory=Tally)
+    crops: Mapping[int, FruitCrop] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Part({', '.join(f'{name}: {value}' for name, value in self.facts.items())})"
@@ -102,13 +107,21 @@ class OpenPart:
         Opens what tells which boxes are one fruit; gives None where the boxes carry names, or there is one frame.
     believing : Believing
         Tells which tracks are fruits.
+    with_crops : bool
+        Whether to keep a small picture of each fruit.
     """
 
     def __init__(
-        self, number: int, began: str | None, open_tracker: Callable[[], Tracker | None], believing: Believing
+        self,
+        number: int,
+        began: str | None,
+        open_tracker: Callable[[], Tracker | None],
+        believing: Believing,
+        *,
+        with_crops: bool = True,
     ) -> None:
         self._number, self._began, self._open_tracker, self._believing = number, began, open_tracker, believing
-        self._tracker = open_tracker()
+        self._tracker, self._with_crops, self._shots = open_tracker(), with_crops, BestShots()
         self._looks: list[Look] = []
         self._times_s: list[float] = []
         self._seen: Counter[str | int] = Counter()
@@ -123,13 +136,17 @@ class OpenPart:
         """Take the next frame; its left picture, where there is one, shows fruits that have no box."""
         self._looks.append(look)
         self._times_s.append(time_s)
+        names: Sequence[str | int | None] = ()
         if self._tracker is None:
-            self._seen.update(_names(look))
+            names = _names(look)
         elif look.detections.looked:
             numbers = self._tracker.update(look.frame, session_from_camera, look.detections, look.lifted)
-            self._seen.update(numbers[numbers >= 0].tolist())
+            names = [number if number >= 0 else None for number in numbers.tolist()]
             if left is not None:
                 self._tracker.glimpse(left)
+        self._seen.update(name for name in names if name is not None)
+        if self._with_crops and left is not None:
+            self._shots.offer(look, names, left)
 
     @property
     def n_fruits(self) -> int:
@@ -158,6 +175,7 @@ class OpenPart:
     def continued(self, poses: NDArray[np.float64], other: OpenPart, other_poses: NDArray[np.float64]) -> OpenPart:
         """Give this part with the later frames of another one, whose poses are in the same frame of reference."""
         joined = OpenPart(self._number, self._began, self._open_tracker, self._believing)
+        joined._shots = self._shots.with_those_of(other._shots)
         for part, known in ((self, poses), (other, other_poses)):
             for look, time_s, pose in zip(part._looks, part._times_s, known, strict=True):
                 joined.add(look, time_s, pose)
@@ -192,7 +210,8 @@ class OpenPart:
         trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), poses)
         boxes = _boxes(self._looks, row_of[owners.fruits])
         tally = Tally.of(self._looks, boxes.fruits, first.fruits, joined.fruits, fates)
-        return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally)
+        crops = self._shots.crops(boxes.frames, boxes.fruits)
+        return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally, crops)
 
     def _owners(self) -> _Owners:
         return self._named() if self._tracker is None else self._tracked(self._tracker.finish(min_views=1))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
@@ -80,8 +81,8 @@ class Survey:
 
     def __repr__(self) -> str:
         where = f" in the longest of {len(self.parts)} parts" if len(self.parts) > 1 else ""
-        skipped = f", {len(self.skipped)} frames skipped" if self.skipped else ""
-        return f"Survey({len(self.cloud)} fruits{where}, from {self.detections} boxes{skipped})"
+        skipped = f", {amount(len(self.skipped), 'frame')} skipped" if self.skipped else ""
+        return f"Survey({amount(len(self.cloud), 'fruit')}{where}, from {amount(self.detections, 'box')}{skipped})"
 
     def _repr_html_(self) -> str:
         rows = [(number, *part.facts.values()) for number, part in enumerate(self.parts, start=1)]
@@ -117,6 +118,7 @@ def scan(
     depth: str = "auto",
     odometry: bool = False,
     retrack: bool = False,
+    crops: bool = True,
     config: Mapping[str, Any] | None = None,
     keep: Kept | None = None,
     progress: Progress | None = None,
@@ -136,6 +138,8 @@ def scan(
         Find the poses even where the recording has some.
     retrack : bool
         Track the boxes even where they have ids.
+    crops : bool
+        Keep a small picture of each fruit, of a recording with colour.
     config : mapping, optional
         Values of the core's tables that differ from `pomona.default_config()`; `tracking` and `odometry` are used here.
     keep : Kept, optional
@@ -159,7 +163,7 @@ def scan(
     camera = pose_source_of(recording, odometry=odometry, config=config)
     # In a single frame nothing can be seen twice: each box is a fruit.
     named = len(recording) == 1 or (not retrack and bool(getattr(detector, "with_ids", False)))
-    findings = _Findings(partial(_open_part, recording, None if named else config or {}))
+    findings = _Findings(partial(_open_part, recording, None if named else config or {}, crops))
     look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
     with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
@@ -201,13 +205,16 @@ def _placed(camera: PoseSource, frame: Frame) -> Place:
         return Place(None, broken=str(error))
 
 
-def _open_part(recording: Recording, config: Mapping[str, Any] | None, number: int, began: str | None) -> OpenPart:
+def _open_part(
+    recording: Recording, config: Mapping[str, Any] | None, crops: bool, number: int, began: str | None
+) -> OpenPart:
     """Open a part whose boxes are tracked, or, without a configuration, go by their names."""
 
     def open_tracker() -> Tracker | None:
         return None if config is None else Tracker(recording.calibration, config)
 
-    return OpenPart(number, began, open_tracker, Believing(recording.calibration, config or {}))
+    believing = Believing(recording.calibration, config or {})
+    return OpenPart(number, began, open_tracker, believing, with_crops=crops)
 
 
 class _Findings:
@@ -257,7 +264,7 @@ def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:
     first = next(iter(skipped.values()))
     if len(skipped) == len(recording):
         raise PomonaError(first)
-    message = f"{recording.path}: skipped {len(skipped)} of {len(recording)} frames, first {first}"
+    message = f"{recording.path}: skipped {len(skipped)} of {amount(len(recording), 'frame')}, first {first}"
     warnings.warn(message, PomonaWarning, stacklevel=3)
 
 

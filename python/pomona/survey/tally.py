@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.errors import PomonaWarning
 from pomona.survey.believing import Believing
 from pomona.survey.depth import Refusal
@@ -178,9 +179,9 @@ def tell_little(path: Path, n_frames: int, tally: Tally) -> None:
 def _few_boxes(n_frames: int, n_boxes: int) -> str | None:
     what_to_do = "check the file of the boxes, or the model's --min-score and --classes"
     if n_boxes == 0:
-        return f"found no boxes in {n_frames} frames, so no fruits: {what_to_do}"
+        return f"found no boxes in {amount(n_frames, 'frame')}, so no fruits: {what_to_do}"
     if n_frames > 1 and n_boxes < max(FEW_BOXES, FEW_IN_A_FRAME * n_frames):
-        return f"found {n_boxes} boxes in {n_frames} frames, too few for fruits: {what_to_do}"
+        return f"found {amount(n_boxes, 'box')} in {amount(n_frames, 'frame')}, too few for fruits: {what_to_do}"
     return None
 
 
@@ -190,7 +191,7 @@ def _few_depths(tally: Tally) -> str | None:
     if n_refused <= (1 - SMALL_SHARE) * n_boxes:
         return None
     reason = refused.most_common(1)[0][0]
-    return f"{n_refused} of {n_boxes} boxes have no depth, most because {reason}: {ADVICE[reason]}"
+    return f"{n_refused} of {amount(n_boxes, 'box')} have no depth, most because {reason}: {ADVICE[reason]}"
 
 
 def _few_fruits(tally: Tally) -> str | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pomona.amounts import amount
 from pomona.atomic import whole_file
 from pomona.detect.picture_boxes import boxes_within, read_boxes
 from pomona.detect.picture_file import pictures_in
@@ -72,7 +73,7 @@ def labelled_pictures(places: Sequence[Path], boxes: Path) -> list[Labelled]:
         boxes_px = boxes_within(boxes, listed.get(name, ()), picture_size(path))
         labelled.append(Labelled(path, boxes_px, np.full(len(boxes_px), np.nan, np.float32)))
     if len(labelled) < LEAST_PICTURES or not listed:
-        found = f"found {len(labelled)} pictures with {sum(map(len, listed.values()))} boxes"
+        found = f"found {amount(len(labelled), 'picture')} with {amount(sum(map(len, listed.values())), 'box')}"
         raise PomonaError(f"{boxes}: {found}, expected {LEAST_PICTURES} pictures or more, and boxes in them")
     return labelled
 

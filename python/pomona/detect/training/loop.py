@@ -15,9 +15,9 @@ from torch.utils.data import DataLoader, Dataset
 
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
-from pomona.detect.training.crops import drawn_crop
 from pomona.detect.training.fruit_network import FruitNetwork
 from pomona.detect.training.loss import loss_of
+from pomona.detect.training.shown_crops import drawn_crop
 from pomona.detect.training.targets import Targets, targets_of
 
 __all__ = ["Plan", "Source", "mean_of", "train"]

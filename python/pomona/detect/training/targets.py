@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.detect.training.crops import PictureCrop
+from pomona.detect.training.shown_crops import PictureCrop
 
 __all__ = ["STRIDE", "Targets", "targets_of"]
 
