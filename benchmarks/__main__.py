@@ -20,6 +20,7 @@ NAMES = (
     "season_map",
     "growth",
     "seasons",
+    "mapscale",
     "clouds",
     "odometry",
     "tracking",

@@ -23,6 +23,7 @@ __all__ = [
     "EXPORTS",
     "GROWN",
     "KEPT",
+    "MERGED",
     "MODEL",
     "PAIRS",
     "PARQUET_MARK",
@@ -299,6 +300,7 @@ PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "di
 BOXES = Like("a table of boxes", _has_columns("image", "xmin", "ymin", "xmax", "ymax", "score"))
 MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
+MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
 PICTURE = Like("a plot", _is_picture)
 VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)

@@ -5,6 +5,7 @@ mod bundle;
 mod camera;
 mod cloud;
 mod descriptor;
+mod identity;
 mod lifting;
 mod matching;
 mod odometry;
@@ -30,6 +31,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(tracking::believed, module)?)?;
     module.add_function(wrap_pyfunction!(appearance::look_of, module)?)?;
     module.add_function(wrap_pyfunction!(descriptor::describe, module)?)?;
+    module.add_function(wrap_pyfunction!(identity::contracted, module)?)?;
+    module.add_function(wrap_pyfunction!(identity::whereabouts, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::fuse_fruits, module)?)?;
     module.add_function(wrap_pyfunction!(lifting::lift, module)?)?;
     module.add_function(wrap_pyfunction!(bundle::adjust, module)?)?;

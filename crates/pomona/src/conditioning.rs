@@ -119,10 +119,15 @@ impl Conditioned {
         self.outward().inverse().compose(pose).compose(&query.outward())
     }
 
+    /// A pose between the conditioned clouds, between the callers' frames; `self` is the map.
+    pub(crate) fn restored_pose(&self, query: &Self, pose: &Similarity) -> Similarity {
+        self.outward().compose(pose).compose(&query.outward().inverse())
+    }
+
     /// An answer between conditioned clouds in the callers' rows, frames and units; `self` is the map.
     pub(crate) fn restored(&self, query: &Self, found: Match) -> Match {
         let pose = |found: Registration| Registration {
-            map_from_query: self.outward().compose(&found.map_from_query).compose(&query.outward().inverse()),
+            map_from_query: self.restored_pose(query, &found.map_from_query),
             ..found
         };
         let pair = |pair: Pair| Pair {

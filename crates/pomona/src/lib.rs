@@ -71,6 +71,7 @@ mod conditioning;
 pub mod config;
 pub mod error;
 pub mod geometry;
+pub mod identity;
 pub mod lifting;
 pub mod look;
 pub mod matching;

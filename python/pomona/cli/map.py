@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,13 +22,14 @@ from pomona.cli.match_options import (
     up_option,
 )
 from pomona.cli.terminal import say, say_json, tell
-from pomona.cli.verbs import Verbs
+from pomona.cli.verbs import Verbs, Writes
+from pomona.likes import MERGED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from pomona.orchard import Added, Change, OrchardMap, Removed, Session
+    from pomona.orchard import Added, Change, Merged, OrchardMap, Removed, Session
 
 _EVENTS = {"joined": "joined", "split": "split off as", "moved": "moved to"}
 
@@ -61,6 +62,9 @@ def map_add(
     unit: Unit | None = typer.Option(
         None, help="Unit of the coordinates of a .csv or .ply; m also says that odd distances or diameters are right."
     ),
+    new_part: bool = typer.Option(
+        False, "--new-part", help="Let a session that is not found start a part of its own: another row, for example."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Recognise the fruits of SESSION in ORCHARD and add it.
@@ -85,7 +89,7 @@ def map_add(
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
-        answers = add_sessions(orchard, visits, settings=settings, waiting=_waiting(orchard))
+        answers = add_sessions(orchard, visits, settings=settings, new_part=new_part, waiting=_waiting(orchard))
     told = list(zip(visits, answers, strict=True))
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
@@ -119,6 +123,37 @@ def map_remove(
     if removed is not None and not yes:
         tell(f"pomona: {orchard}: nothing is removed without --yes")
     if not done:
+        raise typer.Exit(1)
+
+
+@app.command("merge")
+def map_merge(
+    orchard: Path = orchard_argument,
+    other: Path = typer.Argument(metavar="OTHER", help="The map whose sessions come; it stays as it is."),
+    output: Annotated[Path | None, Writes(MERGED)] = typer.Option(
+        None, "--output", "-o", help="Write the merged map here (.gpkg) and leave ORCHARD as it is."
+    ),
+    config: Path | None = config_option,
+    threads: int | None = threads_option,
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Join two maps that overlap: all sessions of OTHER come to ORCHARD.
+
+    The result is that of adding each session. Fruits of ORCHARD keep their ids, those of OTHER get ids of ORCHARD. Exit
+    code 0: merged. 1: OTHER was not found in ORCHARD, and nothing is written. 2: wrong input.
+    """
+    from pomona.cli.progress import working
+    from pomona.orchard import merge_maps
+    from pomona.settings import Settings
+
+    settings = Settings.load(config, {"threads": threads})
+    with working(f"merging {other.name} into {orchard.name}"):
+        merged = merge_maps(orchard, other, output=output, settings=settings, waiting=_waiting(orchard))
+    if json:
+        say_json(_merged_as_json(other, merged))
+    else:
+        say(*_merged_as_lines(other, merged))
+    if not merged.is_merged:
         raise typer.Exit(1)
 
 
@@ -193,6 +228,33 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
     }
 
 
+def _merged_as_json(other: Path, merged: Merged) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {
+        "other": str(other),
+        "merged": merged.is_merged,
+        "status": None if merged.match is None else merged.match.status.value,
+        "sessions": list(merged.sessions),
+        "shared": list(merged.shared),
+        "n_fruits": len(merged.fruit_ids),
+        "n_known": merged.n_known,
+        "fruit_ids": merged.fruit_ids,
+        "changes": [asdict(change) for change in merged.changes],
+    }
+
+
+def _merged_as_lines(other: Path, merged: Merged) -> list[str]:
+    if not merged.is_merged:
+        assert merged.match is not None
+        return [f"{other}: {merged.match.status.value}, not found in the map, which stays as it was"]
+    n_fruits, n_came, n_shared = len(merged.fruit_ids), len(merged.sessions), len(merged.shared)
+    told = (
+        f"{other}: sessions that came: {n_came}, in both: {n_shared}; {merged.n_known} of {n_fruits} fruits were known"
+    )
+    return [told, *map(_change_as_text, merged.changes)]
+
+
 def _added_as_lines(visit: Session, added: Added) -> list[str]:
     return [_added_as_text(visit, added), *map(_change_as_text, added.changes)]
 
@@ -208,6 +270,8 @@ def _added_as_text(visit: Session, added: Added) -> str:
         return f"{visit.name}: starts the map with {amount(added.n_new, 'fruit')}"
     if not added.is_added:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
+    if match.status.value != "Found":
+        return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
         f"{added.n_missed} in view and not seen"

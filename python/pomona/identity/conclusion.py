@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona import _core
 from pomona.identity.common_frame import frames_of_visits
-from pomona.identity.contraction import contracted
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, chances_of_missing, looks_of
@@ -57,7 +57,7 @@ class Conclusion:
 def conclude(
     visits: Sequence[SeenVisit], pairs: Sequence[VisitPair], known: NDArray[np.float64], keepers: Sequence[int]
 ) -> Conclusion:
-    """Say who is who, from all visits at once.
+    """Say who is who, from all visits of a part of the orchard at once.
 
     Nothing here depends on the order in which the visits came; only the frame of the map does.
 
@@ -72,7 +72,7 @@ def conclude(
     """
     sights = all_sights(visits)
     links = links_of(sights, pairs)
-    labels = contracted(sights, links)
+    labels = _core.contracted(sights.visits, len(visits), links.sights, links.log_odds, links.matched)
     frames = frames_of_visits(visits, pairs, known, keepers)
     positions = np.concatenate(
         [visit.positions @ frame[:3, :3].T + frame[:3, 3] for visit, frame in zip(visits, frames, strict=True)]

@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import Sights, VisitPair
 
-__all__ = ["UNPAIRED", "Links", "links_of"]
-
-UNPAIRED = 7.0
-"""Nats against two sights of matched visits that the match left unpaired. Of the fruits that both have seen it pairs
-all but 3 in 100, which were 3.5 nats; twice that keeps a fruit apart from the neighbour of one that was thinned."""
+__all__ = ["Links", "links_of"]
 
 SUREST = 8.0
-"""Nats of a pair at most: more than `UNPAIRED`, so that one missing pair does not part what sure ones join."""
+"""Nats of a pair at most: more than the 7 that a missing pair speaks against, so that one does not part what sure ones
+join."""
 
 
 LEAST_SURE = 0.5
@@ -36,26 +33,24 @@ class Links:
         The earlier one first.
     log_odds : (L,) float64
         That the two are one fruit; positive and negative.
-    is_matched : (V, V) bool
-        Whether two visits were found in one another: then a pair that is not there speaks against, by `UNPAIRED`.
+    matched : (M, 2) int64
+        Visits that were found in one another: then a pair that is not there speaks against.
     """
 
     sights: NDArray[np.int64]
     log_odds: NDArray[np.float64]
-    is_matched: NDArray[np.bool_]
+    matched: NDArray[np.int64]
 
 
 def links_of(sights: Sights, pairs: Sequence[VisitPair]) -> Links:
     """Put the pairs of all matches together, sizes weighed in."""
-    n_visits = len(sights.starts)
-    is_matched = np.zeros((n_visits, n_visits), bool)
     found, log_odds = [np.empty((0, 2), np.int64)], [np.empty(0)]
     for pair in pairs:
-        is_matched[pair.first, pair.second] = is_matched[pair.second, pair.first] = True
         linked = pair.rows + sights.starts[[pair.first, pair.second]]
         found.append(linked)
         log_odds.append(_by_place(pair.probabilities) + _by_size(sights, pair, linked))
-    return Links(np.concatenate(found), np.concatenate(log_odds), is_matched)
+    matched = np.array([(pair.first, pair.second) for pair in pairs], np.int64).reshape(-1, 2)
+    return Links(np.concatenate(found), np.concatenate(log_odds), matched)
 
 
 def _by_place(probabilities: NDArray[np.float64]) -> NDArray[np.float64]:

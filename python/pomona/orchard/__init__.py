@@ -4,6 +4,7 @@ from pomona.orchard.adding import Added, add_session, add_sessions
 from pomona.orchard.fruit_ids import Change
 from pomona.orchard.integrity import problems
 from pomona.orchard.loading import load_session
+from pomona.orchard.merging import Merged, merge_maps
 from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
 from pomona.orchard.removing import Removed, remove_session
 from pomona.orchard.session import Session
@@ -15,6 +16,7 @@ __all__ = [
     "FORMAT_VERSION",
     "Added",
     "Change",
+    "Merged",
     "Observations",
     "OrchardMap",
     "Removed",
@@ -23,6 +25,7 @@ __all__ = [
     "add_session",
     "add_sessions",
     "load_session",
+    "merge_maps",
     "problems",
     "read_session",
     "remove_session",

@@ -17,29 +17,26 @@ from pomona.errors import PomonaError
 from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, new_visit, read_evidence
 from pomona.orchard.fruit_ids import Change
-from pomona.orchard.recognising import matches_with_visits
+from pomona.orchard.joining import Newcomer, join
+from pomona.orchard.parts import parts_with
+from pomona.orchard.recognising import Recognised, matches_with_visits, recognised, seen_last_by
 from pomona.orchard.session import Session
-from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
-from pomona.orchard.writing import (
-    Placement,
-    insert_crops,
-    insert_matches,
-    insert_observations,
-    insert_session,
-    update_layers,
-)
+from pomona.orchard.settling import Settlement, write_changes
+from pomona.orchard.writing import Placement
 from pomona.settings import Settings
 from pomona.store import schema
 from pomona.store.failures import WrongContentError
 from pomona.store.numbering import last_ids
 from pomona.store.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.store.rows import columns_of
-from pomona.store.stored_fruits import fruits_in_map
 
 if TYPE_CHECKING:
     from pomona.matching import Match
 
-__all__ = ["Added", "add_session", "add_sessions"]
+__all__ = ["Added", "add_session", "add_sessions", "require_new"]
+
+BETWEEN_PARTS_M = 10.0
+"""From one part of a map to the next, where nobody knows how they lie to each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +51,12 @@ class Added:
         Fruits known before, fruits of which the session is the first sight, fruits of the map that hang where the
         session looked and were not seen.
     match : Match, optional
-        How the session was found in the map; None for the first session.
+        How the session was found in the map, or not; None for the first session.
+    is_added : bool
+        Whether the map holds the session now.
     known : FruitCloud, optional
-        The fruits that `match` is with: those of the map that may still hang, before the session came.
+        The fruits that `match` is with: those of the map that may still hang, before the session came; of a large map
+        those where the session lies.
     changes : tuple of Change
         Observations of other sessions that now are of another fruit.
     """
@@ -66,13 +66,9 @@ class Added:
     n_new: int
     n_missed: int
     match: Match | None
+    is_added: bool = False
     known: FruitCloud | None = None
     changes: tuple[Change, ...] = ()
-
-    @property
-    def is_added(self) -> bool:
-        """Whether the map holds the session now."""
-        return self.match is None or self.match.status.value == "Found"
 
 
 def add_session(
@@ -80,14 +76,15 @@ def add_session(
     session: Session,
     *,
     settings: Settings | None = None,
+    new_part: bool = False,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
 ) -> Added:
     """Recognise a session's fruits in the map and add it; the first session starts the map.
 
     All of it happens in one transaction: a crash, a full disk or a kill leaves the map as it was. When the session is
-    not found in the map, nothing is written. A new map appears whole; when two programs start it at once, the second
-    finds its session in the map of the first.
+    not found in the map, nothing is written, unless it shall start a part of its own. A new map appears whole; when two
+    programs start it at once, the second finds its session in the map of the first.
 
     Parameters
     ----------
@@ -97,6 +94,8 @@ def add_session(
         The visit to add.
     settings : Settings, optional
         How to match; the defaults of `pomona.match` otherwise.
+    new_part : bool
+        Whether a session that is not found in the map starts a part of its own, as another row of the orchard does.
     timeout_s : float
         How long to wait for another program that is writing to the map.
     waiting : callable, optional
@@ -120,7 +119,7 @@ def add_session(
             pass
         except NoLinksError:
             return _start_in_place(path, session, settings, timeout_s, waiting)
-    return _add(path, session, settings, timeout_s, waiting)
+    return _add(path, session, settings, timeout_s, waiting, new_part=new_part)
 
 
 def add_sessions(
@@ -128,16 +127,18 @@ def add_sessions(
     sessions: Sequence[Session],
     *,
     settings: Settings | None = None,
+    new_part: bool = False,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
 ) -> list[Added]:
     """Add several sessions, each in a transaction of its own; return what became of each, in their order.
 
-    One that is not found in the map is tried again after the others, which may have seen what lies between.
+    One that is not found in the map is tried again after the others, which may have seen what lies between. When all
+    that are left are not found, the first of them starts a part of its own if it may, and the others are tried again.
 
     Parameters
     ----------
-    path, settings, timeout_s, waiting
+    path, settings, new_part, timeout_s, waiting
         As for `add_session`.
     sessions : sequence of Session
         The visits to add.
@@ -149,15 +150,22 @@ def add_sessions(
     """
     answers: dict[int, Added] = {}
     waiting_for_others = list(range(len(sessions)))
+    starts_part = False
     while waiting_for_others:
-        for number in waiting_for_others:
+        for place, number in enumerate(waiting_for_others):
             answers[number] = add_session(
-                path, sessions[number], settings=settings, timeout_s=timeout_s, waiting=waiting
+                path,
+                sessions[number],
+                settings=settings,
+                new_part=starts_part and place == 0,
+                timeout_s=timeout_s,
+                waiting=waiting,
             )
         refused = [number for number in waiting_for_others if not answers[number].is_added]
-        if len(refused) == len(waiting_for_others):
+        is_stuck = len(refused) == len(waiting_for_others)
+        if is_stuck and not new_part:
             break
-        waiting_for_others = refused
+        starts_part, waiting_for_others = is_stuck, refused
     return [answers[number] for number in range(len(sessions))]
 
 
@@ -166,7 +174,7 @@ def _start_in_place(
 ) -> Added:
     """Start a map where it cannot appear whole: readers are told that it is empty until it is not."""
     try:
-        return _add(path, session, settings, timeout_s, waiting, create=True)
+        return _add(path, session, settings, timeout_s, waiting, new_part=False, create=True)
     except BaseException:
         # SQLite makes the file before the first commit; a map that never was shall leave none.
         if path.exists() and path.stat().st_size == 0:
@@ -181,6 +189,7 @@ def _add(
     timeout_s: float,
     waiting: Waiting | None,
     *,
+    new_part: bool,
     create: bool = False,
 ) -> Added:
     # A file of no bytes is what a killed start leaves where a map cannot appear whole.
@@ -189,19 +198,16 @@ def _add(
         if is_blank:
             return _start(connection, session)
         last_ids(connection)
-        _require_new(connection, session)
+        require_new(connection, session, session.content_sha256)
         settings = settings or Settings.load(None, {})
-        known = _worth_recognising(fruits_in_map(connection, FruitCloud))
-        if not len(known):
-            raise WrongContentError("has sessions and no fruits, expected at least one")
-        found = settings.match(session.cloud, known)
-        if found.status.value != "Found":
-            return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found, known)
-        evidence = read_evidence(connection)
-        ids = np.array(known.ids, np.int64)
-        matches = matches_with_visits(evidence, new_visit(session), found, ids, settings)
-        placement = Placement(settings, found.log_odds, found.noise_m)
-        return replace(_join(connection, session, evidence, matches, placement), match=found, known=known)
+        found = recognised(connection, session.cloud, settings)
+        if found.is_found:
+            added = _add_where_found(connection, session, found, settings)
+        elif new_part:
+            added = _join(connection, session, Evidence((), ()), {}, map_from_session=_beside(connection, session))
+        else:
+            added = Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, None)
+        return replace(added, match=found.match, known=found.known)
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:
@@ -210,77 +216,69 @@ def _start(connection: sqlite3.Connection, session: Session) -> Added:
     return _join(connection, session, Evidence((), ()), {})
 
 
+def _add_where_found(connection: sqlite3.Connection, session: Session, found: Recognised, settings: Settings) -> Added:
+    """Add the session to the parts of the map that have fruits which it saw."""
+    evidence = read_evidence(connection, parts_with(connection, seen_last_by(connection, found)))
+    matches = matches_with_visits(evidence, new_visit(session), found, settings)
+    placement = Placement(settings, found.match.log_odds, found.match.noise_m)
+    return _join(connection, session, evidence, matches, placement)
+
+
+def _beside(connection: sqlite3.Connection, session: Session) -> NDArray[np.float64]:
+    """Return where a part begins of which nobody knows where it lies: beside all others, in the axes of its session."""
+    (most_x,) = connection.execute("SELECT max(maxx) FROM rtree_observations_geom").fetchone()
+    frame = np.eye(4)
+    frame[0, 3] = np.ceil(most_x + BETWEEN_PARTS_M - session.cloud.positions[:, 0].min())
+    return frame
+
+
 def _join(
     connection: sqlite3.Connection,
     session: Session,
     evidence: Evidence,
     matches: Mapping[int, VisitPair],
     placement: Placement | None = None,
+    *,
+    map_from_session: NDArray[np.float64] | None = None,
 ) -> Added:
     """Write the session and all that follows from it with the others."""
     visit = new_visit(session)
-    together = evidence.with_visit(visit, matches)
-    settlement = settlement_of(connection, together)
-    own = together.number_of(0)
-    frame = settlement.conclusion.frames[own]
-    fruit_ids = settlement.fruit_ids[settlement.conclusion.sights.visits == own]
-    # Fruits come after their observations: where they hang, the last observation says.
-    connection.execute("PRAGMA defer_foreign_keys = ON")
-    session_id = insert_session(connection, session, frame, placement)
-    observation_ids = insert_observations(connection, session_id, fruit_ids, session.cloud.transformed(frame))
-    insert_crops(connection, session_id, observation_ids, session.crops)
-    added = replace(
-        visit,
-        session_id=session_id,
-        map_from_session=frame,
-        observation_ids=observation_ids,
-        fruit_ids=fruit_ids,
-    )
-    together = together.with_known(added)
-    for pair in together.pairs:
-        if own in (pair.first, pair.second):
-            one, other = together.visits[pair.first], together.visits[pair.second]
-            ids = (one.session_id, other.session_id), (one.observation_ids, other.observation_ids)
-            insert_matches(connection, pair, *ids)
-    settle(connection, together, settlement)
+    if map_from_session is not None:
+        visit = replace(visit, map_from_session=map_from_session)
+    newcomer = Newcomer(session, placement, visit.seen.key[1])
+    settlement = join(connection, evidence.with_visit(visit, matches), {visit.session_id: newcomer})
     write_changes(connection, "added", session.name, settlement.changes)
-    update_layers(connection)
-    return _told(settlement, own)
+    (session_id,) = connection.execute("SELECT max(id) FROM sessions").fetchone()
+    return _told(settlement, session_id)
 
 
-def _worth_recognising(fruits: FruitCloud) -> FruitCloud:
-    """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
-    judged = zip(fruits.extras["state"], fruits.extras["fruit_probability"], strict=True)
-    may_hang = np.array([state != "gone" and (state != "missed" or float(p or 1) > 0.5) for state, p in judged], bool)
-    return fruits.select(may_hang) if may_hang.any() else fruits
-
-
-def _told(settlement: Settlement, own: int) -> Added:
+def _told(settlement: Settlement, session_id: int) -> Added:
     """Say what became of a session that is there now."""
-    conclusion = settlement.conclusion
-    looks = conclusion.looks
+    part, own = settlement.part_with(session_id)
+    looks = part.conclusion.looks
     is_elsewhere = looks.seen.sum(axis=1) > looks.seen[:, own]
     n_matched = int((looks.seen[:, own] & is_elsewhere).sum())
     n_seen = int(looks.seen[:, own].sum())
     return Added(
-        fruit_ids=settlement.fruit_ids[conclusion.sights.visits == own],
+        fruit_ids=part.fruit_ids_of(own),
         n_matched=n_matched,
         n_new=n_seen - n_matched,
         n_missed=int((looks.in_view[:, own] & ~looks.seen[:, own]).sum()),
         match=None,
+        is_added=True,
         changes=tuple(settlement.changes),
     )
 
 
-def _require_new(connection: sqlite3.Connection, session: Session) -> None:
-    """Refuse a session that is in the map: by its name, by what it saw or by what it was made from."""
+def require_new(connection: sqlite3.Connection, session: Session, content: str) -> None:
+    """Refuse a session that is in the map: by its name, by the hash of what it saw or by what it was made from."""
     columns = columns_of(connection, "sessions", ("name", "content_sha256", "input_hashes"))
     if not columns[0]:
         raise WrongContentError("has no session, expected at least one")
     for name, content_sha256, input_hashes in zip(*columns, strict=True):
         if name == session.name:
             raise WrongContentError(f"session {name} is in the map already")
-        if content_sha256 == session.content_sha256:
+        if content_sha256 == content:
             raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same fruits")
         if session.input_hashes and input_hashes == session.input_hashes_json:
             raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same input files")

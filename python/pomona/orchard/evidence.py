@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
+from pomona.orchard.parts import components
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import cameras_in_map
 from pomona.store.cells import finite_json
 from pomona.store.failures import WrongContentError
-from pomona.store.rows import columns_of
-from pomona.store.stored_fruits import OF_SESSION, observed_cloud
+from pomona.store.rows import columns_of, one_of
+from pomona.store.stored_fruits import OF_SESSION, seen_cloud
 
 __all__ = ["Evidence", "KnownVisit", "new_visit", "read_evidence"]
 
@@ -32,7 +33,7 @@ class KnownVisit:
     Attributes
     ----------
     session_id : int
-        0 for one that is not in the map yet.
+        0 or less for one that is not in the map yet.
     date : str
     cloud : FruitCloud
         In the session's own frame.
@@ -54,7 +55,7 @@ class KnownVisit:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """All visits, in the order of date and content, and their matches."""
+    """Visits of one or more parts of the map, in the order of date and content, and their matches."""
 
     visits: Sequence[KnownVisit]
     pairs: Sequence[VisitPair]
@@ -72,19 +73,25 @@ class Evidence:
             pairs.append(replace(match, first=first, second=second))
         return Evidence(visits, pairs)
 
-    def with_known(self, known: KnownVisit) -> Evidence:
-        """Return it with the visit that was new as the map holds it now."""
-        return replace(self, visits=[visit if visit.session_id else known for visit in self.visits])
-
     def without_session(self, session_id: int) -> Evidence:
         """Return it with one visit less."""
         gone = self.number_of(session_id)
+        return self._of([number for number in range(len(self.visits)) if number != gone])
+
+    def parts(self) -> list[Evidence]:
+        """Return the visits that hang together by their matches, each part for itself."""
+        numbers = range(len(self.visits))
+        return [self._of(part) for part in components(numbers, ((pair.first, pair.second) for pair in self.pairs))]
+
+    def _of(self, numbers: Sequence[int]) -> Evidence:
+        """Return what these visits say, and their matches with one another."""
+        now = {number: at for at, number in enumerate(numbers)}
         pairs = [
-            replace(pair, first=pair.first - (pair.first > gone), second=pair.second - (pair.second > gone))
+            replace(pair, first=now[pair.first], second=now[pair.second])
             for pair in self.pairs
-            if gone not in (pair.first, pair.second)
+            if pair.first in now and pair.second in now
         ]
-        return Evidence([visit for number, visit in enumerate(self.visits) if number != gone], pairs)
+        return Evidence([self.visits[number] for number in numbers], pairs)
 
     def number_of(self, session_id: int) -> int:
         """Return the number of a visit."""
@@ -101,17 +108,18 @@ class Evidence:
         return np.concatenate([visit.observation_ids for visit in self.visits])
 
     def conclusion(self) -> Conclusion:
-        """Say what follows; the sessions that came first stay where they are."""
+        """Say what follows for visits that hang together; the sessions that came first stay where they are."""
         known = np.array([visit.map_from_session for visit in self.visits])
-        newest_last = [visit.session_id or np.inf for visit in self.visits]
-        keepers = np.argsort(newest_last, kind="stable").tolist()
+        newest_last = [(visit.session_id < 1, abs(visit.session_id)) for visit in self.visits]
+        keepers = sorted(range(len(self.visits)), key=newest_last.__getitem__)
         return conclude([visit.seen for visit in self.visits], self.pairs, known, keepers)
 
 
-def read_evidence(connection: sqlite3.Connection) -> Evidence:
-    """Read all sessions of a map and their matches."""
+def read_evidence(connection: sqlite3.Connection, session_ids: Sequence[int]) -> Evidence:
+    """Read these sessions of a map and how they match one another."""
     names = ("id", "date", "content_sha256", "map_from_session")
-    rows = sorted(zip(*columns_of(connection, "sessions", names), strict=True), key=lambda row: (row[1], row[2]))
+    wanted = one_of("sessions.id", session_ids)
+    rows = sorted(zip(*columns_of(connection, "sessions", names, wanted), strict=True), key=lambda row: row[1:3])
     visits = [
         _known_visit(connection, session_id, (date, content), np.array(finite_json(transform), np.float64))
         for session_id, date, content, transform in rows
@@ -124,9 +132,8 @@ def _known_visit(
 ) -> KnownVisit:
     which = OF_SESSION.format(session_id)
     ids, fruit_ids = columns_of(connection, "observations", ("id", "fruit_id"), which)
-    in_map = observed_cloud(connection, session_id, FruitCloud)
     session_from_map = np.linalg.inv(map_from_session)
-    cloud = in_map.transformed(session_from_map)
+    cloud = seen_cloud(connection, session_id, FruitCloud).transformed(session_from_map)
     cameras = cameras_in_map(connection, session_id)
     return KnownVisit(
         session_id=session_id,
@@ -163,30 +170,31 @@ def _rigid(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 def _pairs(connection: sqlite3.Connection, visits: Sequence[KnownVisit]) -> list[VisitPair]:
     numbers = {visit.session_id: number for number, visit in enumerate(visits)}
     names = ("id", "first_session_id", "second_session_id", "first_from_second", "log_odds", "pairs")
+    wanted = one_of("first_session_id", numbers)
     found = []
     for match_id, first, second, transform, log_odds, pairs in zip(
-        *columns_of(connection, "matches", names), strict=True
+        *columns_of(connection, "matches", names, wanted), strict=True
     ):
-        if first not in numbers or second not in numbers:
-            raise WrongContentError(f"matches {match_id}: points to a row of sessions that is not there")
+        if second not in numbers:
+            continue
         asked = (numbers[first], numbers[second])
+        cells = np.array(finite_json(pairs), np.float64).reshape(-1, 3)
         found.append(
             VisitPair(
                 *asked,
                 first_from_second=np.array(finite_json(transform), np.float64),
                 log_odds=log_odds,
-                rows=_rows(match_id, visits, asked, finite_json(pairs)),
-                probabilities=np.array([pair[2] for pair in finite_json(pairs)], np.float64),
+                rows=_rows(match_id, visits, asked, cells[:, :2].astype(np.int64)),
+                probabilities=cells[:, 2].copy(),
             )
         )
     return found
 
 
 def _rows(
-    match_id: int, visits: Sequence[KnownVisit], numbers: tuple[int, int], pairs: list[tuple[int, int, float]]
+    match_id: int, visits: Sequence[KnownVisit], numbers: tuple[int, int], ids: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Return the rows of the two visits, (M, 2), that the observations of a match are."""
-    ids = np.array([pair[:2] for pair in pairs], np.int64).reshape(-1, 2)
     rows = np.zeros(ids.shape, np.int64)
     for side, number in enumerate(numbers):
         own = visits[number].observation_ids

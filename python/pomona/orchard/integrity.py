@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from pomona.amounts import amount
 from pomona.orchard.evidence import read_evidence
+from pomona.orchard.parts import parts_of_map
 from pomona.orchard.settling import FruitRow, fruit_rows, settlement_of
 from pomona.store.cells import COLUMNS
 from pomona.store.failures import WrongContentError
 from pomona.store.numbering import misnumbered
 from pomona.store.opening import snapshot
-from pomona.store.rows import columns_of, misfits
+from pomona.store.rows import columns_of, misfits, one_of
 
 __all__ = ["problems"]
 
@@ -76,22 +77,27 @@ def _unsettled(connection: sqlite3.Connection) -> Iterator[str]:
     (judged,) = columns_of(connection, "fruits", ("state_probability",))
     if None in judged:
         return
-    evidence = read_evidence(connection)
-    settlement = settlement_of(connection, evidence)
+    for session_ids in parts_of_map(connection):
+        yield from _unsettled_part(connection, session_ids)
+
+
+def _unsettled_part(connection: sqlite3.Connection, session_ids: Sequence[int]) -> Iterator[str]:
+    settlement = settlement_of(connection, read_evidence(connection, session_ids))
     for change in settlement.changes:
         yield (
             f"fruit {change.from_fruit_id} has {amount(change.n_observations, 'observation')} that from what the "
             f"sessions saw belong to fruit {change.to_fruit_id}"
         )
     if not settlement.changes:
-        yield from _misjudged(connection, fruit_rows(connection, evidence, settlement))
+        for part in settlement.parts:
+            yield from _misjudged(connection, fruit_rows(connection, part))
 
 
 def _misjudged(connection: sqlite3.Connection, rows: dict[int, FruitRow]) -> Iterator[str]:
-    names = ("state", "n_missed", "last_session_id")
-    told = columns_of(connection, "fruits", ("id", *names))
+    names = ("state", "n_missed", "last_session_id", "n_sessions")
+    told = columns_of(connection, "fruits", ("id", *names), one_of("fruits.id", rows))
     for fruit_id, *found in zip(*told, strict=True):
-        _, state, _, last_session_id, _, n_missed, *_ = rows[fruit_id]
-        for name, one, other in zip(names, found, (state, n_missed, last_session_id), strict=True):
+        _, state, _, last_session_id, n_sessions, n_missed, *_ = rows[fruit_id]
+        for name, one, other in zip(names, found, (state, n_missed, last_session_id, n_sessions), strict=True):
             if one != other:
                 yield f"fruit {fruit_id} has the {name} {one}, from what the sessions saw follows {other}"

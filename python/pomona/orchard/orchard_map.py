@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import sqlite3
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +18,15 @@ from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.orchard.fruit_ids import Change
 from pomona.store.cells import finite_json
+from pomona.store.failures import told
 from pomona.store.opening import snapshot
-from pomona.store.rows import columns_of
+from pomona.store.rows import columns_of, one_of
 from pomona.store.stored_fruits import fruits_in_map
 
 __all__ = ["Observations", "OrchardMap", "Visit"]
+
+COUNTS = "SELECT session_id, count(*), count(match_probability) FROM observations GROUP BY session_id"
+"""What each session saw, and of how much a visit before had seen it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +138,8 @@ class Observations:
 class OrchardMap:
     """A map or session file for reading; every call sees the file as it is at that moment.
 
+    In a `with` block all calls see the moment at which it began, and cost only what they ask.
+
     Parameters
     ----------
     path : str or Path
@@ -145,8 +153,27 @@ class OrchardMap:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._held: sqlite3.Connection | None = None
+        self._holding = ExitStack()
         with snapshot(self.path) as (_, kind):
             self.kind = kind
+
+    def __enter__(self) -> Self:
+        self._held, _ = self._holding.enter_context(snapshot(self.path))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._held = None
+        self._holding.close()
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        if self._held is not None:
+            with told(self.path):
+                yield self._held
+        else:
+            with snapshot(self.path) as (connection, _):
+                yield connection
 
     def __repr__(self) -> str:
         return f"OrchardMap({str(self.path)!r}, {self.kind})"
@@ -158,7 +185,7 @@ class OrchardMap:
 
     def fruits(self) -> FruitCloud:
         """Return every fruit where it was last seen, with its identity as id."""
-        with snapshot(self.path) as (connection, _):
+        with self._reading() as connection:
             return fruits_in_map(connection, FruitCloud)
 
     @property
@@ -169,32 +196,36 @@ class OrchardMap:
     def visits(self) -> tuple[Visit, ...]:
         """Return the sessions in order of date."""
         names = ("id", "name", "date", "recording", "map_from_session", "method", "log_odds", "noise_m")
-        with snapshot(self.path) as (connection, _):
+        with self._reading() as connection:
             rows = zip(*columns_of(connection, "sessions", names, "ORDER BY date, id"), strict=True)
-            seen_by, probabilities = columns_of(connection, "observations", ("session_id", "match_probability"))
-        n_fruits = Counter(seen_by)
-        n_matched = Counter(
-            by for by, probability in zip(seen_by, probabilities, strict=True) if probability is not None
-        )
+            counts = {session_id: counted for session_id, *counted in connection.execute(COUNTS)}
         return tuple(
-            Visit(name, date, recording, np.array(finite_json(transform)), n_fruits[i], n_matched[i], *about_match)
+            Visit(name, date, recording, np.array(finite_json(transform)), *counts.get(i, (0, 0)), *about_match)
             for i, name, date, recording, transform, *about_match in rows
         )
 
     def changes(self) -> list[tuple[str, str, Change]]:
         """Return what later evidence changed, in order: cause (added, removed), session, and the change."""
         names = ("cause", "session", "event", "from_fruit_id", "to_fruit_id", "n_observations")
-        with snapshot(self.path) as (connection, _):
+        with self._reading() as connection:
             rows = zip(*columns_of(connection, "changes", names), strict=True)
             return [(cause, session, Change(*change)) for cause, session, *change in rows]
 
     def observations(self) -> Observations:
         """Return what was seen of each fruit, in order of fruit and date."""
+        return self._observations("")
+
+    def series(self, fruit_id: int) -> Observations:
+        """Return what was seen of one fruit, in order of date; nothing of a fruit that is not there."""
+        return self._observations(f"WHERE fruit_id = {int(fruit_id):d} ")
+
+    def _observations(self, of_fruits: str) -> Observations:
         names = ("fruit_id", "session_id", "label", "geom", "diameter_m", "match_probability")
-        in_order = "JOIN sessions s ON s.id = session_id ORDER BY fruit_id, s.date, s.id"
-        with snapshot(self.path) as (connection, _):
-            ids, names_of, dates_of = columns_of(connection, "sessions", ("id", "name", "date"))
+        in_order = f"JOIN sessions s ON s.id = session_id {of_fruits}ORDER BY fruit_id, s.date, s.id"
+        with self._reading() as connection:
             fruit_ids, seen_by, labels, geoms, *numbers = columns_of(connection, "observations", names, in_order)
+            those = one_of("sessions.id", set(seen_by))
+            ids, names_of, dates_of = columns_of(connection, "sessions", ("id", "name", "date"), those)
         sessions, dates = dict(zip(ids, names_of, strict=True)), dict(zip(ids, dates_of, strict=True))
         diameters_m, probabilities = (np.array(column, dtype=np.float64) for column in numbers)
         return Observations(

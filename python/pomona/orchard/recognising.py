@@ -1,29 +1,128 @@
-"""A session against every visit of the map that may have seen the same fruits."""
+"""A session against the map: where it lies there, and how it matches every visit that may have seen the same fruits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+import sqlite3
+from collections import defaultdict
+from collections.abc import Container, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona import _core, geopackage
+from pomona.cloud import FruitCloud
 from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.settings import Settings
+from pomona.store.failures import WrongContentError
+from pomona.store.rows import columns_of, one_of
+from pomona.store.stored_fruits import fruits_in_map
+from pomona.threads import capped_threads, cores
 
 if TYPE_CHECKING:
     from pomona.matching import Match
 
-__all__ = ["matches_with_visits"]
+__all__ = [
+    "Recognised",
+    "last_sights",
+    "matches_between",
+    "matches_through_fruits",
+    "matches_with_visits",
+    "recognised",
+    "seen_last_by",
+    "worth_recognising",
+]
 
 MARGIN_M = 0.5
 """Between visits that still are compared: trees sag and trajectories drift by less."""
 
+LARGE = 10_000
+"""Fruits of a map of which the surroundings of a session are chosen first; fewer are made ready in half a second."""
+
+NEARBY_M = 1.5
+"""From the fruits of a session, as it seems to lie: what it may have seen. Of the farthest, a guess is off by less."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recognised:
+    """How a session was found in the map, or not.
+
+    Attributes
+    ----------
+    match : Match
+    known : FruitCloud
+        The fruits that `match` is with.
+    """
+
+    match: Match
+    known: FruitCloud
+
+    @property
+    def is_found(self) -> bool:
+        """Whether the session lies in the map."""
+        return self.match.status.value == "Found"
+
+    @property
+    def fruit_ids(self) -> NDArray[np.int64]:
+        """Of the fruits that `match` is with."""
+        return np.array(self.known.ids, np.int64)
+
+
+def recognised(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings) -> Recognised:
+    """Look for a session in the map.
+
+    In a large one among the fruits where it seems to lie; among all of them where it is not found there.
+    """
+    nearby = _nearby(connection, cloud, settings)
+    if nearby:
+        known = worth_recognising(fruits_in_map(connection, FruitCloud, nearby))
+        found = Recognised(settings.match(cloud, known), known)
+        if found.is_found:
+            return found
+    known = worth_recognising(fruits_in_map(connection, FruitCloud))
+    if not len(known):
+        raise WrongContentError("has sessions and no fruits, expected at least one")
+    return Recognised(settings.match(cloud, known), known)
+
+
+def worth_recognising(fruits: FruitCloud) -> FruitCloud:
+    """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
+    judged = zip(fruits.extras["state"], fruits.extras["fruit_probability"], strict=True)
+    may_hang = np.array([state != "gone" and (state != "missed" or float(p or 1) > 0.5) for state, p in judged], bool)
+    return fruits.select(may_hang) if may_hang.any() else fruits
+
+
+def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings) -> list[int]:
+    """Return the fruits of a large map among which a session seems to lie; none where nothing tells."""
+    from scipy.spatial import cKDTree
+
+    (n_fruits,) = connection.execute("SELECT count(*) FROM fruits").fetchone()
+    if n_fruits < LARGE or settings.call["scale"] != "metric":
+        return []
+    ids, geoms = columns_of(connection, "fruits", ("id", "geom"))
+    places = geopackage.points_of(geoms)
+    guess = _core.whereabouts(places, np.ascontiguousarray(cloud.positions))
+    if guess is None:
+        return []
+    in_map = cloud.transformed(np.array(guess[0])).positions
+    low, high = in_map.min(axis=0) - NEARBY_M, in_map.max(axis=0) + NEARBY_M
+    around = np.flatnonzero(((places >= low) & (places <= high)).all(axis=1))
+    distances_m, _ = cKDTree(in_map).query(places[around], distance_upper_bound=NEARBY_M)
+    return [ids[row] for row in around[np.isfinite(distances_m)].tolist()]
+
+
+def seen_last_by(connection: sqlite3.Connection, found: Recognised) -> set[int]:
+    """Return the sessions that saw the fruits last in which something was found."""
+    seen_again = found.fruit_ids[found.match.pairs[:, 1]].tolist()
+    (session_ids,) = columns_of(connection, "fruits", ("last_session_id",), one_of("fruits.id", seen_again))
+    return set(session_ids)
+
 
 def matches_with_visits(
-    evidence: Evidence, visit: KnownVisit, found: Match, fruit_ids: NDArray[np.int64], settings: Settings
+    evidence: Evidence, visit: KnownVisit, found: Recognised, settings: Settings
 ) -> dict[int, VisitPair]:
     """Return how a visit matches each other one in which it was found, by the number of that one.
 
@@ -34,28 +133,49 @@ def matches_with_visits(
     Parameters
     ----------
     evidence, visit
-        The map, and the new visit.
-    found, fruit_ids
-        Where the visit was found in the map, and the fruits of the map, in its order.
+        The parts of the map where the visit was found, and the new visit.
+    found
+        How it was found there.
     settings
         Of the match.
     """
-    assert found.map_from_query is not None
-    asked = Settings({**settings.call, "up": None, "per_frame": False}, settings.overrides)
-    in_map = visit.cloud.transformed(found.map_from_query).positions
-    matches = {}
-    for number, other in enumerate(evidence.visits):
-        if _are_apart(in_map, other):
-            continue
-        is_later = visit.seen.key > other.seen.key
-        query, map_ = (visit.cloud, other.cloud) if is_later else (other.cloud, visit.cloud)
-        match = asked.match(query, map_)
-        if match.status.value == "Found":
-            assert match.map_from_query is not None
-            matches[number] = VisitPair(
-                0, 0, match.map_from_query, match.log_odds, match.pairs[:, ::-1], match.probabilities
-            )
-    return matches or dict(_as_in_map(evidence, visit, found, fruit_ids))
+    assert found.match.map_from_query is not None
+    matches = matches_between(evidence, visit, found.match.map_from_query, settings)
+    rows = [(0, row) for row in range(len(visit.cloud))]
+    return matches or matches_through_fruits(evidence, found, [visit], rows).get(0, {})
+
+
+def matches_between(
+    evidence: Evidence,
+    visit: KnownVisit,
+    map_from_visit: NDArray[np.float64],
+    settings: Settings,
+    but: Container[int] = (),
+) -> dict[int, VisitPair]:
+    """Return how a visit that seems to lie there in the map matches each other one that is not apart from it.
+
+    Sessions in `but` are not asked.
+    """
+    in_map = visit.cloud.transformed(map_from_visit).positions
+    numbers = [
+        number
+        for number, other in enumerate(evidence.visits)
+        if other.session_id not in but and not _are_apart(in_map, other)
+    ]
+    asked = Settings({**settings.call, "up": None, "per_frame": False, "threads": 1}, settings.overrides)
+    with ThreadPoolExecutor(capped_threads(settings.call["threads"]) or cores()) as pool:
+        found = pool.map(lambda number: _match_of_two(visit, evidence.visits[number], asked), numbers)
+        return {number: pair for number, pair in zip(numbers, found, strict=True) if pair is not None}
+
+
+def _match_of_two(visit: KnownVisit, other: KnownVisit, settings: Settings) -> VisitPair | None:
+    is_later = visit.seen.key > other.seen.key
+    query, map_ = (visit.cloud, other.cloud) if is_later else (other.cloud, visit.cloud)
+    match = settings.match(query, map_)
+    if match.status.value != "Found":
+        return None
+    assert match.map_from_query is not None
+    return VisitPair(0, 0, match.map_from_query, match.log_odds, match.pairs[:, ::-1], match.probabilities)
 
 
 def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
@@ -67,26 +187,45 @@ def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
     return bool((in_map.min(axis=0) > high).any() or (in_map.max(axis=0) < low).any())
 
 
-def _as_in_map(
-    evidence: Evidence, visit: KnownVisit, found: Match, fruit_ids: NDArray[np.int64]
-) -> Iterator[tuple[int, VisitPair]]:
-    """Give the pairs with the fruits of the map, by the visit that saw each of those last."""
-    assert found.map_from_query is not None
-    last = _last_sights(evidence)
-    matched = [last[fruit_id] for fruit_id in fruit_ids[found.pairs[:, 1]].tolist()]
-    for number in sorted({number for number, _ in matched}):
-        mine = [row for row, (by, _) in enumerate(matched) if by == number]
-        rows = np.array([(matched[row][1], found.pairs[row, 0]) for row in mine], np.int64)
-        other_from_visit = np.linalg.inv(evidence.visits[number].map_from_session) @ found.map_from_query
-        pair = VisitPair(0, 0, other_from_visit, found.log_odds, rows, found.probabilities[mine])
-        if visit.seen.key < evidence.visits[number].seen.key:
-            pair = replace(
-                pair, first_from_second=np.asarray(np.linalg.inv(other_from_visit), np.float64), rows=rows[:, ::-1]
-            )
-        yield number, pair
+def matches_through_fruits(
+    evidence: Evidence, found: Recognised, visits: Sequence[KnownVisit], sights: Sequence[tuple[int, int]]
+) -> dict[int, dict[int, VisitPair]]:
+    """Return how visits match those of the map that saw the same fruits last, by the numbers of both.
+
+    Parameters
+    ----------
+    evidence, found
+        Visits of the map, and how the query was found in it.
+    visits
+        Of the query, where they lie in its frame.
+    sights
+        Visit and its row for each row of the query.
+    """
+    match, last = found.match, last_sights(evidence)
+    assert match.map_from_query is not None
+    of_pairs = zip(match.pairs[:, 0].tolist(), found.fruit_ids[match.pairs[:, 1]].tolist(), strict=True)
+    between: dict[tuple[int, int], list[tuple[int, int, int]]] = defaultdict(list)
+    for place, (asked, fruit_id) in enumerate(of_pairs):
+        (mine, row), (other, other_row) = sights[asked], last[fruit_id]
+        between[mine, other].append((other_row, row, place))
+    matches: dict[int, dict[int, VisitPair]] = defaultdict(dict)
+    for (mine, other), rows in sorted(between.items()):
+        map_from_other = evidence.visits[other].map_from_session
+        other_from_mine = np.linalg.inv(map_from_other) @ match.map_from_query @ visits[mine].map_from_session
+        table = np.array(rows, np.int64)
+        pair = VisitPair(0, 0, other_from_mine, match.log_odds, table[:, :2], match.probabilities[table[:, 2]])
+        is_later = visits[mine].seen.key > evidence.visits[other].seen.key
+        matches[mine][other] = pair if is_later else _turned(pair)
+    return matches
 
 
-def _last_sights(evidence: Evidence) -> Mapping[int, tuple[int, int]]:
+def _turned(pair: VisitPair) -> VisitPair:
+    """Return a pair with its first visit second."""
+    first_from_second = np.asarray(np.linalg.inv(pair.first_from_second), np.float64)
+    return replace(pair, first_from_second=first_from_second, rows=pair.rows[:, ::-1])
+
+
+def last_sights(evidence: Evidence) -> Mapping[int, tuple[int, int]]:
     """Return the last visit that saw each fruit, and its row there."""
     return {
         fruit_id: (number, row)

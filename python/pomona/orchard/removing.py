@@ -6,13 +6,14 @@ import sqlite3
 from dataclasses import dataclass
 from pathlib import Path
 
-from pomona.orchard.evidence import read_evidence
+from pomona.orchard.evidence import Evidence, read_evidence
 from pomona.orchard.fruit_ids import Change
+from pomona.orchard.parts import parts_with
 from pomona.orchard.settling import FruitRow, fruit_rows, settle, settlement_of, write_changes
 from pomona.orchard.writing import update_layers
 from pomona.store.failures import WrongContentError
 from pomona.store.opening import TIMEOUT_S, Waiting, writing
-from pomona.store.rows import columns_of
+from pomona.store.rows import columns_of, one_of
 
 __all__ = ["Removed", "remove_session"]
 
@@ -93,18 +94,17 @@ def remove_session(
 
 
 def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: bool) -> Removed:
-    evidence = read_evidence(connection)
+    evidence = read_evidence(connection, parts_with(connection, [session_id]))
     going = evidence.visits[evidence.number_of(session_id)]
     rest = evidence.without_session(session_id)
-    settlement = settlement_of(connection, rest)
-    before = _fruits(connection)
+    (n_sessions,) = connection.execute("SELECT count(*) FROM sessions").fetchone()
+    before = _fruits(connection, set(evidence.fruit_ids.tolist()))
     if not dry:
         for part in PARTS:
             connection.execute(part, {"session": session_id})
-    after = fruit_rows(connection, rest, settlement)
+    after, changes = _left(connection, rest, name, dry=dry)
     if not dry:
-        settle(connection, rest, settlement)
-        write_changes(connection, "removed", name, settlement.changes)
+        connection.executemany("DELETE FROM fruits WHERE id = ?", ((one,) for one in before.keys() - after.keys()))
         connection.execute("DELETE FROM sessions WHERE id = ?", (session_id,))
         update_layers(connection)
     n_changed = sum(_place_and_state(row) != before[fruit_id] for fruit_id, row in after.items() if fruit_id in before)
@@ -112,14 +112,30 @@ def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: 
         n_observations=len(going.cloud),
         n_gone=len(before.keys() - after.keys()),
         n_changed=n_changed,
-        n_left=len(rest.visits),
-        changes=tuple(settlement.changes),
+        n_left=n_sessions - 1,
+        changes=tuple(changes),
     )
 
 
-def _fruits(connection: sqlite3.Connection) -> dict[int, tuple[bytes, str]]:
-    """Return place and state of each fruit."""
-    ids, geoms, states = columns_of(connection, "fruits", ("id", "geom", "state"))
+def _left(
+    connection: sqlite3.Connection, rest: Evidence, name: str, *, dry: bool
+) -> tuple[dict[int, FruitRow], list[Change]]:
+    """Settle what is left of the part, which may have come apart; nothing where the session was all of it."""
+    if not rest.visits:
+        return {}, []
+    settlement = settlement_of(connection, rest)
+    after = {fruit_id: row for part in settlement.parts for fruit_id, row in fruit_rows(connection, part).items()}
+    if not dry:
+        settle(connection, settlement)
+        write_changes(connection, "removed", name, settlement.changes)
+    return after, settlement.changes
+
+
+def _fruits(connection: sqlite3.Connection, fruit_ids: set[int]) -> dict[int, tuple[bytes, str]]:
+    """Return place and state of each of these fruits."""
+    ids, geoms, states = columns_of(
+        connection, "fruits", ("id", "geom", "state"), one_of("fruits.id", sorted(fruit_ids))
+    )
     return dict(zip(ids, zip(geoms, states, strict=True), strict=True))
 
 

@@ -1,11 +1,11 @@
-"""What follows from all sessions, written into the map: only what is another than before."""
+"""What follows for the parts of the map that changed, written into it: only what is another than before."""
 
 from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,9 @@ from pomona.orchard.fruit_ids import Change, changes_between, ids_of_clusters
 from pomona.orchard.moving import move_session
 from pomona.orchard.writing import nullable
 from pomona.store.numbering import last_ids
-from pomona.store.rows import columns_of
+from pomona.store.rows import columns_of, one_of
 
-__all__ = ["FruitRow", "Settlement", "fruit_rows", "settle", "settlement_of", "write_changes"]
+__all__ = ["FruitRow", "SettledPart", "Settlement", "fruit_rows", "settle", "settlement_of", "write_changes"]
 
 FruitRow = tuple[bytes, str, str, int, int, int, float | None, float, float]
 """Of a fruit: geom, state, last_seen, last_session_id, n_sessions, n_missed, diameter_m, state_probability,
@@ -29,57 +29,95 @@ UNMOVED_M = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Settlement:
-    """Identities as they shall be.
+class SettledPart:
+    """Identities of one part of the map as they shall be.
 
     Attributes
     ----------
+    evidence : Evidence
     conclusion : Conclusion
     ids : (K,) int64
         Of the conclusion's fruits.
-    fruit_ids : (S,) int64
-        Of its sights.
-    last_id : int
-        The last id that had been given out before.
+    """
+
+    evidence: Evidence
+    conclusion: Conclusion
+    ids: NDArray[np.int64]
+
+    @property
+    def fruit_ids(self) -> NDArray[np.int64]:
+        """Of the part's sights, (S,)."""
+        return self.ids[self.conclusion.labels]
+
+    def fruit_ids_of(self, visit: int) -> NDArray[np.int64]:
+        """Return those of the sights of a visit, by its number."""
+        return np.asarray(self.fruit_ids[self.conclusion.sights.visits == visit])
+
+
+@dataclass(frozen=True, eq=False)
+class Settlement:
+    """Identities of the parts that something came to or went from.
+
+    Attributes
+    ----------
+    parts : list of SettledPart
+    before : set of int
+        Ids that their sights had.
     changes : list of Change
     """
 
-    conclusion: Conclusion
-    ids: NDArray[np.int64]
-    fruit_ids: NDArray[np.int64]
-    last_id: int
+    parts: list[SettledPart]
+    before: set[int]
     changes: list[Change]
+
+    def part_with(self, session_id: int) -> tuple[SettledPart, int]:
+        """Return the part of a session, and its number there."""
+        part = next(one for one in self.parts if any(v.session_id == session_id for v in one.evidence.visits))
+        return part, part.evidence.number_of(session_id)
 
 
 def settlement_of(connection: sqlite3.Connection, evidence: Evidence) -> Settlement:
-    """Say which fruit has which id."""
-    conclusion = evidence.conclusion()
+    """Say which fruit has which id; an id is one's over all parts, which may have been one before."""
+    parts = evidence.parts()
+    conclusions = [part.conclusion() for part in parts]
     last_id = last_ids(connection).get("fruits", 0)
-    ids = ids_of_clusters(conclusion.labels, evidence.fruit_ids, last_id)
-    fruit_ids = ids[conclusion.labels]
-    changes = changes_between(evidence.fruit_ids, fruit_ids, last_id)
-    return Settlement(conclusion, ids, fruit_ids, last_id, changes)
+    ends = np.cumsum([0, *(len(conclusion.states) for conclusion in conclusions)])
+    labels = np.concatenate([one.labels + start for one, start in zip(conclusions, ends[:-1], strict=True)])
+    before = np.concatenate([part.fruit_ids for part in parts])
+    ids = ids_of_clusters(labels, before, last_id)
+    of_parts = zip(parts, conclusions, np.split(ids, ends[1:-1]), strict=True)
+    return Settlement(
+        [SettledPart(*part) for part in of_parts],
+        set(before.tolist()) - {0},
+        changes_between(before, ids[labels], last_id),
+    )
 
 
-def settle(connection: sqlite3.Connection, evidence: Evidence, settlement: Settlement) -> None:
-    """Bring sessions, fruits and observations up to date; all of them are in the map already.
+def settle(connection: sqlite3.Connection, settlement: Settlement) -> None:
+    """Bring sessions, fruits and observations of the parts up to date; all of them are in the map already.
 
     Sessions move first, then come new fruits, then observations change theirs, then fruits without any go.
     """
-    frames = settlement.conclusion.frames
-    for visit, frame in zip(evidence.visits, frames, strict=True):
+    for part in settlement.parts:
+        _move_sessions(connection, part)
+    rows = {fruit_id: row for part in settlement.parts for fruit_id, row in fruit_rows(connection, part).items()}
+    _write_fruits(connection, rows, settlement.before)
+    for part in settlement.parts:
+        _write_observations(connection, part)
+    gone = sorted(settlement.before - rows.keys())
+    connection.executemany("DELETE FROM fruits WHERE id = ?", ((fruit_id,) for fruit_id in gone))
+
+
+def _move_sessions(connection: sqlite3.Connection, part: SettledPart) -> None:
+    for visit, frame in zip(part.evidence.visits, part.conclusion.frames, strict=True):
         if np.abs(frame - visit.map_from_session).max() > UNMOVED_M:
             move_session(connection, visit.session_id, frame, visit.cloud.transformed(frame), visit.observation_ids)
-    rows = fruit_rows(connection, evidence, settlement)
-    _write_fruits(connection, rows)
-    _write_observations(connection, evidence, settlement)
-    connection.execute("DELETE FROM fruits WHERE id NOT IN (SELECT fruit_id FROM observations)")
 
 
-def fruit_rows(connection: sqlite3.Connection, evidence: Evidence, settlement: Settlement) -> dict[int, FruitRow]:
-    """Return the table of fruits by id, each where its last sight is."""
-    conclusion = settlement.conclusion
-    geoms = dict(zip(*columns_of(connection, "observations", ("id", "geom")), strict=True))
+def fruit_rows(connection: sqlite3.Connection, part: SettledPart) -> dict[int, FruitRow]:
+    """Return the rows of the part's fruits by id, each where its last sight is."""
+    evidence, conclusion = part.evidence, part.conclusion
+    geoms = dict(zip(*_of_sessions(connection, evidence, ("id", "geom")), strict=True))
     order = np.arange(len(evidence.visits))
     looks = conclusion.looks
     first = looks.seen.argmax(axis=1)[:, None]
@@ -87,10 +125,10 @@ def fruit_rows(connection: sqlite3.Connection, evidence: Evidence, settlement: S
     n_sessions = looks.seen.sum(axis=1).tolist()
     last_sight, diameters_m = _last_of_each(evidence, conclusion)
     rows: dict[int, FruitRow] = {}
-    for fruit in np.argsort(settlement.ids).tolist():
+    for fruit in np.argsort(part.ids).tolist():
         sight = last_sight[fruit]
         visit = evidence.visits[int(conclusion.sights.visits[sight])]
-        rows[int(settlement.ids[fruit])] = (
+        rows[int(part.ids[fruit])] = (
             geoms[int(evidence.observation_ids[sight])],
             conclusion.states[fruit],
             visit.date,
@@ -102,6 +140,12 @@ def fruit_rows(connection: sqlite3.Connection, evidence: Evidence, settlement: S
             float(1.0 - conclusion.lives.false[fruit]),
         )
     return rows
+
+
+def _of_sessions(connection: sqlite3.Connection, evidence: Evidence, names: Sequence[str]) -> list[list[Any]]:
+    """Return columns of the observations of these visits."""
+    which = one_of("session_id", (visit.session_id for visit in evidence.visits))
+    return columns_of(connection, "observations", names, which)
 
 
 def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[list[int], list[float | None]]:
@@ -124,31 +168,38 @@ def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[list[int]
     return last.tolist(), nullable(diameters_m)
 
 
-def _write_fruits(connection: sqlite3.Connection, rows: dict[int, FruitRow]) -> None:
+def _write_fruits(connection: sqlite3.Connection, rows: dict[int, FruitRow], known: set[int]) -> None:
+    """Write fruits that are new or another than before; the place apart, which the spatial index follows."""
     names = (
         "id", "geom", "state", "last_seen", "last_session_id", "n_sessions", "n_missed", "diameter_m",
         "state_probability", "fruit_probability",
     )  # fmt: skip
-    before = {row[0]: row[1:] for row in zip(*columns_of(connection, "fruits", names), strict=True)}
+    told = columns_of(connection, "fruits", names, one_of("fruits.id", sorted(known)))
+    before = {row[0]: row[1:] for row in zip(*told, strict=True)}
     connection.executemany(
         f"INSERT INTO fruits ({', '.join(names)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         ((fruit_id, *row) for fruit_id, row in rows.items() if fruit_id not in before),
     )
+    changed = [(row, fruit_id) for fruit_id, row in rows.items() if before.get(fruit_id, row) != row]
     connection.executemany(
-        f"UPDATE fruits SET {', '.join(f'{name} = ?' for name in names[1:])} WHERE id = ?",
-        ((*row, fruit_id) for fruit_id, row in rows.items() if before.get(fruit_id, row) != row),
+        f"UPDATE fruits SET {', '.join(f'{name} = ?' for name in names[2:])} WHERE id = ?",
+        ((*row[1:], fruit_id) for row, fruit_id in changed),
+    )
+    connection.executemany(
+        "UPDATE fruits SET geom = ? WHERE id = ?",
+        ((row[0], fruit_id) for row, fruit_id in changed if row[0] != before[fruit_id][0]),
     )
 
 
-def _write_observations(connection: sqlite3.Connection, evidence: Evidence, settlement: Settlement) -> None:
+def _write_observations(connection: sqlite3.Connection, part: SettledPart) -> None:
     """Give observations their fruits, and say how sure that is."""
     names = ("id", "fruit_id", "match_probability", "match_distance_m")
-    before = {row[0]: row[1:] for row in zip(*columns_of(connection, "observations", names), strict=True)}
+    before = {row[0]: row[1:] for row in zip(*_of_sessions(connection, part.evidence, names), strict=True)}
     after = zip(
-        evidence.observation_ids.tolist(),
-        settlement.fruit_ids.tolist(),
-        nullable(settlement.conclusion.probabilities),
-        nullable(settlement.conclusion.distances_m),
+        part.evidence.observation_ids.tolist(),
+        part.fruit_ids.tolist(),
+        nullable(part.conclusion.probabilities),
+        nullable(part.conclusion.distances_m),
         strict=True,
     )
     changed = [row for row in after if before[row[0]] != row[1:]]
@@ -163,7 +214,10 @@ def _write_observations(connection: sqlite3.Connection, evidence: Evidence, sett
 
 
 def write_changes(
-    connection: sqlite3.Connection, cause: Literal["added", "removed"], session: str, changes: Sequence[Change]
+    connection: sqlite3.Connection,
+    cause: Literal["added", "removed", "merged"],
+    session: str,
+    changes: Sequence[Change],
 ) -> None:
     """Keep what changed as history."""
     connection.executemany(

@@ -18,10 +18,10 @@ from pomona.orchard.session import Session
 from pomona.store.failures import WrongContentError, content
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
-from pomona.store.stored_fruits import OF_SESSION, observed_cloud, only_session
+from pomona.store.stored_fruits import OF_SESSION, observed_cloud, only_session, session_row
 from pomona.trajectory import Trajectory
 
-__all__ = ["cameras_in_map", "read_session"]
+__all__ = ["cameras_in_map", "read_session", "session_in_map"]
 
 
 def read_session(path: str | Path) -> Session:
@@ -53,6 +53,22 @@ def _crops_by_row(connection: sqlite3.Connection, session_id: int) -> dict[int, 
     if strange is not None:
         raise WrongContentError(f"crops: observation_id: found {strange}, expected an observation of its session")
     return {row_of[seen]: crop for seen, crop in crops.items()}
+
+
+def session_in_map(connection: sqlite3.Connection, session_id: int, session_from_map: NDArray[np.float64]) -> Session:
+    """Return a session of a map, in its own frame again."""
+    about = session_row(connection, session_id)
+    cloud = observed_cloud(connection, session_id, FruitCloud).transformed(session_from_map)
+    found = cameras_in_map(connection, session_id)
+    trajectory = None
+    if found is not None:
+        frames, times_s, map_from_camera = found
+        session_from_camera = session_from_map @ map_from_camera
+        session_from_camera[:, :3, :3] /= np.cbrt(np.linalg.det(session_from_camera[:, :3, :3]))[:, None, None]
+        trajectory = Trajectory(frames, times_s, session_from_camera)
+    crops = _crops_by_row(connection, session_id)
+    with content("sessions"):
+        return Session(cloud=cloud, trajectory=trajectory, crops=crops, **about)
 
 
 def _trajectory(connection: sqlite3.Connection, session_id: int) -> Trajectory | None:

@@ -109,8 +109,12 @@ def insert_session(
     session: Session,
     map_from_session: NDArray[np.float64],
     placement: Placement | None = None,
+    content_sha256: str | None = None,
 ) -> int:
-    """Add the session, its provenance and its poses; return its number. Fruits follow."""
+    """Add the session, its provenance and its poses; return its number. Fruits follow.
+
+    What it saw has the hash of `session`, unless it was seen before it came from another map.
+    """
     cursor = connection.execute(
         """INSERT INTO sessions (name, date, recording, content_sha256, map_from_session, program_version,
         configuration, input_hashes, method, settings, log_odds, noise_m)
@@ -119,7 +123,7 @@ def insert_session(
             session.name,
             session.date,
             session.recording,
-            session.content_sha256,
+            content_sha256 or session.content_sha256,
             json.dumps(map_from_session.tolist()),
             session.program_version,
             session.configuration_json,

@@ -51,15 +51,22 @@ def snapshot(path: Path) -> Iterator[tuple[sqlite3.Connection, Kind]]:
 
 @contextmanager
 def writing(
-    path: Path, kind: Kind, *, create: bool = False, timeout_s: float = TIMEOUT_S, waiting: Waiting | None = None
+    path: Path,
+    kind: Kind,
+    *,
+    create: bool = False,
+    timeout_s: float = TIMEOUT_S,
+    waiting: Waiting | None = None,
+    shown: Path | None = None,
 ) -> Iterator[tuple[sqlite3.Connection, bool]]:
     """Let nobody else write to a file of ours; all of the block is kept, or nothing when it raises.
 
-    Gives the connection, and whether the file is empty and waits for its tables, which only `create` allows.
+    Errors name `shown` where the file is not there for good. Gives the connection, and whether the file is empty and
+    waits for its tables, which only `create` allows.
     """
     if not create:
         _require_there(path)
-    with told(path), _connection(path, create=create, timeout_s=timeout_s) as connection:
+    with told(shown or path), _connection(path, create=create, timeout_s=timeout_s) as connection:
         _begin_to_write(connection, timeout_s, waiting)
         _migrate_older(connection, path, kind, timeout_s)
         with _transaction(connection):

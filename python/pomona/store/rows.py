@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from pomona.store.cells import COLUMNS
 from pomona.store.failures import WrongContentError
 
-__all__ = ["columns_of", "misfits"]
+__all__ = ["columns_of", "misfits", "one_of"]
 
 LEAST_ROW_BYTES = 8
 """No row of ours is stored in less; so a file of a megabyte has no more than 131,072 rows to give."""
@@ -48,6 +48,11 @@ def columns_of(connection: sqlite3.Connection, table: str, names: Sequence[str],
         for line in _misfits(table, name, ids, cells):
             raise WrongContentError(line)
     return columns
+
+
+def one_of(column: str, ids: Iterable[int]) -> str:
+    """Return what chooses for `columns_of` the rows whose column is one of these, in order of their ids."""
+    return f"WHERE {column} IN ({', '.join(f'{one:d}' for one in ids)}) ORDER BY 1"
 
 
 def misfits(connection: sqlite3.Connection, table: str) -> list[str]:

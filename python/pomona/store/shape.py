@@ -12,6 +12,7 @@ import itertools
 import sqlite3
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from types import NoneType
 from typing import NamedTuple
 
 from pomona import geopackage
@@ -64,7 +65,7 @@ def items_of(connection: sqlite3.Connection) -> list[Item]:
     """Return the schema of a file, names in lower case as SQLite compares them."""
     items = []
     for row in connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master"):
-        if not all(isinstance(cell, str) for cell in row[:3]) or not isinstance(row[3], str | None):
+        if not all(isinstance(cell, str) for cell in row[:3]) or not isinstance(row[3], (str, NoneType)):
             raise WrongContentError(f"the schema: found {str(row)[:60]!r}, expected texts")
         kind, name, table, sql = row
         items.append(Item(kind, name.lower(), table.lower(), sql))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +14,13 @@ from pomona import geopackage
 from pomona.store.cells import finite_json
 from pomona.store.failures import WrongContentError, content
 from pomona.store.opening import snapshot
-from pomona.store.rows import columns_of
+from pomona.store.rows import columns_of, one_of
 from pomona.views import Views
 
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
 
-__all__ = ["OF_SESSION", "fruits_in_map", "observed_cloud", "only_session", "stored_cloud"]
+__all__ = ["OF_SESSION", "fruits_in_map", "observed_cloud", "only_session", "seen_cloud", "session_row", "stored_cloud"]
 
 COVARIANCE = ("cxx", "cxy", "cxz", "cxy", "cyy", "cyz", "cxz", "cyz", "czz")
 
@@ -28,7 +28,7 @@ OF_SESSION = "WHERE session_id = {:d} ORDER BY id"
 
 PROBABILITIES = ("state_probability", "fruit_probability")
 
-AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id ORDER BY fruit_id"
+AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id{} ORDER BY fruit_id"
 """The observation of each fruit by the session that saw it last."""
 
 
@@ -60,14 +60,34 @@ def observed_cloud(connection: sqlite3.Connection, session_id: int, make: type[F
         )
 
 
-def fruits_in_map(connection: sqlite3.Connection, make: type[FruitCloud]) -> FruitCloud:
-    """Return every fruit where it was last seen, with the covariance of that sighting."""
+def seen_cloud(connection: sqlite3.Connection, session_id: int, make: type[FruitCloud]) -> FruitCloud:
+    """Return where a session saw its fruits and how large, as `observed_cloud` does, without what it noted besides."""
+    geoms, diameters_m, n_views, *cells = columns_of(
+        connection, "observations", ("geom", "diameter_m", "n_views", *COVARIANCE), OF_SESSION.format(session_id)
+    )
+    with content("observations"):
+        return make(
+            positions=geopackage.points_of(geoms),
+            diameters_m=_numbers(diameters_m),
+            covariances=_covariances(cells),
+            n_views=None if not n_views or None in n_views else np.array(n_views, dtype=np.int64),
+        )
+
+
+def fruits_in_map(
+    connection: sqlite3.Connection, make: type[FruitCloud], fruit_ids: Collection[int] | None = None
+) -> FruitCloud:
+    """Return every fruit, or those of these ids, where it was last seen, with the covariance of that sighting."""
+    which, at_last = "", AT_LAST.format("")
+    if fruit_ids is not None:
+        listed = ", ".join(map(str, fruit_ids))
+        which, at_last = one_of("fruits.id", fruit_ids), AT_LAST.format(f" AND f.id IN ({listed})")
     names = ("id", "geom", "diameter_m", "state", "last_seen", "last_session_id", "n_sessions", "n_missed")
     ids, geoms, diameters_m, states, last_seen, last_session_ids, n_sessions, n_missed = columns_of(
-        connection, "fruits", names
+        connection, "fruits", names, which
     )
-    probabilities = columns_of(connection, "fruits", PROBABILITIES)
-    seen_ids, *cells = columns_of(connection, "observations", ("fruit_id", *COVARIANCE), AT_LAST)
+    probabilities = columns_of(connection, "fruits", PROBABILITIES, which)
+    seen_ids, *cells = columns_of(connection, "observations", ("fruit_id", *COVARIANCE), at_last)
     _require_seen(ids, last_session_ids, seen_ids)
     with content("fruits"):
         return make(
@@ -87,10 +107,16 @@ def fruits_in_map(connection: sqlite3.Connection, make: type[FruitCloud]) -> Fru
 
 def only_session(connection: sqlite3.Connection) -> dict[str, Any]:
     """Return the number of the session, and what `Session` is told besides the cloud and the trajectory."""
-    names = ("id", "name", "date", "recording", "configuration", "input_hashes", "program_version")
-    columns = columns_of(connection, "sessions", names)
-    if len(columns[0]) != 1:
-        raise WrongContentError(f"is a session file with {len(columns[0])} sessions, expected 1")
+    (ids,) = columns_of(connection, "sessions", ("id",))
+    if len(ids) != 1:
+        raise WrongContentError(f"is a session file with {len(ids)} sessions, expected 1")
+    return {"id": ids[0], **session_row(connection, ids[0])}
+
+
+def session_row(connection: sqlite3.Connection, session_id: int) -> dict[str, Any]:
+    """Return what `Session` is told besides the cloud and the trajectory."""
+    names = ("name", "date", "recording", "configuration", "input_hashes", "program_version")
+    columns = columns_of(connection, "sessions", names, one_of("sessions.id", [session_id]))
     about = {name: cells[0] for name, cells in zip(names, columns, strict=True)}
     parsed = {name: finite_json(about[name]) for name in ("configuration", "input_hashes")}
     return {**about, **parsed}

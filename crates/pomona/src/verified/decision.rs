@@ -25,7 +25,7 @@ const MIN_FRUITS: usize = 5;
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
-const SEED_SIGMA: f64 = 0.075;
+pub(crate) const SEED_SIGMA: f64 = 0.075;
 
 /// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
 pub(super) const DETECTION: f64 = 0.55;

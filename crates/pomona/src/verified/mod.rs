@@ -41,5 +41,6 @@ mod support;
 mod vertical;
 
 pub use acceptance::VerifiedConfig;
-pub(crate) use decision::{MAX_FRUITS, VerifiedMap, pairs_under, search};
-pub(crate) use landscape::median;
+pub(crate) use decision::{MAX_FRUITS, SEED_SIGMA, VerifiedMap, pairs_under, search};
+pub(crate) use landscape::{Landscape, median, single};
+pub(crate) use seeds::{COMPANIONS, Quad, SeedIndex, canonical, frame, near_ties, shuffled};

@@ -1,0 +1,79 @@
+"""Another map as a whole, read to be merged."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Container
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.orchard.evidence import Evidence, KnownVisit, read_evidence
+from pomona.orchard.recognising import last_sights, worth_recognising
+from pomona.orchard.session import Session
+from pomona.orchard.stored_sessions import session_in_map
+from pomona.store.opening import snapshot
+from pomona.store.rows import columns_of
+from pomona.store.stored_fruits import fruits_in_map
+
+__all__ = ["OtherMap", "read_other"]
+
+
+@dataclass(frozen=True, eq=False)
+class OtherMap:
+    """All that a map holds of its sessions.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    evidence : Evidence
+        In the frame of that map.
+    sessions : list of Session
+        Each in its own frame, in the order of the evidence's visits.
+    fruits : FruitCloud
+        Those that may still hang.
+    """
+
+    name: str
+    evidence: Evidence
+    sessions: list[Session]
+    fruits: FruitCloud
+
+    @property
+    def contents(self) -> list[str]:
+        """Hashes of what each session saw."""
+        return [visit.seen.key[1] for visit in self.evidence.visits]
+
+    def all_but(self, left_out: Container[int]) -> list[int]:
+        """Return the numbers of the other sessions."""
+        return [number for number in range(len(self.sessions)) if number not in left_out]
+
+    def last_sights(self) -> list[tuple[int, int]]:
+        """Return for each of `fruits` the visit that saw it last, and its row there."""
+        last = last_sights(self.evidence)
+        return [last[int(name)] for name in self.fruits.ids or ()]
+
+
+def read_other(path: Path) -> OtherMap:
+    """Read a map.
+
+    Raises
+    ------
+    PomonaError
+        When it is not a map of ours.
+    """
+    with snapshot(path) as (connection, kind):
+        if kind != "map":
+            raise PomonaError(f"{path}: is the file of one session, expected a map; `map add` takes sessions")
+        (session_ids,) = columns_of(connection, "sessions", ("id",))
+        evidence = read_evidence(connection, session_ids)
+        sessions = [_session(connection, visit) for visit in evidence.visits]
+        return OtherMap(path.stem, evidence, sessions, worth_recognising(fruits_in_map(connection, FruitCloud)))
+
+
+def _session(connection: sqlite3.Connection, visit: KnownVisit) -> Session:
+    return session_in_map(connection, visit.session_id, np.asarray(np.linalg.inv(visit.map_from_session)))

@@ -1,0 +1,194 @@
+"""Two maps into one: as if all sessions had been added to the first; no input is ever lost."""
+
+import sqlite3
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pomona import FruitCloud, PomonaError
+from pomona.cli import main
+from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, problems
+from pomona.synth.clouds import scene_pair
+
+DATES = ("2024-06-01", "2024-06-29", "2024-07-27", "2024-08-24", "2024-09-07")
+
+
+@pytest.fixture(scope="module")
+def row() -> FruitCloud:
+    return scene_pair("base", seed=3).map
+
+
+def visit(row: FruitCloud, number: int, part: slice = slice(None)) -> Session:
+    """Three of four fruits of a stretch, 1.2 cm off, in a frame of their own."""
+    rng = np.random.default_rng(number)
+    along = np.argsort(row.positions @ np.linalg.svd(row.positions - row.positions.mean(axis=0))[2][0])
+    seen = along[part][rng.random(len(along[part])) < 0.75]
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    cloud = FruitCloud(
+        row.positions[seen] + rng.normal(0, 0.012, (len(seen), 3)),
+        ids=tuple(f"{number}.{fruit}" for fruit in seen.tolist()),
+    )
+    return Session(DATES[number], DATES[number], "test", cloud.transformed(frame))
+
+
+@pytest.fixture(scope="module")
+def visits(row: FruitCloud) -> list[Session]:
+    """The middle of the row thrice, and either end with what is next to it."""
+    n = len(row)
+    stretches = [slice(None), slice(0, 2 * n // 3), slice(None), slice(n // 3, n), slice(None)]
+    return [visit(row, number, stretch) for number, stretch in enumerate(stretches)]
+
+
+def grown(path: Path, visits: list[Session]) -> Path:
+    assert all(added.is_added for added in add_sessions(path, visits))
+    return path
+
+
+def who_is_who(path: Path) -> set[frozenset[str]]:
+    seen = OrchardMap(path).observations()
+    sights: dict[int, set[str]] = {}
+    for fruit, label in zip(seen.fruit_ids.tolist(), seen.labels, strict=True):
+        sights.setdefault(fruit, set()).add(str(label))
+    return set(map(frozenset, sights.values()))
+
+
+def states(path: Path) -> list[tuple[str, ...]]:
+    extras = OrchardMap(path).fruits().extras
+    return sorted(zip(extras["state"], extras["n_sessions"], extras["n_missed"], strict=True))
+
+
+@pytest.fixture(scope="module")
+def together(visits: list[Session], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return grown(tmp_path_factory.mktemp("together") / "orchard.gpkg", visits)
+
+
+@pytest.mark.parametrize("ours", [[0, 1], [0, 2, 4], [3, 4], [0, 1, 2, 3]])
+@pytest.mark.parametrize("shared", [[], [2]])
+def test_a_merged_map_is_that_of_all_sessions(
+    visits: list[Session], together: Path, ours: list[int], shared: list[int], tmp_path: Path
+) -> None:
+    first = sorted({*ours, *shared})
+    second = [number for number in range(5) if number not in ours or number in shared]
+    path = grown(tmp_path / "ours.gpkg", [visits[number] for number in first])
+    other = grown(tmp_path / "theirs.gpkg", [visits[number] for number in second])
+    kept = other.read_bytes()
+    ids = dict(zip(OrchardMap(path).fruits().ids or (), OrchardMap(path).fruits().positions.tolist(), strict=True))
+    merged = merge_maps(path, other)
+    assert merged.is_merged
+    assert {*merged.sessions, *merged.shared} == {visits[number].name for number in second}
+    assert set(merged.shared) == {visits[number].name for number in second if number in first}
+    assert who_is_who(path) == who_is_who(together)
+    assert states(path) == states(together)
+    assert problems(path) == []
+    assert other.read_bytes() == kept
+    assert set(ids) <= set(OrchardMap(path).fruits().ids or ()) | {
+        str(change.from_fruit_id) for change in merged.changes
+    }
+
+
+def test_what_the_other_s_fruits_became_is_told_and_kept(visits: list[Session], tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    other = grown(tmp_path / "theirs.gpkg", visits[2:])
+    before = {str(i) for i in OrchardMap(path).fruits().ids or ()}
+    merged = merge_maps(path, other)
+    seen, theirs = OrchardMap(path).observations(), OrchardMap(other).observations()
+    now = dict(zip(seen.labels, seen.fruit_ids.tolist(), strict=True))
+    kept = [(session, one) for cause, session, one in OrchardMap(path).changes() if cause == "merged"]
+    assert {session for session, _ in kept} == {"theirs"}
+    assert sum(change.n_observations for _, change in kept) == len(theirs)
+    told = {(change.from_fruit_id, change.to_fruit_id) for _, change in kept}
+    assert {(old, now[label]) for old, label in zip(theirs.fruit_ids.tolist(), theirs.labels, strict=True)} == told
+    assert merged.n_known == sum(str(fruit) in before for fruit in merged.fruit_ids.values()) > 100
+    assert {change.event for _, change in kept} >= {"joined", "moved"}
+
+
+def test_maps_that_do_not_overlap_stay_as_they_are(visits: list[Session], tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    stranger = visit(scene_pair("base", seed=9).map, 4)
+    other = grown(tmp_path / "theirs.gpkg", [stranger])
+    before = path.read_bytes(), other.read_bytes()
+    output = tmp_path / "merged.gpkg"
+    assert not merge_maps(path, other).is_merged
+    assert not merge_maps(path, other, output=output).is_merged
+    assert (path.read_bytes(), other.read_bytes()) == before
+    assert not output.exists()
+
+
+def test_into_another_file(visits: list[Session], together: Path, tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:3])
+    other = grown(tmp_path / "theirs.gpkg", visits[3:])
+    before = path.read_bytes(), other.read_bytes()
+    output = tmp_path / "merged.gpkg"
+    assert merge_maps(path, other, output=output).is_merged
+    assert (path.read_bytes(), other.read_bytes()) == before
+    assert who_is_who(output) == who_is_who(together)
+    assert problems(output) == []
+    with pytest.raises(PomonaError, match="is an orchard map, which no output replaces"):
+        merge_maps(path, other, output=output)
+
+
+def test_all_sessions_in_both_changes_nothing(visits: list[Session], tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:3])
+    other = grown(tmp_path / "theirs.gpkg", [visits[2], visits[0]])
+    before = who_is_who(path)
+    merged = merge_maps(path, other)
+    assert (merged.sessions, set(merged.shared)) == ((), {visits[0].name, visits[2].name})
+    assert who_is_who(path) == before
+    assert problems(path) == []
+
+
+def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Session], tmp_path: Path) -> None:
+    strangers = [visit(scene_pair("base", seed=9).map, number) for number in (1, 3)]
+    path = grown(tmp_path / "orchard.gpkg", [visits[0]])
+    assert not add_session(path, strangers[0]).is_added
+    added = add_session(path, strangers[0], new_part=True)
+    assert (added.is_added, added.n_matched, added.n_new) == (True, 0, len(strangers[0].cloud))
+    alone = states(path)
+    assert add_session(path, strangers[1]).n_matched > 50
+    assert add_session(path, visits[4]).n_matched > 50
+    # A part says nothing of the fruits of another: those of the row are as they would be alone.
+    only = grown(tmp_path / "row.gpkg", [visits[0], visits[4]])
+    assert who_is_who(only) < who_is_who(path)
+    row_labels = {label for fruit in who_is_who(only) for label in fruit}
+    assert row_labels.isdisjoint({label for fruit in who_is_who(path) - who_is_who(only) for label in fruit})
+    assert len(states(path)) == len(states(only)) + len({*who_is_who(path)} - {*who_is_who(only)})
+    assert problems(path) == []
+    assert alone != states(path)
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: str | Path) -> int | str | None:
+    monkeypatch.setattr("sys.argv", ["pomona", "map", *map(str, arguments)])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    return caught.value.code
+
+
+def test_what_cannot_be_merged_is_said_in_a_line(
+    visits: list[Session],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    other = grown(tmp_path / "theirs.gpkg", [visits[2]])
+    named = grown(tmp_path / "named.gpkg", [replace(visits[3], name=visits[0].name)])
+    said = [
+        (path, f"{path}: is the map itself, expected another one to merge with {path}"),
+        (tmp_path / "none.gpkg", f"{tmp_path / 'none.gpkg'}: is not there, expected a session or a map (.gpkg)"),
+        (named, f"{path}: session {visits[0].name} is in the map already"),
+    ]
+    for with_whom, line in said:
+        assert run(monkeypatch, "merge", path, with_whom) == 2
+        assert capsys.readouterr().err == f"pomona: {line}\n"
+    assert run(monkeypatch, "merge", path, other, "-o", other) == 2
+    assert "is the input" in capsys.readouterr().err
+    assert run(monkeypatch, "merge", path, other) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[0].startswith(f"{other}: sessions that came: 1, in both: 0; ")
+    assert run(monkeypatch, "check", path) == 0
+    with sqlite3.connect(path) as connection:
+        assert connection.execute("SELECT count(*) FROM sessions").fetchone() == (3,)
