@@ -20,6 +20,7 @@ from pomona.orchard.fruit_ids import Change
 from pomona.orchard.recognising import matches_with_visits
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
+from pomona.orchard.tree_tables import follow_trees
 from pomona.orchard.writing import Placement, insert_matches, insert_observations, insert_session, update_layers
 from pomona.settings import Settings
 from pomona.store import schema
@@ -236,6 +237,7 @@ def _join(
             insert_matches(connection, pair, *ids)
     settle(connection, together, settlement)
     write_changes(connection, "added", session.name, settlement.changes)
+    follow_trees(connection)
     update_layers(connection)
     return _told(settlement, own)
 
