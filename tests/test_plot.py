@@ -155,18 +155,18 @@ def test_arrows_say_by_how_much_they_are_magnified() -> None:
     assert pytest.approx(int(times) * int(length_cm) / 100) == key.U
 
 
-def test_trees_are_taken_from_the_map_or_guessed_and_said_to_be() -> None:
+def test_trees_are_taken_from_the_map_or_found_and_said_to_be() -> None:
     query, map, match = moved_row()
     named = dataclasses.replace(map, extras={"tree": ("A",) * 30 + ("B",) * 29 + ("",)})
     texts = [text.get_text() for text in draw_match(query, named, match).axes[0].texts]
     assert texts == ["tree A", "tree B"]
     rng = np.random.default_rng(0)
     x = np.concatenate([rng.normal(place, 0.25, 40) for place in (0.0, 2.0, 4.0)])
-    row = np.stack([x, 0 * x, 0 * x], axis=1)
+    row = np.column_stack([x, rng.uniform(0.0, 2.0, 120), rng.uniform(-0.4, 0.4, 120)])
     guessed = Trees.along(np.array([1.0, 0.0, 0.0]), FruitCloud(row), row)
     assert guessed.names is None
     np.testing.assert_allclose(guessed.places, [0.0, 2.0, 4.0], atol=0.2)
-    hedge = np.stack([np.linspace(0, 8, 200), np.zeros(200), np.zeros(200)], axis=1)
+    hedge = np.column_stack([np.linspace(0, 8, 200), rng.uniform(0.0, 2.0, 200), rng.uniform(-0.4, 0.4, 200)])
     assert len(Trees.along(np.array([1.0, 0.0, 0.0]), FruitCloud(hedge), hedge).places) == 0
 
 

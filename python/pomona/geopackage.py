@@ -8,7 +8,6 @@ Source: OGC 12-128r17, GeoPackage Encoding Standard 1.3; annexes F.1-F.3 for the
 
 from __future__ import annotations
 
-import math
 import sqlite3
 import struct
 from collections.abc import Sequence
@@ -29,6 +28,7 @@ __all__ = [
     "are_points",
     "connect",
     "create",
+    "line",
     "points",
     "points_of",
     "touch",
@@ -46,6 +46,7 @@ WGS84 = 4326
 
 LITTLE_ENDIAN = 1
 WKB_POINT_Z = 1001
+WKB_LINE_Z = 1002
 
 POINT_Z = np.dtype(
     [
@@ -62,6 +63,9 @@ POINT_Z = np.dtype(
 
 POINT_HEAD = b"GP\0\x01" + struct.pack("<BI", LITTLE_ENDIAN, WKB_POINT_Z)
 """What every point begins with, but for the number of the reference system."""
+
+LINE_HEAD, LINE_HEAD_BYTES = b"GP\0\x01" + struct.pack("<BI", LITTLE_ENDIAN, WKB_LINE_Z), 17
+"""What every line begins with, without the reference system, and how long that is with it and the count."""
 
 CORE_TABLES = """
 CREATE TABLE gpkg_spatial_ref_sys (
@@ -234,6 +238,13 @@ def points(positions: ArrayLike) -> list[bytes]:
     return [whole[start : start + POINT_Z.itemsize] for start in range(0, len(whole), POINT_Z.itemsize)]
 
 
+def line(positions: ArrayLike) -> bytes:
+    """Encode (N, 3) coordinates as one GeoPackage line."""
+    xyz = np.asarray(positions, dtype="<f8")
+    head = b"GP\0\x01" + struct.pack("<iBII", UNDEFINED_CARTESIAN, LITTLE_ENDIAN, WKB_LINE_Z, len(xyz))
+    return head + xyz.tobytes()
+
+
 def points_of(blobs: Sequence[bytes]) -> NDArray[np.float64]:
     """Decode points to (N, 3) coordinates; the inverse of `points`. All must be points, see `are_points`."""
     return np.frombuffer(b"".join(blobs), dtype=POINT_Z)["xyz"].astype(np.float64)
@@ -249,10 +260,20 @@ def are_points(blobs: Sequence[bytes]) -> bool:
     return bool(ours.all() and np.isfinite(decoded["xyz"]).all())
 
 
-def _bounds(point: object) -> tuple[float, float, float, float] | tuple[None, None, None, None]:
-    """Return min x, max x, min y, max y of a point as this module writes it; None for anything else."""
-    if isinstance(point, bytes) and len(point) == POINT_Z.itemsize and point[:4] + point[8:13] == POINT_HEAD:
-        x, y = struct.unpack_from("<2d", point, POINT_Z.itemsize - 24)
-        if math.isfinite(x) and math.isfinite(y):
-            return x, x, y, y
-    return None, None, None, None
+def _bounds(geometry: object) -> tuple[float, float, float, float] | tuple[None, None, None, None]:
+    """Return min x, max x, min y, max y of a point or line as this module writes it; None for anything else."""
+    xy = _plan(geometry) if isinstance(geometry, bytes) else np.empty((0, 2))
+    if not len(xy) or not np.isfinite(xy).all():
+        return None, None, None, None
+    (min_x, min_y), (max_x, max_y) = xy.min(axis=0).tolist(), xy.max(axis=0).tolist()
+    return min_x, max_x, min_y, max_y
+
+
+def _plan(blob: bytes) -> NDArray[np.float64]:
+    """Return x and y of a point or line, (V, 2); none of anything else."""
+    head = blob[:4] + blob[8:13]
+    if head == POINT_HEAD and len(blob) == POINT_Z.itemsize:
+        return np.array([struct.unpack_from("<2d", blob, POINT_Z.itemsize - 24)])
+    if head == LINE_HEAD and len(blob) > LINE_HEAD_BYTES and (len(blob) - LINE_HEAD_BYTES) % 24 == 0:
+        return np.frombuffer(blob, "<f8", offset=LINE_HEAD_BYTES).reshape(-1, 3)[:, :2]
+    return np.empty((0, 2))

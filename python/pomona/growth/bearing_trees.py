@@ -1,4 +1,4 @@
-"""Which tree each fruit hangs on: as the map names it, else the nearest of the trees that stand out in the row."""
+"""Which tree each fruit hangs on: as the map names it, else as the fruits tell."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.plot.projections import side_and_plan
-from pomona.plot.trees import Trees
+from pomona.tree_rows.names import tree_names
 
 __all__ = ["BearingTrees", "bearing_trees"]
 
@@ -46,19 +46,13 @@ class BearingTrees:
 def bearing_trees(cloud: FruitCloud) -> BearingTrees:
     """Tell the trees of a map's fruits.
 
-    Named by the column ``tree`` where the map has one, a blank cell for the fruits of no tree; else numbered from 1
-    along the row where the fruits stand in heaps, see `Trees`.
+    Named by the column ``tree`` where the map has one, a blank cell for the fruits of no tree; else those that the
+    fruits themselves tell, see `pomona.tree_rows`.
     """
     axis = side_and_plan(cloud.positions)[0].axes[0]
     along_m = cloud.positions @ axis
-    trees = Trees.along(axis, cloud, cloud.positions)
-    if trees.names is not None:
-        rest = ("",) if "" in cloud.extras["tree"] else ()
-        names = (*trees.names, *rest)
-        number_of = {name: number for number, name in enumerate(names)}
-        return BearingTrees(names, np.array([number_of[name] for name in cloud.extras["tree"]], np.int64), along_m)
-    if len(trees.places) < 2:
-        return BearingTrees(("",), np.zeros(len(cloud), np.int64), along_m)
-    middles = (trees.places[1:] + trees.places[:-1]) / 2.0
-    names = tuple(str(number + 1) for number in range(len(trees.places)))
-    return BearingTrees(names, np.searchsorted(middles, along_m).astype(np.int64), along_m)
+    of_fruits = np.array(cloud.extras.get("tree") or tree_names(cloud.positions), dtype=object)
+    names = sorted(set(of_fruits.tolist()) - {""}, key=lambda name: along_m[of_fruits == name].mean())
+    names += [""] * ("" in of_fruits)
+    number_of = {name: number for number, name in enumerate(names)}
+    return BearingTrees(tuple(names), np.array([number_of[name] for name in of_fruits], np.int64), along_m)

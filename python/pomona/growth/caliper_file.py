@@ -9,8 +9,8 @@ from pathlib import Path
 from statistics import median
 
 from pomona.errors import PomonaError
-from pomona.growth.table_lines import table_lines
 from pomona.reading import number_in, shown
+from pomona.table_lines import table_lines
 
 __all__ = ["Measurement", "read_calipers"]
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.growth.table_lines import table_lines
 from pomona.reading import number_in, shown
+from pomona.table_lines import table_lines
 
 __all__ = ["CALENDAR", "Calendar", "DegreeDays", "SeasonClock", "read_temperatures"]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.session import Session
 from pomona.orchard.settling import SettledPart, Settlement, settle, settlement_of
+from pomona.orchard.tree_tables import follow_trees
 from pomona.orchard.writing import (
     Placement,
     insert_crops,
@@ -61,6 +62,7 @@ def join(connection: sqlite3.Connection, together: Evidence, newcomers: Mapping[
         _insert_matches(connection, part.evidence, added)
     settlement = replace(settlement, parts=parts)
     settle(connection, settlement)
+    follow_trees(connection)
     update_layers(connection)
     return settlement
 

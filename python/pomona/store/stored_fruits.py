@@ -101,8 +101,18 @@ def fruits_in_map(
                 "n_sessions": tuple(map(str, n_sessions)),
                 "n_missed": tuple(map(str, n_missed)),
                 **{name: _shares(cells) for name, cells in zip(PROBABILITIES, probabilities, strict=True)},
+                **_trees(connection),
             },
         )
+
+
+def _trees(connection: sqlite3.Connection) -> dict[str, tuple[str, ...]]:
+    """Return the column `tree`, blank for the fruits of none; nothing where the map has told no trees."""
+    (of_fruits,) = columns_of(connection, "fruits", ("tree_id",))
+    if not any(of_fruits):
+        return {}
+    names = dict(zip(*columns_of(connection, "trees", ("id", "name")), strict=True))
+    return {"tree": tuple("" if tree is None else names.get(tree) or f"tree {tree}" for tree in of_fruits)}
 
 
 def only_session(connection: sqlite3.Connection) -> dict[str, Any]:

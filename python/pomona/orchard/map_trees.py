@@ -1,0 +1,308 @@
+"""`map trees`: rows and trees of a map, found from its fruits or given, with numbers that stay."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona import geopackage
+from pomona.errors import PomonaError
+from pomona.orchard.given_trees import KnownTree
+from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
+from pomona.orchard.writing import update_layers
+from pomona.store.cells import finite_json
+from pomona.store.opening import TIMEOUT_S, Waiting, writing
+from pomona.store.rows import columns_of
+from pomona.tree_rows import Crowns, Planting, RowLine, planting_at, planting_of, row_lines
+from pomona.tree_rows.numbering_of_trees import UNNUMBERED, numbers_along, same_trees
+from pomona.tree_rows.tree_spacing import SPACINGS_M
+
+__all__ = ["TreeRow", "find_trees"]
+
+BESIDE_ROW_M = 2.0
+"""A tree that is given stands no farther from the curve of its row: its foot, or its top."""
+
+BELIEVED = 0.5
+"""What was seen once, looked for in vain and is less likely a fruit than this tells no tree."""
+
+TREE_COLUMN = "tree"
+"""Where a session says on which tree it saw a fruit."""
+
+
+@dataclass(frozen=True)
+class TreeRow:
+    """One row as the map has it now.
+
+    Attributes
+    ----------
+    number : int
+    kind : {"trees", "segments", "none"}
+        Trees; lengths of a row in which no trees can be told; or nothing of both.
+    source : {"found", "given"}
+    n_fruits : int
+    spacing_m, log_odds : float
+        Between trees, and what speaks for trees rather than a hedge; infinite where they are given.
+    trees : tuple of (str, int, int)
+        Name, number and fruits of each.
+    """
+
+    number: int
+    kind: str
+    source: str
+    n_fruits: int
+    spacing_m: float
+    log_odds: float
+    trees: tuple[tuple[str, int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fruits:
+    """All fruits of the map, and where cameras went."""
+
+    ids: NDArray[np.int64]
+    positions: NDArray[np.float64]
+    believed: NDArray[np.bool_]
+    ways: tuple[NDArray[np.float64], ...]
+
+
+def find_trees(
+    path: str | Path,
+    *,
+    given: Sequence[KnownTree] = (),
+    spacing_m: float | None = None,
+    segment_m: float | None = None,
+    renumber: bool = False,
+    timeout_s: float = TIMEOUT_S,
+    waiting: Waiting | None = None,
+) -> list[TreeRow]:
+    """Find the rows and trees of a map and write them into it, in one transaction.
+
+    Parameters
+    ----------
+    path : str or Path
+        The map (.gpkg).
+    given : sequence of KnownTree
+        Trees that are known; in their rows none is looked for. Those that are drawn in the map, and those that the
+        sessions name in a column ``tree``, are known too.
+    spacing_m : float, optional
+        Between trunks, where it is known.
+    segment_m : float, optional
+        Where no trees can be told, part the row into lengths of this.
+    renumber : bool
+        Whether to count from 1 again; else trees keep their numbers.
+    timeout_s, waiting
+        As for `add_session`.
+
+    Raises
+    ------
+    PomonaError
+        When the file is not a map of ours, a length cannot be, or a tree that is given stands beside no row.
+    """
+    for name, length_m in (("--spacing", spacing_m), ("--segments", segment_m)):
+        low, high = SPACINGS_M
+        if length_m is not None and not low <= length_m <= 10.0 * high:
+            raise PomonaError(f"{name}: found {length_m:g} m, expected {low:g} to {10.0 * high:g}")
+    with writing(Path(path), "map", timeout_s=timeout_s, waiting=waiting) as (connection, _):
+        fruits = _fruits(connection)
+        known = [*given, *_drawn(connection, replaced=bool(given))]
+        known = known or _named(connection, fruits)
+        found = _Finding(connection, fruits, known, spacing_m, segment_m, renumber)
+        rows = found.rows()
+        update_layers(connection)
+        return rows
+
+
+class _Finding:
+    """One run over all rows."""
+
+    def __init__(
+        self,
+        connection: sqlite3.Connection,
+        fruits: _Fruits,
+        known: Sequence[KnownTree],
+        spacing_m: float | None,
+        segment_m: float | None,
+        renumber: bool,
+    ) -> None:
+        self.connection, self.fruits, self.known = connection, fruits, list(known)
+        self.spacing_m, self.segment_m, self.renumber = spacing_m, segment_m, renumber
+        self.before = [tree for tree in stored_trees(connection) if tree.source != DRAWN]
+        self.taken_rows: set[int] = set()
+        self.used: set[int] = set()
+
+    def rows(self) -> list[TreeRow]:
+        believed = np.flatnonzero(self.fruits.believed)
+        lines = row_lines(self.fruits.positions[believed], self.fruits.ways)
+        self._require_beside(lines)
+        bear(self.connection, self.fruits.ids, np.zeros(len(self.fruits.ids), np.int64), None)
+        told = [self._row(line, believed[line.members]) for line in lines]
+        gone = [(tree.tree_id,) for tree in self.before if tree.tree_id not in self.used]
+        self.connection.executemany("DELETE FROM trees WHERE id = ?", gone)
+        self.connection.execute(
+            "DELETE FROM rows WHERE source IS NOT NULL AND id NOT IN (SELECT row_id FROM trees WHERE row_id NOTNULL)"
+        )
+        return sorted(told, key=lambda row: row.number)
+
+    def _row(self, line: RowLine, members: NDArray[np.int64]) -> TreeRow:
+        positions = self.fruits.positions[members]
+        given = sorted(
+            (float(line.along_of(tree.place_in_map[None])[0]), number)
+            for number, tree in enumerate(self.known)
+            if _is_beside(line, tree.place_in_map)
+        )
+        kind, source = "trees", FOUND
+        if given:
+            source = GIVEN
+            places = np.array([along for along, _ in given])
+            planting = planting_at(positions, line.along_m, line.beside_m, places)
+        else:
+            planting = planting_of(positions, line.along_m, line.beside_m, self.spacing_m)
+            if planting.crowns is None and self.segment_m is not None:
+                kind, planting = "segments", _segments(line, self.segment_m)
+        if planting.crowns is None:
+            return TreeRow(0, "none", FOUND, len(members), planting.spacing_m, planting.log_odds, ())
+        return self._written(line, members, planting, kind, source, [self.known[number] for _, number in given])
+
+    def _written(
+        self,
+        line: RowLine,
+        members: NDArray[np.int64],
+        planting: Planting,
+        kind: str,
+        source: str,
+        given: Sequence[KnownTree],
+    ) -> TreeRow:
+        assert planting.crowns is not None
+        places_m = planting.crowns.places_m
+        points = np.array([tree.place_in_map for tree in given]) if given else line.places(places_m)
+        same = self._same(line, places_m, planting.spacing_m)
+        numbers = self._numbers(places_m, planting.spacing_m, same)
+        row_id, row_number = write_row(
+            self.connection, self._row_before(same), self.taken_rows, source, planting, line.knots_m[:, 1:]
+        )
+        self.taken_rows.add(row_id)
+        bearers, chances = (
+            planting.bearers(line.along_m, line.beside_m) if kind == "trees" else _in_segments(line, planting.crowns)
+        )
+        counts = np.bincount(bearers[bearers >= 0], minlength=len(places_m))
+        told, tree_ids = [], np.zeros(len(places_m), np.int64)
+        for tree in range(len(places_m)):
+            name = (given[tree].name if given else "") or f"{row_number}-{numbers[tree]}"
+            before = given[tree].tree_id if given and given[tree].tree_id else 0
+            before = before or (self.before[same[tree]].tree_id if same[tree] >= 0 else 0)
+            tree_ids[tree] = write_tree(
+                self.connection,
+                StoredTree(
+                    before, name, row_id, int(numbers[tree]), float(places_m[tree]), points[tree],
+                    "tree" if kind == "trees" else "segment", source, int(counts[tree]),
+                ),
+                is_drawn=bool(given and given[tree].tree_id),
+            )  # fmt: skip
+            self.used.add(int(tree_ids[tree]))
+            told.append((name, int(numbers[tree]), int(counts[tree])))
+        bear(self.connection, self.fruits.ids[members], np.where(bearers >= 0, tree_ids[bearers], 0), chances)
+        log_odds = planting.log_odds
+        return TreeRow(row_number, kind, source, len(members), planting.spacing_m, log_odds, tuple(told))
+
+    def _same(self, line: RowLine, places_m: NDArray[np.float64], spacing_m: float) -> NDArray[np.int64]:
+        """Return which tree of before each tree is, (K,), -1 for none."""
+        beside = [
+            number
+            for number, tree in enumerate(self.before)
+            if tree.tree_id not in self.used and _is_beside(line, tree.place_in_map)
+        ]
+        if not beside:
+            return np.full(len(places_m), -1)
+        known_m = line.along_of(np.array([self.before[number].place_in_map for number in beside]))
+        same = same_trees(places_m, known_m, spacing_m)
+        return np.where(same >= 0, np.array(beside)[same], -1)
+
+    def _numbers(self, places_m: NDArray[np.float64], spacing_m: float, same: NDArray[np.int64]) -> NDArray[np.int64]:
+        if self.renumber:
+            return numbers_along(places_m, spacing_m)
+        known = [self.before[number].number if number >= 0 else None for number in same.tolist()]
+        return numbers_along(
+            places_m, spacing_m, np.array([UNNUMBERED if number is None else number for number in known], np.int64)
+        )
+
+    def _row_before(self, same: NDArray[np.int64]) -> int:
+        """Return the row of most of the trees of before, 0 for none."""
+        rows = Counter(self.before[number].row_id for number in same.tolist() if number >= 0)
+        return next((row for row, _ in rows.most_common() if row), 0)
+
+    def _require_beside(self, lines: Sequence[RowLine]) -> None:
+        for tree in self.known:
+            if not any(_is_beside(line, tree.place_in_map) for line in lines):
+                place = ", ".join(f"{metres:g}" for metres in tree.place_in_map)
+                raise PomonaError(
+                    f"tree {tree.name or 'without name'}: found it at {place}, where no row of fruits is within "
+                    f"{BESIDE_ROW_M:g} m, expected the map's own metres"
+                )
+
+
+def _is_beside(line: RowLine, place: NDArray[np.float64]) -> bool:
+    on = line.places(line.along_of(place[None]))[0]
+    along = float(line.along_of(place[None])[0])
+    reach = -BESIDE_ROW_M <= along <= line.knots_m[-1, 0] + BESIDE_ROW_M
+    return bool(reach and np.linalg.norm(place - on) <= BESIDE_ROW_M)
+
+
+def _segments(line: RowLine, length_m: float) -> Planting:
+    count = max(1, round(float(line.along_m.max()) / length_m))
+    places = (np.arange(count) + 0.5) * length_m
+    crowns = Crowns(length_m, places.astype(np.float64), np.full(count, 1.0 / count), np.array([length_m]))
+    return Planting(crowns, length_m, -np.inf, np.empty(0))
+
+
+def _in_segments(line: RowLine, crowns: Crowns) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the segment of each fruit; of that there is no doubt."""
+    numbers = np.clip((line.along_m / crowns.spacing_m).astype(np.int64), 0, len(crowns.places_m) - 1)
+    return numbers, np.ones(len(numbers))
+
+
+def _fruits(connection: sqlite3.Connection) -> _Fruits:
+    ids, geoms, states, chances = columns_of(connection, "fruits", ("id", "geom", "state", "fruit_probability"))
+    sessions, places = columns_of(connection, "poses", ("session_id", "geom"))
+    cameras, of_session = geopackage.points_of(places), np.array(sessions, np.int64)
+    return _Fruits(
+        ids=np.array(ids, np.int64),
+        positions=geopackage.points_of(geoms),
+        believed=np.array(
+            [
+                chance is None or chance > BELIEVED or state in ("new", "seen")
+                for state, chance in zip(states, chances, strict=True)
+            ],
+            bool,
+        ),
+        ways=tuple(cameras[of_session == session] for session in np.unique(of_session)),
+    )
+
+
+def _drawn(connection: sqlite3.Connection, *, replaced: bool) -> list[KnownTree]:
+    """Return the trees that people have drawn, and those that were given before, unless others are given now."""
+    kept = (DRAWN,) if replaced else (DRAWN, GIVEN)
+    return [
+        KnownTree(tree.name, tree.place_in_map, tree.tree_id)
+        for tree in stored_trees(connection)
+        if tree.source in kept
+    ]
+
+
+def _named(connection: sqlite3.Connection, fruits: _Fruits) -> list[KnownTree]:
+    """Return the trees that sessions name, each amid its fruits."""
+    fruit_ids, others = columns_of(connection, "observations", ("fruit_id", "other_columns"))
+    names: dict[str, set[int]] = {}
+    for fruit_id, text in zip(fruit_ids, others, strict=True):
+        name = (finite_json(text) or {}).get(TREE_COLUMN, "").strip() if text else ""
+        if name:
+            names.setdefault(name, set()).add(fruit_id)
+    return [
+        KnownTree(name, fruits.positions[np.isin(fruits.ids, list(of_tree))].mean(axis=0))
+        for name, of_tree in sorted(names.items())
+    ]
