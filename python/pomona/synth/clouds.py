@@ -16,8 +16,15 @@ Readings where the description of the cells is open:
 - Of two visits that share some trees, either may be the one farther along the row.
 - Rotations are uniform, about z alone when the cell is upright; translations uniform within 20 m per axis. Both visits
   are moved. The map stays in metres; the query's unit is 1 / scale metres.
-- Diameters, where known: 70 +- 6 mm on the first visit, 12 mm more on the second, each measured to 2 mm; false points
-  have diameters of the same distribution.
+- Diameters, where known: 70 +- 6 mm on the first visit, 12 mm or a factor more on the second, each measured to 2 mm;
+  false points have diameters of the same distribution.
+- Drift moves the second visit: its ends by that share of half the row's length, along it, aside and up or down.
+- Visits from opposite sides see a fruit with a probability that is a logistic function of its depth in the row, 1/2 in
+  the middle. Noise along the line of sight is noise in depth.
+- Thinning takes whole clusters before the second visit. A frame holds the fruits nearest to one of those that the
+  second visit sees.
+- Of the fruits seen the share `doubled` is there twice, 3-5 cm apart, and as many are tried to be one with their
+  nearest.
 """
 
 from __future__ import annotations
@@ -30,9 +37,9 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.synth.disturbances import bent, in_frame, in_sight, left_after_thinning, merged, sagged, split
 from pomona.synth.false_points import false_points
 from pomona.synth.named_cells import CELLS, Cell
-from pomona.synth.planting import Row
 from pomona.synth.rotations import uniform_rotation
 from pomona.synth.scenes import draw_scene
 
@@ -108,17 +115,18 @@ def scene_pair(cell: str | Cell, seed: int) -> ScenePair:
 
     scene = draw_scene(rng, cell)
     labels = rng.permutation(len(scene.row))
-    sagged = _sagged(rng, scene.row, cell.sag_m)
+    second = bent(rng, sagged(rng, scene.row, cell.sag_m), cell.drift)
+    left = scene.in_query & left_after_thinning(rng, scene.row, cell.thinned)
     low, high = cell.scale_range or (1.0, 1.0)
     scale = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     map_visit = _visit(rng, cell, scene.row.positions, scene.in_map, labels, "m", 1.0)
-    query_visit = _visit(rng, cell, sagged, scene.in_query, labels, "q", 1.0 / scale)
+    query_visit = _visit(rng, cell, second, left, labels, "q", 1.0 / scale)
     query, map_ = query_visit.cloud, map_visit.cloud
     if cell.sizes:
         sizes_rng = np.random.Generator(np.random.PCG64([*key, 1]))
         true_m = sizes_rng.normal(_MEAN_DIAMETER_M, _DIAMETER_SIGMA_M, len(labels))
         map_ = _measured(sizes_rng, map_, true_m, 1.0)
-        query = _measured(sizes_rng, query, true_m + _GROWTH_M, 1.0 / scale)
+        query = _measured(sizes_rng, query, _grown(sizes_rng, true_m, cell), 1.0 / scale)
     return ScenePair(
         cell=cell,
         seed=seed,
@@ -131,15 +139,6 @@ def scene_pair(cell: str | Cell, seed: int) -> ScenePair:
     )
 
 
-def _sagged(rng: np.random.Generator, row: Row, sag_m: float) -> NDArray[np.float64]:
-    """Positions after branches sank and trees leaned."""
-    factor = rng.uniform(0.3, 1.0, row.branch.max(initial=-1) + 1)[row.branch]
-    azimuth = rng.uniform(0.0, 2.0 * np.pi, row.tree.max(initial=-1) + 1)[row.tree]
-    lean = rng.uniform(0.0, 0.5, row.tree.max(initial=-1) + 1)[row.tree] * row.positions[:, 2] / row.height_m
-    shift = np.stack([lean * np.cos(azimuth), lean * np.sin(azimuth), -factor * row.along_branch**2], axis=1)
-    return np.asarray(row.positions + sag_m * shift)
-
-
 def _visit(
     rng: np.random.Generator,
     cell: Cell,
@@ -149,11 +148,17 @@ def _visit(
     side: Literal["q", "m"],
     units_per_metre: float,
 ) -> SynthVisit:
-    """See the fruits `in_view`: hide, add, disturb, move, shuffle."""
+    """See the fruits `in_view`: hide, merge, split, add, disturb, move, shuffle."""
     seen = np.flatnonzero(in_view & (rng.random(len(positions)) >= cell.hidden))
-    n_false = round(cell.false_rate * len(seen))
-    places = np.concatenate([positions[seen], false_points(rng, positions[seen], n_false)])
-    places = places + rng.normal(0.0, cell.noise_m / np.sqrt(2.0), places.shape)
+    seen = seen[in_sight(rng, positions[seen], cell.fade_m, 1 if side == "q" else -1)]
+    seen = in_frame(rng, positions, seen, cell.frame if side == "q" else 0)
+    alone, fruits = merged(rng, positions[seen], cell.doubled)
+    seen, fruits = seen[alone], fruits[alone]
+    false = [split(rng, fruits, cell.doubled), false_points(rng, fruits, round(cell.false_rate * len(seen)))]
+    places = np.concatenate([fruits, *false])
+    n_false = len(places) - len(seen)
+    # The camera looks across the row: its depth is the row's.
+    places = places + rng.normal(0.0, cell.noise_m / np.sqrt(2.0), places.shape) * [1.0, cell.depth_noise, 1.0]
     order = rng.permutation(len(places))
     session_from_row = _random_pose(rng, cell, units_per_metre, mirrored=cell.mirrored and side == "q")
     ids = [f"f{labels[fruit]:05d}" for fruit in seen] + [f"{side}{number:05d}" for number in range(n_false)]
@@ -175,6 +180,14 @@ def _random_pose(
     pose[:3, :3] = units_per_metre * rotation
     pose[:3, 3] = units_per_metre * rng.uniform(-_TRANSLATION_M, _TRANSLATION_M, 3)
     return pose
+
+
+def _grown(rng: np.random.Generator, true_m: NDArray[np.float64], cell: Cell) -> NDArray[np.float64]:
+    """Diameters on the second visit."""
+    if cell.growth is None:
+        return true_m + _GROWTH_M
+    low, high = np.log(cell.growth)
+    return np.asarray(true_m * np.exp(rng.uniform(low, high, len(true_m))))
 
 
 def _measured(

@@ -37,6 +37,20 @@ class Cell:
         Both visits know the vertical: they are turned about z alone.
     sizes
         Both visits know the diameters, to 2 mm, the second after a common growth.
+    growth
+        Smallest and largest factor by which each diameter grows, log-uniform; None: 12 mm for all.
+    drift
+        Share of its length by which the second visit is stretched and bent.
+    thinned
+        Probability that a cluster is gone on the second visit.
+    fade_m
+        Depth over which sight fades, the visits looking from opposite sides; 0: both see alike.
+    depth_noise
+        Noise along the line of sight, in units of `noise_m`.
+    doubled
+        Share of the fruits that a visit has twice, and that it tries to take for one with their nearest.
+    frame
+        Fruits of the second visit that one frame shows; 0: all.
     mirrored
         The query is reflected, which no motion undoes.
     scene
@@ -59,6 +73,13 @@ class Cell:
     scale_range: tuple[float, float] | None = None
     upright: bool = False
     sizes: bool = False
+    growth: tuple[float, float] | None = None
+    drift: float = 0.0
+    thinned: float = 0.0
+    fade_m: float = 0.0
+    depth_noise: float = 1.0
+    doubled: float = 0.0
+    frame: int = 0
     mirrored: bool = False
     scene: Scene = "row"
     row: RowShape = _APPLE_ROW
@@ -204,6 +225,44 @@ PLANTING_CELLS = tuple(
 )
 """The same questions on every planting: two of five trees in common with 45 % hidden, and none."""
 
+_FRAME25 = replace(_BASE, name="frame25", frame=25)
+_FRAME25_NOOV = replace(_NOOV, name="frame25-noov", frame=25)
+
+FRAME_CELLS = (
+    replace(_BASE, name="frame12", frame=12),
+    replace(_BASE, name="frame16", frame=16),
+    _FRAME25,
+    replace(_FRAME25, name="frame25up", upright=True, seeded_as="frame25"),
+    replace(_BASE, name="frame40", frame=40),
+    replace(_BASE, name="frame40-trees1000", seen=1000, shared=1000, frame=40),
+    _FRAME25_NOOV,
+    replace(_FRAME25_NOOV, name="frame25-noovup", upright=True, seeded_as="frame25-noov"),
+)
+"""One frame of a few fruits against five trees and more."""
+
+_OPPOSITE = replace(_BASE, name="opposite25", hidden=0.1, fade_m=0.1, depth_noise=2.0)
+_OPPOSITE8 = replace(_OPPOSITE, name="opposite8", fade_m=0.03)
+_SAG = replace(_BASE, name="sag5", sag_m=0.05)
+_GROWN = replace(_O45S4, name="grown175", sizes=True, growth=(1.75, 1.75), seeded_as="o45s4")
+
+CHANGE_CELLS = (
+    _OPPOSITE,
+    replace(_OPPOSITE, name="opposite15", fade_m=0.055),
+    _OPPOSITE8,
+    replace(_OPPOSITE8, name="opposite8up", upright=True, seeded_as="opposite8"),
+    replace(_BASE, name="thinned30", thinned=0.3),
+    replace(_BASE, name="thinned70", thinned=0.7),
+    _SAG,
+    replace(_SAG, name="sag10", sag_m=0.10),
+    replace(_SAG, name="sag20", sag_m=0.20),
+    replace(_BASE, name="drift1", drift=0.01),
+    replace(_BASE, name="drift3", drift=0.03),
+    replace(_BASE, name="doubled10", doubled=0.10),
+    _GROWN,
+    replace(_GROWN, name="grownmixed", growth=(1.5, 2.0)),
+)
+"""What changes between two visits: sides, thinning, sag, drift, doubles and growth."""
+
 _CLEAN = Cell("clean", hidden=0.0, false_rate=0.0, noise_m=0.01)
 
 ADVERSARIAL_CELLS = (
@@ -217,5 +276,14 @@ ADVERSARIAL_CELLS = (
 """Symmetric, degenerate and tiny scenes: a confident wrong answer is the only failure."""
 
 CELLS: dict[str, Cell] = {
-    cell.name: cell for cell in (*PAPER_CELLS, *VARIANT_CELLS, *ROW_CELLS, *PLANTING_CELLS, *ADVERSARIAL_CELLS)
+    cell.name: cell
+    for cell in (
+        *PAPER_CELLS,
+        *VARIANT_CELLS,
+        *ROW_CELLS,
+        *PLANTING_CELLS,
+        *FRAME_CELLS,
+        *CHANGE_CELLS,
+        *ADVERSARIAL_CELLS,
+    )
 }
