@@ -21,6 +21,7 @@ __all__ = [
     "DEMO_SEED",
     "DRAWN_BOXES",
     "EXPORTS",
+    "FARM_PLAN",
     "GROWN",
     "KEPT",
     "MODEL",
@@ -290,6 +291,7 @@ SEASON = Like("a folder of a drawn season", _has_season, is_folder=True)
 CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
+FARM_PLAN = Like("a plan of a farm", lambda path: b"[recordings]" in _head(path))
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),

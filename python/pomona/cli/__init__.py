@@ -13,6 +13,7 @@ from pomona.cli import (
     detect,
     evaluate,
     export,
+    farm,
     growth,
     import_,
     info,
@@ -66,6 +67,7 @@ app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)
 app.command()(export.export)
+app.add_typer(farm.app, name="farm")
 app.command()(config.config)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(synth.app, name="synth")

@@ -60,6 +60,12 @@ def map_add(
     unit: Unit | None = typer.Option(
         None, help="Unit of the coordinates of a .csv or .ply; m also says that odd distances or diameters are right."
     ),
+    name: str | None = typer.Option(None, help="Name of the session in the map; else its own, of a cloud its file's."),
+    replace: bool = typer.Option(
+        False,
+        "--replace",
+        help="Take the place of a session of the same name that saw something else; the same one is left as it is.",
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Recognise the fruits of SESSION in ORCHARD and add it.
@@ -68,6 +74,8 @@ def map_add(
     what becomes another fruit is told. The first session starts the map; of several, one that is not found is tried
     again after the others. Exit code 0: added. 1: one was not found in the map. 2: wrong input.
     """
+    import dataclasses
+
     from pomona.cli.progress import working
     from pomona.errors import PomonaError
     from pomona.orchard import add_sessions, load_session
@@ -79,11 +87,14 @@ def map_add(
         )
     if date is not None and len(sessions) > 1:
         raise PomonaError(f"--date: found it with {len(sessions)} sessions, expected one; each has a day of its own")
+    if name is not None and len(sessions) > 1:
+        raise PomonaError(f"--name: found it with {len(sessions)} sessions, expected one; each has a name of its own")
     visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
+    visits = [visit if name is None else dataclasses.replace(visit, name=name) for visit in visits]
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {sum(len(visit.cloud) for visit in visits)} fruits to {orchard.name}"):
-        answers = add_sessions(orchard, visits, settings=settings, waiting=_waiting(orchard))
+        answers = add_sessions(orchard, visits, settings=settings, waiting=_waiting(orchard), replacing=replace)
     told = list(zip(visits, answers, strict=True))
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
@@ -201,6 +212,8 @@ def _change_as_text(change: Change) -> str:
 
 def _added_as_text(visit: Session, added: Added) -> str:
     match = added.match
+    if added.was_there:
+        return f"{visit.name}: is in the map already, the very same"
     if match is None:
         return f"{visit.name}: starts the map with {added.n_new} fruits"
     if not added.is_added:

@@ -18,6 +18,7 @@ from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, new_visit, read_evidence
 from pomona.orchard.fruit_ids import Change
 from pomona.orchard.recognising import matches_with_visits
+from pomona.orchard.removing import take_out
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
 from pomona.orchard.writing import Placement, insert_matches, insert_observations, insert_session, update_layers
@@ -52,6 +53,8 @@ class Added:
         The fruits that `match` is with: those of the map that may still hang, before the session came.
     changes : tuple of Change
         Observations of other sessions that now are of another fruit.
+    was_there : bool
+        Whether the map held the very session before, and stays as it was.
     """
 
     fruit_ids: NDArray[np.int64]
@@ -61,6 +64,7 @@ class Added:
     match: Match | None
     known: FruitCloud | None = None
     changes: tuple[Change, ...] = ()
+    was_there: bool = False
 
     @property
     def is_added(self) -> bool:
@@ -75,6 +79,7 @@ def add_session(
     settings: Settings | None = None,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
+    replacing: bool = False,
 ) -> Added:
     """Recognise a session's fruits in the map and add it; the first session starts the map.
 
@@ -94,6 +99,9 @@ def add_session(
         How long to wait for another program that is writing to the map.
     waiting : callable, optional
         Called once when it has to wait.
+    replacing : bool
+        Whether the session takes the place of one of its name that saw something else; the very same session is left
+        as it is. Both in one transaction: where the new one is not found, the old one stays.
 
     Raises
     ------
@@ -113,7 +121,18 @@ def add_session(
             pass
         except NoLinksError:
             return _start_in_place(path, session, settings, timeout_s, waiting)
-    return _add(path, session, settings, timeout_s, waiting)
+    try:
+        return _add(path, session, settings, timeout_s, waiting, replacing=replacing)
+    except _NotFoundError as refused:
+        return refused.added
+
+
+class _NotFoundError(Exception):
+    """Nothing of the transaction is kept: the session was not found in the map."""
+
+    def __init__(self, added: Added) -> None:
+        super().__init__()
+        self.added = added
 
 
 def add_sessions(
@@ -123,6 +142,7 @@ def add_sessions(
     settings: Settings | None = None,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
+    replacing: bool = False,
 ) -> list[Added]:
     """Add several sessions, each in a transaction of its own; return what became of each, in their order.
 
@@ -130,7 +150,7 @@ def add_sessions(
 
     Parameters
     ----------
-    path, settings, timeout_s, waiting
+    path, settings, timeout_s, waiting, replacing
         As for `add_session`.
     sessions : sequence of Session
         The visits to add.
@@ -145,7 +165,12 @@ def add_sessions(
     while waiting_for_others:
         for number in waiting_for_others:
             answers[number] = add_session(
-                path, sessions[number], settings=settings, timeout_s=timeout_s, waiting=waiting
+                path,
+                sessions[number],
+                settings=settings,
+                timeout_s=timeout_s,
+                waiting=waiting,
+                replacing=replacing,
             )
         refused = [number for number in waiting_for_others if not answers[number].is_added]
         if len(refused) == len(waiting_for_others):
@@ -175,6 +200,7 @@ def _add(
     waiting: Waiting | None,
     *,
     create: bool = False,
+    replacing: bool = False,
 ) -> Added:
     # A file of no bytes is what a killed start leaves where a map cannot appear whole.
     create = create or path.stat().st_size == 0
@@ -182,6 +208,11 @@ def _add(
         if is_blank:
             return _start(connection, session)
         last_ids(connection)
+        if replacing:
+            if _holds(connection, session):
+                return _there_already(connection, session)
+            if not take_out(connection, session.name):
+                return _join(connection, session, Evidence((), ()), {})
         _require_new(connection, session)
         settings = settings or Settings.load(None, {})
         known = _worth_recognising(fruits_in_map(connection, FruitCloud))
@@ -189,7 +220,7 @@ def _add(
             raise WrongContentError("has sessions and no fruits, expected at least one")
         found = settings.match(session.cloud, known)
         if found.status.value != "Found":
-            return Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found, known)
+            raise _NotFoundError(Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, found, known))
         evidence = read_evidence(connection)
         ids = np.array(known.ids, np.int64)
         matches = matches_with_visits(evidence, new_visit(session), found, ids, settings)
@@ -262,6 +293,24 @@ def _told(settlement: Settlement, own: int) -> Added:
         match=None,
         changes=tuple(settlement.changes),
     )
+
+
+def _holds(connection: sqlite3.Connection, session: Session) -> bool:
+    """Tell whether the map has the very session: by its name, its day and what it saw."""
+    there = zip(*columns_of(connection, "sessions", ("name", "date", "content_sha256")), strict=True)
+    return (session.name, session.date, session.content_sha256) in there
+
+
+def _there_already(connection: sqlite3.Connection, session: Session) -> Added:
+    """Say what the map knows of a session that it holds."""
+    rows = connection.execute(
+        """SELECT fruit_id, n_sessions FROM observations JOIN fruits ON fruits.id = fruit_id
+        WHERE session_id = (SELECT id FROM sessions WHERE name = ?) ORDER BY observations.id""",
+        (session.name,),
+    ).fetchall()
+    n_matched = sum(n_sessions > 1 for _, n_sessions in rows)
+    ids = np.array([fruit_id for fruit_id, _ in rows], np.int64)
+    return Added(ids, n_matched, len(rows) - n_matched, 0, None, was_there=True)
 
 
 def _require_new(connection: sqlite3.Connection, session: Session) -> None:
