@@ -209,7 +209,7 @@ def test_check_names_the_cell(orchard: Path, script: str, line: str) -> None:
         ),
         ("UPDATE sessions SET configuration = '[]'", "sessions 1: configuration: found '[]', expected a JSON object"),
         ("DELETE FROM sessions", "is a session file with 0 sessions, expected 1"),
-        ("INSERT INTO pomona_format VALUES (2, 1, 'map', '')", "has format None and kind None, expected 1 to 2 and"),
+        ("INSERT INTO pomona_format VALUES (2, 1, 'map', '')", "has format None and kind None, expected 1 to 3 and"),
     ],
 )
 def test_a_session_that_cannot_be_is_refused(session: Path, script: str, line: str) -> None:

@@ -1,14 +1,16 @@
-"""Files of format 1, written by the program of then, are read as they are and brought up to date when written."""
+"""Files of formats 1 and 2, written by the programs of then, are read as they are, brought up to date when written."""
 
 import gzip
 import sqlite3
 from pathlib import Path
 
 import numpy as np
+import pyogrio
 import pytest
 
-from pomona import FruitCloud, geopackage
+from pomona import FruitCloud, PomonaError, geopackage
 from pomona.orchard import (
+    FORMAT_VERSION,
     Observations,
     OrchardMap,
     Session,
@@ -23,9 +25,9 @@ MAPS = Path(__file__).parents[1] / "testdata" / "maps"
 VISITS = [("2024-06-01", 50, 0), ("2024-07-01", 54, 54), ("2024-08-01", 58, 48)]
 
 
-def unpacked(kind: str, folder: Path) -> Path:
+def unpacked(kind: str, folder: Path, version: int = 1) -> Path:
     path = folder / f"{kind}.gpkg"
-    path.write_bytes(gzip.decompress((MAPS / f"version_1_{kind}.gpkg.gz").read_bytes()))
+    path.write_bytes(gzip.decompress((MAPS / f"version_{version}_{kind}.gpkg.gz").read_bytes()))
     return path
 
 
@@ -33,6 +35,12 @@ def unpacked(kind: str, folder: Path) -> Path:
 def orchard(tmp_path: Path) -> Path:
     """Three visits to 60 fruits, the one of July added last."""
     return unpacked("map", tmp_path)
+
+
+@pytest.fixture
+def orchard_2(tmp_path: Path) -> Path:
+    """Three visits to 40 fruits on three trees, the one of July added last."""
+    return unpacked("map", tmp_path, 2)
 
 
 def asked(path: Path, question: str) -> list[tuple[object, ...]]:
@@ -78,7 +86,7 @@ def test_a_writer_brings_it_up_to_date(orchard: Path) -> None:
     before = OrchardMap(orchard).observations()
     added = add_session(orchard, next_visit(orchard))
     assert added.is_added
-    assert asked(orchard, "SELECT format_version FROM pomona_format") == [(2,)]
+    assert asked(orchard, "SELECT format_version FROM pomona_format") == [(FORMAT_VERSION,)]
     assert asked(orchard, "SELECT count(*) FROM matches") == [(6,)]
     after = OrchardMap(orchard).observations()
     # No evidence has come against an identity of then.
@@ -123,3 +131,103 @@ def test_a_refused_session_leaves_the_old_format_or_the_new_one_whole(orchard: P
     assert not add_session(orchard, Session("elsewhere", "2024-09-01", "test", elsewhere)).is_added
     assert problems(orchard) == []
     assert [(visit.name, visit.n_fruits, visit.n_matched) for visit in OrchardMap(orchard).visits()] == VISITS
+
+
+# Format 2: identities and states as they are, but no crops, no georeference, and trees that only people drew.
+
+
+def rewritten(path: Path) -> None:
+    """Bring a map up to date: whatever is written does it first."""
+    assert remove_session(path, "2024-08-01", dry=True) is not None
+
+
+def test_format_2_is_read_as_it_is(orchard_2: Path, tmp_path: Path) -> None:
+    before = orchard_2.read_bytes()
+    assert [(visit.name, visit.n_fruits) for visit in OrchardMap(orchard_2).visits()] == [
+        ("2024-06-01", 34),
+        ("2024-07-01", 36),
+        ("2024-08-01", 32),
+    ]
+    assert problems(orchard_2) == []
+    assert orchard_2.read_bytes() == before
+    session = read_session(unpacked("session", tmp_path, 2))
+    assert (len(session.cloud), session.trajectory is not None) == (34, True)
+
+
+def test_format_2_comes_up_to_date_with_all_it_has(orchard_2: Path) -> None:
+    wanted = "SELECT id, hex(geom), state, last_seen, n_missed, diameter_m, state_probability FROM fruits ORDER BY id"
+    before = (
+        asked(orchard_2, wanted),
+        asked(orchard_2, "SELECT * FROM matches"),
+        asked(orchard_2, "SELECT * FROM poses"),
+    )
+    rewritten(orchard_2)
+    after = asked(orchard_2, wanted), asked(orchard_2, "SELECT * FROM matches"), asked(orchard_2, "SELECT * FROM poses")
+    assert after == before
+    assert asked(orchard_2, "SELECT format_version FROM pomona_format") == [(FORMAT_VERSION,)]
+    assert asked(orchard_2, "SELECT count(*) FROM rtree_fruits_geom") == asked(orchard_2, "SELECT count(*) FROM fruits")
+    for table in ("crops", "georeference", "control_points", "fruits_wgs84", "trees_wgs84"):
+        assert asked(orchard_2, f"SELECT count(*) FROM {table}") == [(0,)]
+    assert problems(orchard_2) == []
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_an_older_file_becomes_word_for_word_a_new_one(tmp_path: Path, version: int) -> None:
+    new, old = tmp_path / "new.gpkg", unpacked("map", tmp_path, version)
+    add_session(new, load_session(unpacked("session", tmp_path, version)))
+    rewritten(old)
+    tables = "SELECT type, name, tbl_name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%' ORDER BY type, name"
+    assert asked(old, tables) == asked(new, tables)
+    layers = "SELECT table_name, data_type, description, srs_id FROM gpkg_contents ORDER BY table_name"
+    assert asked(old, layers) == asked(new, layers)
+    assert dict(pyogrio.list_layers(old).tolist()) == dict(pyogrio.list_layers(new).tolist())
+
+
+def test_drawn_trees_keep_what_people_wrote(orchard_2: Path) -> None:
+    connection = geopackage.connect(orchard_2)
+    geopackage.execute_all(
+        connection,
+        """ALTER TABLE trees ADD COLUMN planted INTEGER;
+        ALTER TABLE trees ADD COLUMN number INTEGER;
+        INSERT INTO rows (id, name) VALUES (4, 'north');
+        INSERT INTO trees (id, name, row_id, planted, number) VALUES (9, 'T9', 4, 2015, 3);
+        UPDATE fruits SET tree_id = 9 WHERE id = 5;
+        """,
+    )
+    connection.close()
+    rewritten(orchard_2)
+    assert asked(orchard_2, "SELECT id, name, row_id, planted, number, source FROM trees") == [
+        (9, "T9", 4, 2015, 3, None)
+    ]
+    assert asked(orchard_2, "SELECT id FROM fruits WHERE tree_id = 9") == [(5,)]
+    assert problems(orchard_2) == []
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        "CREATE TABLE Crops (a TEXT)",
+        "CREATE VIEW fruit_series AS SELECT 1",
+        "CREATE INDEX fruits_by_tree ON trees (name)",
+    ],
+)
+def test_a_name_that_is_taken_is_told(orchard_2: Path, own: str) -> None:
+    with sqlite3.connect(orchard_2) as connection:
+        connection.execute(own)
+    connection.close()
+    before = orchard_2.read_bytes()
+    with pytest.raises(PomonaError, match=r"that is not Pomona's, and format 3 needs the name: rename it$"):
+        OrchardMap(orchard_2).fruits()
+    with pytest.raises(PomonaError, match=r"rename it$"):
+        rewritten(orchard_2)
+    assert orchard_2.read_bytes() == before
+
+
+def test_styles_that_people_made_stay(orchard_2: Path) -> None:
+    with sqlite3.connect(orchard_2) as connection:
+        connection.execute("CREATE TABLE layer_styles (id INTEGER PRIMARY KEY, styleQML TEXT)")
+        connection.execute("INSERT INTO layer_styles VALUES (1, 'mine')")
+    connection.close()
+    rewritten(orchard_2)
+    assert asked(orchard_2, "SELECT * FROM layer_styles") == [(1, "mine")]
+    assert problems(orchard_2) == []

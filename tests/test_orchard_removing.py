@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pomona import FruitCloud, PomonaError, Views
+from pomona import FruitCloud, PomonaError, Views, geopackage
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.synth.clouds import scene_pair
 from pomona.trajectory import Trajectory
@@ -104,3 +104,37 @@ def test_nobody_and_a_look_change_nothing(season: Path) -> None:
     told = remove_session(season, DATES[1], dry=True)
     assert season.read_bytes() == before
     assert remove_session(season, DATES[1]) == told
+
+
+def add_crops(path: Path, picture: bytes) -> None:
+    """Give every observation a picture."""
+    connection = geopackage.connect(path)
+    connection.execute(
+        "INSERT INTO crops (session_id, observation_id, frame, picture) SELECT session_id, id, 0, ? FROM observations",
+        (picture,),
+    )
+    connection.close()
+
+
+def count_crops(path: Path) -> int:
+    connection = geopackage.connect(path)
+    (count,) = connection.execute("SELECT count(*) FROM crops").fetchone()
+    connection.close()
+    return int(count)
+
+
+def test_pictures_go_with_their_session(season: Path) -> None:
+    add_crops(season, b"RIFF\0\0\0\0WEBP")
+    assert problems(season) == []
+    before = count_crops(season)
+    removed = remove_session(season, DATES[1])
+    assert removed is not None
+    assert count_crops(season) == before - removed.n_observations
+    assert problems(season) == []
+
+
+def test_what_is_no_picture_is_told(season: Path) -> None:
+    add_crops(season, b"<svg onload='alert(1)'/>")
+    told = problems(season)
+    assert len(told) == count_crops(season)
+    assert told[0].startswith("crops 1: picture: found b\"<svg onload='alert(1)'/>\", expected a WebP or JPEG picture")

@@ -124,6 +124,13 @@ def test_gdal_opens_every_layer(session_file: Path, full_cloud: FruitCloud, traj
         "sightings": None,
         "matches": None,
         "changes": None,
+        "crops": None,
+        "georeference": None,
+        "control_points": "Point Z",
+        "fruits_wgs84": "Point Z",
+        "trees_wgs84": "Point Z",
+        "fruit_series": "Point Z",
+        "layer_styles": None,
         "pomona_format": None,
     }
     np.testing.assert_array_equal(points(session_file, "fruits"), full_cloud.positions)
@@ -180,14 +187,14 @@ def refusal(path: Path) -> str:
 
 
 def test_a_newer_format_is_refused(session_file: Path) -> None:
-    change(session_file, "UPDATE pomona_format SET format_version = 3")
-    assert refusal(session_file) == "has format 3, this program reads up to 2: update pomona"
+    change(session_file, "UPDATE pomona_format SET format_version = 4")
+    assert refusal(session_file) == "has format 4, this program reads up to 3: update pomona"
 
 
 @pytest.mark.parametrize("wrong", ["format_version = 0", "kind = 'tree'"])
 def test_a_format_that_never_was_is_refused(session_file: Path, wrong: str) -> None:
     change(session_file, f"UPDATE pomona_format SET {wrong}")
-    assert "expected 1 to 2 and 'session' or 'map'" in refusal(session_file)
+    assert "expected 1 to 3 and 'session' or 'map'" in refusal(session_file)
 
 
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:

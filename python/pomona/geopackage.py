@@ -25,6 +25,7 @@ __all__ = [
     "add_functions",
     "add_index_triggers",
     "add_table",
+    "add_view",
     "are_points",
     "connect",
     "create",
@@ -40,6 +41,8 @@ LOCAL_METRES = 'LOCAL_CS["local metres",UNIT["metre",1]]'
 """A frame without a place on Earth, as well-known text."""
 
 UNDEFINED_CARTESIAN = -1
+WGS84 = 4326
+"""Reference systems by their number in a GeoPackage."""
 
 LITTLE_ENDIAN = 1
 WKB_POINT_Z = 1001
@@ -153,26 +156,43 @@ def add_table(connection: sqlite3.Connection, name: str, columns: str, descripti
         SQL of the columns after ``id`` and ``geom``.
     description : str
         One line that other programs show.
-    geometry : {"", "POINT", "LINESTRING"}
-        Type of the three-dimensional geometry ``geom``; nothing for a table without.
+    geometry : {"", "POINT", "LINESTRING", "POINT WGS84"}
+        Type of the three-dimensional geometry ``geom``; nothing for a table without. In local metres, or else in
+        degrees.
     """
-    columns = f"geom {geometry}, {columns}" if geometry else columns
+    kind, srs_id = _kind_and_system(geometry)
+    columns = f"geom {kind}, {columns}" if geometry else columns
     # AUTOINCREMENT: a number is never given out a second time, even after its row was deleted.
     connection.execute(f"CREATE TABLE {name} (id INTEGER PRIMARY KEY AUTOINCREMENT, {columns})")
-    connection.execute(
-        "INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id) VALUES (?, ?, ?, ?, ?)",
-        (name, "features" if geometry else "attributes", name, description, UNDEFINED_CARTESIAN if geometry else None),
-    )
+    _register(connection, name, description, kind, srs_id)
     if geometry:
-        connection.execute(
-            "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', ?, ?, 1, 0)", (name, geometry, UNDEFINED_CARTESIAN)
-        )
         connection.execute(
             "INSERT INTO gpkg_extensions VALUES (?, 'geom', 'gpkg_rtree_index', ?, 'write-only')",
             (name, "http://www.geopackage.org/spec120/#extension_rtree"),
         )
         connection.execute(RTREE.format(t=name))
         add_index_triggers(connection, name)
+
+
+def add_view(connection: sqlite3.Connection, name: str, query: str, description: str, geometry: str) -> None:
+    """Add a layer that shows what a query gives, with the column ``OGC_FID`` for its rows' numbers and ``geom``."""
+    connection.execute(f"CREATE VIEW {name} AS {query}")
+    _register(connection, name, description, *_kind_and_system(geometry))
+
+
+def _kind_and_system(geometry: str) -> tuple[str, int]:
+    kind, _, system = geometry.partition(" ")
+    return kind, WGS84 if system else UNDEFINED_CARTESIAN
+
+
+def _register(connection: sqlite3.Connection, name: str, description: str, kind: str, srs_id: int) -> None:
+    """Tell other programs of a layer."""
+    connection.execute(
+        "INSERT INTO gpkg_contents (table_name, data_type, identifier, description, srs_id) VALUES (?, ?, ?, ?, ?)",
+        (name, "features" if kind else "attributes", name, description, srs_id if kind else None),
+    )
+    if kind:
+        connection.execute("INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', ?, ?, 1, 0)", (name, kind, srs_id))
 
 
 def add_index_triggers(connection: sqlite3.Connection, name: str) -> None:
@@ -182,9 +202,9 @@ def add_index_triggers(connection: sqlite3.Connection, name: str) -> None:
 
 def touch(connection: sqlite3.Connection, name: str, last_change: str) -> None:
     """Bring the extent and the time of a layer in the contents up to date; `last_change` is ISO 8601, UTC."""
-    has_geometry = connection.execute("SELECT 1 FROM gpkg_geometry_columns WHERE table_name = ?", (name,)).fetchone()
+    has_index = connection.execute("SELECT 1 FROM gpkg_extensions WHERE table_name = ?", (name,)).fetchone()
     extent: tuple[float | None, ...] = (None, None, None, None)
-    if has_geometry:
+    if has_index:
         extent = connection.execute(
             f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM rtree_{name}_geom"
         ).fetchone()

@@ -17,6 +17,7 @@ from pomona.store.rows import columns_of
 __all__ = ["Removed", "remove_session", "take_out"]
 
 PARTS = (
+    "DELETE FROM crops WHERE session_id = :session",
     "DELETE FROM sightings WHERE observation_id IN (SELECT id FROM observations WHERE session_id = :session)",
     "DELETE FROM observations WHERE session_id = :session",
     "DELETE FROM poses WHERE session_id = :session",

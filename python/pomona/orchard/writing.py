@@ -210,7 +210,7 @@ def update_layers(connection: sqlite3.Connection) -> None:
     """Bring extents and times up to date; the time is the newest visit's: the same input gives the same file."""
     (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
     day, _, time = newest.partition("T")
-    for name in ("pomona_format", *(layer[0] for layer in schema.LAYERS)):
+    for name in ("pomona_format", *(layer[0] for layer in (*schema.LAYERS, *schema.VIEWS))):
         geopackage.touch(connection, name, f"{day}T{time[:8] or '00:00:00'}.000Z")
 
 

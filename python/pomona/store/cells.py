@@ -19,6 +19,9 @@ __all__ = ["COLUMNS", "CellKind", "finite_json", "similarity"]
 RIGID_TOLERANCE = 1e-6
 """How far the axes of a transform may be from right angles and one length; rounding is at 1e-15."""
 
+MOST_PICTURE_BYTES = 1 << 20
+"""Of one fruit on one date; those that Pomona keeps have a few thousand bytes."""
+
 
 @dataclass(frozen=True)
 class CellKind:
@@ -128,6 +131,14 @@ def _are_places(blobs: Sequence[bytes]) -> bool:
     return geopackage.are_points(blobs) and bool(np.abs(geopackage.points_of(blobs)).max() <= FARTHEST_M)
 
 
+def _are_pictures(blobs: Sequence[bytes]) -> bool:
+    return all(
+        len(blob) <= MOST_PICTURE_BYTES
+        and (blob.startswith(b"\xff\xd8\xff") or (blob.startswith(b"RIFF") and blob[8:12] == b"WEBP"))
+        for blob in blobs
+    )
+
+
 def _are_pairs(value: object) -> bool:
     """Tell whether these are rows of two ids and a probability."""
     return isinstance(value, list) and all(
@@ -150,6 +161,10 @@ HASHES = _json("a JSON object of texts", _texts_by_name)
 TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
 PAIRS = _json("a JSON list of [observation id, observation id, probability]", _are_pairs)
 POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
+PICTURE = CellKind("a WebP or JPEG picture of at most 1 MiB", bytes, _are_pictures)
+LONGITUDE = _number("degrees from -180 to 180", -180.0, 180.0)
+LATITUDE = _number("degrees from -90 to 90", -90.0, 90.0)
+HEIGHT = _number("metres above the ellipsoid", -12_000.0, 9_000.0)
 FINITE = _number("a finite number", -np.finfo(float).max, np.finfo(float).max)
 SQUARE = _number("square metres", -(FARTHEST_M**2), FARTHEST_M**2)
 NUMBER = _number("a number", -np.inf, np.inf)
@@ -186,6 +201,28 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
         "diameter_m": _or_null(DIAMETER),
         "state_probability": _or_null(SHARE),
         "fruit_probability": _or_null(SHARE),
+        "tree_id": _or_null(ID),
+        "tree_probability": _or_null(SHARE),
+        "growth_mm_per_day": _or_null(FINITE),
+    },
+    "trees": {
+        "id": ID,
+        "geom": _or_null(POINT),
+        "name": _or_null(TEXT),
+        "row_id": _or_null(ID),
+        "number": _or_null(WHOLE),
+        "along_m": _or_null(FINITE),
+        "kind": _or_null(TEXT),
+        "source": _or_null(TEXT),
+        "n_fruits": _or_null(COUNT),
+    },
+    "rows": {
+        "id": ID,
+        "name": _or_null(TEXT),
+        "number": _or_null(WHOLE),
+        "source": _or_null(TEXT),
+        "spacing_m": _or_null(LENGTH),
+        "spacing_log_odds": _or_null(NUMBER),
     },
     "observations": {
         "id": ID,
@@ -219,12 +256,36 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
     },
     "changes": {
         "id": ID,
-        "cause": _one_of("added", "removed"),
+        "cause": _one_of("added", "removed", "merged"),
         "session": NAME,
         "event": _one_of("joined", "split", "moved"),
         "from_fruit_id": ID,
         "to_fruit_id": ID,
         "n_observations": ID,
     },
+    "crops": {"id": ID, "session_id": ID, "observation_id": ID, "frame": WHOLE, "picture": PICTURE},
+    "georeference": {
+        "id": ID,
+        "enu_from_map": TRANSFORM,
+        "longitude_deg": LONGITUDE,
+        "latitude_deg": LATITUDE,
+        "height_m": _or_null(HEIGHT),
+        "source": _one_of("points", "trajectory"),
+        "n_points": ID,
+        "rms_m": LENGTH,
+    },
+    "control_points": {
+        "id": ID,
+        "geom": POINT,
+        "name": NAME,
+        "longitude_deg": LONGITUDE,
+        "latitude_deg": LATITUDE,
+        "height_m": _or_null(HEIGHT),
+        "session": _or_null(NAME),
+        "frame": _or_null(WHOLE),
+        "east_off_m": FINITE,
+        "north_off_m": FINITE,
+        "up_off_m": _or_null(FINITE),
+    },
 }
-"""The columns that Pomona reads, and what they may hold; the layers `trees` and `rows` are the user's."""
+"""The columns that Pomona reads, and what they may hold."""

@@ -1,11 +1,11 @@
-"""Files of format 1 brought up to date: nothing is lost, and the user's own columns and indexes stay."""
+"""Files of formats 1 and 2 brought up to date: nothing is lost, and the user's own columns and indexes stay."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,13 +13,21 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.store.cells import finite_json
+from pomona.store.failures import WrongContentError
+from pomona.store.older_layers import INDEXES_OF_VERSION_2, layers_of
 from pomona.store.rows import columns_of
-from pomona.store.schema import FORMAT_VERSION, LAYERS, SINCE_VERSION_2
+from pomona.store.schema import FORMAT_VERSION, INDEXES, LAYERS, VIEWS, add_styles
 
 __all__ = ["migrate", "migrated_copy"]
 
-KEPT = "id, geom, state, last_seen, last_session_id, n_sessions, n_missed, diameter_m, tree_id"
-"""Columns of `fruits` in format 1; what is not among them is the user's."""
+ANEW = "pomona_anew"
+"""A table on its way, of which nothing is seen outside the transaction."""
+
+NEW_INDEXES = {
+    statement.split()[2]: statement
+    for statement in INDEXES.strip().splitlines()
+    if statement not in INDEXES_OF_VERSION_2
+}
 
 COMMON = """
 SELECT one.id, other.id, min(coalesce(one.match_probability, 1.0), coalesce(other.match_probability, 1.0))
@@ -47,40 +55,76 @@ def migrated_copy(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection
 
 
 def migrate(connection: sqlite3.Connection) -> None:
-    """Make a file of format 1 one of this, inside the open transaction; foreign keys are off."""
-    layers = {name: layer for name, *layer in LAYERS}
-    for name in SINCE_VERSION_2:
-        geometry, columns, description = layers[name]
-        geopackage.add_table(connection, name, columns, description, geometry)
-    _lay_fruits_out_anew(connection, layers["fruits"][1])
-    _tell_matches(connection)
+    """Make an older file one of this format, inside the open transaction; foreign keys are off.
+
+    Raises
+    ------
+    WrongContentError
+        When somebody's own table has the name of one that is needed.
+    """
+    (version,) = connection.execute("SELECT format_version FROM pomona_format").fetchone()
+    older = {name: columns for name, _, columns, _ in layers_of(version)}
+    _require_free(connection, [name for name, *_ in (*LAYERS, *VIEWS) if name not in older])
+    _require_free(connection, NEW_INDEXES)
+    for name, geometry, columns, description in LAYERS:
+        if name not in older:
+            geopackage.add_table(connection, name, columns, description, geometry)
+        elif older[name] != columns:
+            _lay_out_anew(connection, name, geometry, columns)
+            connection.execute("UPDATE gpkg_contents SET description = ? WHERE table_name = ?", (description, name))
+    for name, geometry, query, description in VIEWS:
+        geopackage.add_view(connection, name, query, description, geometry)
+    for statement in NEW_INDEXES.values():
+        connection.execute(statement)
+    add_styles(connection)
+    if "matches" not in older:
+        _tell_matches(connection)
     connection.execute("UPDATE pomona_format SET format_version = ?", (FORMAT_VERSION,))
 
 
-def _lay_fruits_out_anew(connection: sqlite3.Connection, columns: str) -> None:
-    """Replace the table, whose states were fewer: SQLite cannot change the check of a column."""
-    own = [
-        (f'"{name}"', kind)
-        for _, name, kind, *_ in connection.execute("PRAGMA table_info(fruits)")
-        if name not in KEPT.split(", ")
-    ]
-    indexes = connection.execute(
-        "SELECT sql FROM sqlite_master WHERE type = 'index' AND tbl_name = 'fruits'"
-    ).fetchall()
-    given_out = connection.execute("SELECT seq FROM sqlite_sequence WHERE name = 'fruits'").fetchall()
-    added = "".join(f", {name} {kind}" for name, kind in own)
-    kept = ", ".join([KEPT, *(name for name, _ in own)])
-    connection.execute(f"CREATE TABLE fruits_anew (id INTEGER PRIMARY KEY AUTOINCREMENT, geom POINT, {columns}{added})")
-    connection.execute(f"INSERT INTO fruits_anew ({kept}) SELECT {kept} FROM fruits")
-    connection.execute("DROP TABLE fruits")
-    connection.execute("ALTER TABLE fruits_anew RENAME TO fruits")
-    geopackage.add_index_triggers(connection, "fruits")
-    for (sql,) in indexes:
-        if sql is not None:
-            connection.execute(sql)
-    # An id is never given out again, even that of a fruit that is no longer there.
-    connection.execute("DELETE FROM sqlite_sequence WHERE name = 'fruits'")
-    connection.executemany("INSERT INTO sqlite_sequence (name, seq) VALUES ('fruits', ?)", given_out)
+def _require_free(connection: sqlite3.Connection, names: Iterable[str]) -> None:
+    theirs = {name.lower() for (name,) in connection.execute("SELECT name FROM sqlite_master")}
+    for name in names:
+        if name in theirs:
+            raise WrongContentError(
+                f"has a table or an index {name} that is not Pomona's, and format {FORMAT_VERSION} needs the name: "
+                "rename it"
+            )
+
+
+def _lay_out_anew(connection: sqlite3.Connection, name: str, geometry: str, columns: str) -> None:
+    """Replace a table: SQLite cannot change the check of a column, nor put one before those that people added.
+
+    A column of theirs that is called as a new one of ours becomes ours.
+    """
+    connection.execute(f"CREATE TABLE {ANEW} (id INTEGER PRIMARY KEY AUTOINCREMENT, {_with_place(geometry, columns)})")
+    ours = {column for column, _ in _columns(connection, ANEW)}
+    for column, kind in _columns(connection, name):
+        if column.lower() not in ours:
+            connection.execute(f'ALTER TABLE {ANEW} ADD COLUMN "{column}" {kind}')
+    indexes = connection.execute("SELECT sql FROM sqlite_master WHERE type = 'index' AND tbl_name = ?", (name,))
+    indexes_again = [sql for (sql,) in indexes if sql is not None]
+    given_out = connection.execute("SELECT seq FROM sqlite_sequence WHERE name = ?", (name,)).fetchall()
+    kept = ", ".join(f'"{column}"' for column, _ in _columns(connection, name))
+    connection.execute(f"INSERT INTO {ANEW} ({kept}) SELECT {kept} FROM {name}")
+    connection.execute(f"DROP TABLE {name}")
+    connection.execute(f"ALTER TABLE {ANEW} RENAME TO {name}")
+    if geometry:
+        geopackage.add_index_triggers(connection, name)
+    for sql in indexes_again:
+        connection.execute(sql)
+    # An id is never given out again, even that of a row that is no longer there.
+    connection.execute("DELETE FROM sqlite_sequence WHERE name = ?", (name,))
+    connection.executemany(f"INSERT INTO sqlite_sequence (name, seq) VALUES ('{name}', ?)", given_out)
+
+
+def _with_place(geometry: str, columns: str) -> str:
+    return f"geom {geometry}, {columns}" if geometry else columns
+
+
+def _columns(connection: sqlite3.Connection, table: str) -> list[tuple[str, str]]:
+    """Return name and type of each column."""
+    return [(name, kind) for _, name, kind, *_ in connection.execute(f"PRAGMA table_info({table})")]
 
 
 def _tell_matches(connection: sqlite3.Connection) -> None:

@@ -39,7 +39,11 @@ def columns_of(connection: sqlite3.Connection, table: str, names: Sequence[str],
     WrongContentError
         With the first wrong cell: table, id, column, what was found and what was expected.
     """
-    ids, *columns = _fetched(connection, table, ("id", *names), which)
+    read: list[list[Any]] = [[] for _ in ("id", *names)]
+    for part in _fetched(connection, table, ("id", *names), which):
+        for column, cells in zip(read, part, strict=True):
+            column.extend(cells)
+    ids, *columns = read
     for name, cells in zip(("id", *names), (ids, *columns), strict=True):
         for line in _misfits(table, name, ids, cells):
             raise WrongContentError(line)
@@ -48,9 +52,11 @@ def columns_of(connection: sqlite3.Connection, table: str, names: Sequence[str],
 
 def misfits(connection: sqlite3.Connection, table: str) -> list[str]:
     """Return a line for every wrong cell of a table."""
-    ids, *columns = _fetched(connection, table, ("id", *COLUMNS[table]), "")
     return [
-        line for name, cells in zip(COLUMNS[table], columns, strict=True) for line in _misfits(table, name, ids, cells)
+        line
+        for ids, *columns in _fetched(connection, table, ("id", *COLUMNS[table]), "")
+        for name, cells in zip(COLUMNS[table], columns, strict=True)
+        for line in _misfits(table, name, ids, cells)
     ]
 
 
@@ -60,20 +66,19 @@ def _misfits(table: str, name: str, ids: Sequence[object], cells: Sequence[objec
         yield f"{table} {_shown(ids[row])}: {name}: found {_shown(cells[row])}, expected {kind.expected}"
 
 
-def _fetched(connection: sqlite3.Connection, table: str, names: Sequence[str], which: str) -> list[list[Any]]:
-    """Return columns as they are, no more than the file holds: damaged pages can give the same rows without end."""
+def _fetched(
+    connection: sqlite3.Connection, table: str, names: Sequence[str], which: str
+) -> Iterator[list[Sequence[Any]]]:
+    """Give columns as they are, part by part, no more than the file holds: damaged pages can give rows without end."""
     left = _size_bytes(connection)
     wanted = ", ".join(f"{table}.{name}" for name in names)
     cursor = connection.execute(f"SELECT {wanted} FROM {table} {which or f'ORDER BY {table}.id'}")
-    columns: list[list[Any]] = [[] for _ in names]
     while rows := cursor.fetchmany(ROWS_AT_ONCE):
-        for column, cells in zip(columns, zip(*rows, strict=True), strict=True):
-            column.extend(cells)
-            left -= _length(cells)
-        left -= LEAST_ROW_BYTES * len(rows)
+        part: list[Sequence[Any]] = list(zip(*rows, strict=True))
+        left -= LEAST_ROW_BYTES * len(rows) + sum(map(_length, part))
         if left < 0:
             raise WrongContentError(f"{table}: gives more rows than the file can hold: it is damaged, or was made to")
-    return columns
+        yield part
 
 
 def _length(cells: Sequence[Any]) -> int:

@@ -15,14 +15,15 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from pomona import geopackage
-from pomona.store import schema
+from pomona.store import older_layers, schema
 from pomona.store.failures import WrongContentError
 from pomona.store.sql_text import is_column_list, made, names_in, words_of
 
 __all__ = ["Item", "expected", "items_of", "require_item", "require_ours"]
 
-NOT_OURS_ALONE = "gpkg_spatial_ref_sys"
-"""Pomona neither reads nor writes it, and GDAL makes it anew where a layer's reference system asks for a new column."""
+NOT_OURS_ALONE = frozenset(("gpkg_spatial_ref_sys", "layer_styles"))
+"""Pomona does not read them. GDAL makes the one anew where a layer's reference system asks for a new column; the other
+is QGIS's."""
 
 EXTENSIBLE = frozenset(name for name, *_ in schema.LAYERS)
 """Layers to which people add columns in QGIS."""
@@ -50,10 +51,13 @@ def expected(version: int = schema.FORMAT_VERSION) -> Mapping[tuple[str, str], I
     """Return what a file of ours has, by kind and name: made by the code that makes files."""
     connection = sqlite3.connect(":memory:")
     geopackage.add_functions(connection)
-    schema.create(connection, "map", version)
+    if version == schema.FORMAT_VERSION:
+        schema.create(connection, "map")
+    else:
+        older_layers.create_older(connection, version)
     items = {(item.kind, item.name): item for item in items_of(connection)}
     connection.close()
-    return {key: item for key, item in items.items() if item.table != NOT_OURS_ALONE}
+    return {key: item for key, item in items.items() if item.table not in NOT_OURS_ALONE}
 
 
 def items_of(connection: sqlite3.Connection) -> list[Item]:
