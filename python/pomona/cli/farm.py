@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from pomona.farm import FarmPlan, FarmRun, Fate, Step
     from pomona.farm.executor import Executor
     from pomona.farm.farm_plan import Flag
-    from pomona.farm.ledger import Ledger
+    from pomona.farm.ledger import Ledger, Line
     from pomona.farm.step_keys import Keys
 
 app = Verbs(help="Do all rows and dates of a farm, by a plan.", no_args_is_help=True)
@@ -28,7 +29,10 @@ GIVEN_BY_THE_FARM = {"output", "json", "name", "date", "keep", "preview", "force
 
 plan_argument = typer.Argument(metavar="FARM.toml", help="The plan, as `pomona farm init` writes it.")
 
+VERBS = ("scan", "map", "growth", "report", "export")
 MARKS = {"done": "+", "kept": "+", "incomplete": "~", "failed": "x", "blocked": "-", "waiting": ".", "running": ">"}
+
+LEGEND = "+ done, ~ some not found in the map, x failed, - needs what failed, > runs, . to do"
 
 
 @app.callback()
@@ -61,7 +65,9 @@ def farm_init(
 def farm_run(
     plan: Path = plan_argument,
     workers: int | None = typer.Option(None, min=1, help="Steps at once on this machine; as many as it has cores."),
-    ray: str | None = typer.Option(None, metavar="ADDRESS", help="Run on a Ray cluster instead: its address, or local."),
+    ray: str | None = typer.Option(
+        None, metavar="ADDRESS", help="Run on a Ray cluster instead: its address, or local."
+    ),
     dry_run: bool = typer.Option(False, "--dry-run", help="Only print the commands that would be run."),
     json: bool = typer.Option(False, "--json", help="Print a line of JSON for each step that begins or ends."),
 ) -> None:
@@ -92,7 +98,8 @@ def farm_run(
 def farm_status(plan: Path = plan_argument, json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """Say what of the plan is done, what runs, what failed and what is left to do."""
     season, ledger, _, run = _looked_at(plan)
-    running = _overlay(run, ledger)
+    running = ledger.is_running()
+    _overlay(run, ledger.read(), running=running)
     if json:
         say_json({"running": running, "fates": run.fates, "reasons": run.reasons})
     else:
@@ -101,7 +108,7 @@ def farm_status(plan: Path = plan_argument, json: bool = typer.Option(False, "--
 
 
 def _looked_at(path: Path) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
-    from pomona.cli.progress import working
+    from pomona.cli.progress import counting
     from pomona.farm import FarmRun, read_plan, steps_of
     from pomona.farm.file_hashes import FileHashes
     from pomona.farm.ledger import Ledger
@@ -110,11 +117,11 @@ def _looked_at(path: Path) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
     plan = read_plan(path, _flags())
     ledger = Ledger(plan.results / ".farm")
     steps = steps_of(plan)
-    hashes = FileHashes(ledger.folder / "hashes.json")
-    with working(f"reading {len(plan.visits)} recordings"):
-        keys = keys_of(steps, plan.folder, hashes)
-    hashes.save()
-    return plan, ledger, keys, FarmRun.begin(plan, steps, keys, ledger)
+    hashes = FileHashes(ledger.hashes())
+    with counting("reading recordings", len(steps)) as progress:
+        keys = keys_of(steps, plan.folder, hashes, lambda number: progress(number, len(steps)))
+    ledger.write_hashes(hashes.found)
+    return plan, ledger, keys, FarmRun.begin(steps, keys, ledger.read(), plan.folder)
 
 
 def _flags() -> Mapping[str, Mapping[str, Flag]]:
@@ -159,20 +166,20 @@ def _teller(run: FarmRun, *, json: bool) -> Any:
 
     def tell_of(step: Step, fate: Fate) -> None:
         reason = run.reasons.get(step.name, "")
+        seconds = run.seconds.get(step.name)
         if json:
-            seconds = run.seconds.get(step.name)
             say_json({"event": fate.value, "step": step.name, "seconds": seconds, "reason": reason or None})
         elif fate.value != "running":
-            left = sum(one.value in ("waiting", "running") for one in run.fates.values())
-            took = f" in {run.seconds[step.name]:.1f} s" if step.name in run.seconds else ""
-            tell(f"{step.name}: {fate.value}{took}{f': {reason}' if reason else ''}; {left} left")
+            what = "lost, begun again" if fate.value == "waiting" else fate.value
+            took = "" if seconds is None else f" in {seconds:.1f} s"
+            tell(f"{step.name}: {what}{took}{f': {reason}' if reason else ''}; {run.n_left} left")
 
     return tell_of
 
 
 def _print_commands(plan: FarmPlan, run: FarmRun, *, json: bool) -> None:
-    main = {step.name: [str(step.outputs[0])] for step in run.steps}
-    waiting = [step for step in run.steps if run.fates[step.name].value == "waiting"]
+    main = {name: [os.path.relpath(step.outputs[0], plan.folder)] for name, step in run.steps.items()}
+    waiting = [step for step in run.steps.values() if run.fates[step.name].value == "waiting"]
     if json:
         say_json([{"step": step.name, "commands": step.arguments(main)} for step in waiting])
         return
@@ -180,59 +187,39 @@ def _print_commands(plan: FarmPlan, run: FarmRun, *, json: bool) -> None:
 
     say(f"cd {shlex.quote(str(plan.folder))}")
     say(*(f"pomona {shlex.join(command)}" for step in waiting for command in step.arguments(main)))
-    kept = sum(fate.value in ("kept", "incomplete") for fate in run.fates.values())
-    tell(f"{len(waiting)} steps to do, {kept} are done", *_reasons(run))
+    tell(f"{len(waiting)} steps to do, {sum(run.counts.values()) - len(waiting)} not", *_reasons(run))
 
 
-def _overlay(run: FarmRun, ledger: Ledger) -> bool:
-    """Add what the run that is going, or the last one, says of itself."""
-    import json
-
+def _overlay(run: FarmRun, lines: Mapping[str, Line], *, running: bool) -> None:
+    """Add what the run that is going, or the last one, noted of steps that are not done."""
     from pomona.farm import Fate
 
-    running = ledger.is_running()
-    try:
-        note = json.loads((ledger.folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return running
-    for step in run.steps:
-        if running and step.name in note["running"]:
-            run.tell(step, Fate.running)
-        elif step.name in note["failed"] and run.fates[step.name] is Fate.waiting:
-            run.tell(step, Fate.failed, note["failed"][step.name])
-    run.block()
-    return running
+    for name, line in lines.items():
+        if name in run.steps and run.fates[name] is Fate.waiting and not line.key:
+            if line.failure is not None:
+                run.tell(name, Fate.failed, line.failure)
+            elif running:
+                run.tell(name, Fate.running)
 
 
 def _table(plan: FarmPlan, run: FarmRun) -> list[str]:
     """Show a line a row: a mark for each recording and for what is made of the map."""
-    rows = list(dict.fromkeys(step.row for step in run.steps))
-    kinds = [kind for kind in ("scan", "map", "growth", "report", "export") if any(s.kind == kind for s in run.steps)]
-    cells = {
-        (row, kind): "".join(MARKS[run.fates[s.name].value] for s in run.steps if (s.row, s.kind) == (row, kind))
-        for row in rows
-        for kind in kinds
-    }
-    widths = {kind: max(len(kind), *(len(cells[row, kind]) for row in rows)) for kind in kinds}
-    wide = max(3, *(len(row) for row in rows))
-    counts = {fate: sum(one.value == fate for one in run.fates.values()) for fate in MARKS}
-    told = ", ".join(f"{count} {fate}" for fate, count in counts.items() if count)
-    return [
-        "",
-        f"{'row':<{wide}}  " + "  ".join(f"{kind:<{widths[kind]}}" for kind in kinds).rstrip(),
-        *(
-            f"{row:<{wide}}  " + "  ".join(f"{cells[row, kind]:<{widths[kind]}}" for kind in kinds).rstrip()
-            for row in rows
-        ),
-        "",
-        f"{plan.results}: {told}",
-        "+ done   ~ some not found in the map   x failed   - needs what failed   > runs   . to do",
-    ]
+    marks: dict[tuple[str, str], str] = {}
+    for name, step in run.steps.items():
+        cell = step.row, step.kind
+        marks[cell] = marks.get(cell, "") + MARKS[run.fates[name].value]
+    rows = list(dict.fromkeys(row for row, _ in marks))
+    kinds = [kind for kind in VERBS if any(kind == other for _, other in marks)]
+    table = [["row", *kinds], *([row, *(marks.get((row, kind), "") for kind in kinds)] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in table]
+    counts = ", ".join(f"{count} {fate}" for fate, count in run.counts.items() if count)
+    return ["", *lines, "", f"{plan.results}: {counts}", f"({LEGEND})"]
 
 
 def _reasons(run: FarmRun) -> list[str]:
     return [
-        f"{step.name}: {run.fates[step.name].value}: {run.reasons[step.name]}"
-        for step in run.steps
-        if step.name in run.reasons and run.fates[step.name].value in ("failed", "incomplete")
+        f"{name}: {run.fates[name].value}: {reason}"
+        for name, reason in run.reasons.items()
+        if run.fates[name].value in ("failed", "incomplete")
     ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from pomona.cli.map_team import map_pull, map_push
 from pomona.cli.match_options import (
     Method,
     Scale,
@@ -157,6 +158,10 @@ def map_check(orchard: Path = orchard_argument, json: bool = typer.Option(False,
         say(*(found or ["ok"]))
     if found:
         raise typer.Exit(1)
+
+
+app.command("push")(map_push)
+app.command("pull")(map_pull)
 
 
 def _waiting(orchard: Path) -> Callable[[], None]:

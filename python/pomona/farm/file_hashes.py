@@ -3,43 +3,34 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from pomona.atomic import whole_file
 from pomona.errors import PomonaError
+from pomona.farm.ledger import Stamp
 
-__all__ = ["ChangedMeanwhileError", "FileHashes", "Stamp", "stamps"]
+__all__ = ["FileHashes", "stamps"]
 
 CHUNK_BYTES = 1 << 20
 
-Stamp = tuple[int, int]
-"""Size in bytes, time of the last change in nanoseconds."""
-
-
-class ChangedMeanwhileError(PomonaError):
-    """A file is written while it is read."""
-
 
 class FileHashes:
-    """SHA-256 of files, remembered in a file of their own.
+    """SHA-256 of files.
 
     Parameters
     ----------
-    memory : Path
-        Where they are remembered; what cannot be read there is forgotten.
+    known : mapping
+        What was found before: stamp and hash by path.
+
+    Attributes
+    ----------
+    found : dict
+        What is new: stamp and hash by path.
     """
 
-    def __init__(self, memory: Path) -> None:
-        self.memory = memory
-        self.known: dict[str, tuple[Stamp, str]] = {}
-        try:
-            for name, ((size, time_ns), digest) in json.loads(memory.read_text(encoding="utf-8")).items():
-                self.known[name] = (int(size), int(time_ns)), str(digest)
-        except (OSError, ValueError, AttributeError, TypeError):
-            self.known = {}
-        self.is_new = False
+    def __init__(self, known: Mapping[str, tuple[Stamp, str]]) -> None:
+        self.known = known
+        self.found: dict[str, tuple[Stamp, str]] = {}
 
     def of(self, path: Path) -> str:
         """Return the hash of a file, or of the names and hashes of all that is in a folder.
@@ -47,41 +38,28 @@ class FileHashes:
         Raises
         ------
         PomonaError
-            It cannot be read.
-        ChangedMeanwhileError
-            It changes while it is read.
+            It cannot be read, or changes while it is read.
         """
-        if path.is_dir():
-            digest = hashlib.sha256()
-            for file in files_in(path):
-                digest.update(f"{file.relative_to(path).as_posix()}\0{self._of_file(file)}\n".encode())
-            return digest.hexdigest()
-        return self._of_file(path)
-
-    def save(self) -> None:
-        """Remember, for the next run."""
-        if self.is_new:
-            with whole_file(self.memory) as partial:
-                partial.write_text(json.dumps(self.known), encoding="utf-8")
-            self.is_new = False
+        if not path.is_dir():
+            return self._of_file(path)
+        digest = hashlib.sha256()
+        for file in files_in(path):
+            digest.update(f"{file.relative_to(path).as_posix()}\0{self._of_file(file)}\n".encode())
+        return digest.hexdigest()
 
     def _of_file(self, path: Path) -> str:
         try:
             before = _stamp(path)
-            name = str(path)
-            if name in self.known and self.known[name][0] == before:
-                return self.known[name][1]
-            with path.open("rb") as stream:
-                digest = hashlib.sha256()
-                while chunk := stream.read(CHUNK_BYTES):
-                    digest.update(chunk)
+            stamp, digest = self.found.get(str(path)) or self.known.get(str(path)) or (None, "")
+            if stamp == before:
+                return digest
+            digest = _sha256_of(path)
             if _stamp(path) != before:
-                raise ChangedMeanwhileError(f"{path}: changes while it is read, expected a recording that has ended")
+                raise PomonaError(f"{path}: changes while it is read, expected a recording that has ended")
         except OSError as error:
             raise PomonaError(f"{path}: cannot be read: {error.strerror}") from None
-        self.known[name] = before, digest.hexdigest()
-        self.is_new = True
-        return digest.hexdigest()
+        self.found[str(path)] = before, digest
+        return digest
 
 
 def stamps(paths: Iterable[Path]) -> dict[Path, Stamp | None]:
@@ -98,6 +76,14 @@ def files_in(folder: Path) -> Iterator[Path]:
             yield from files_in(path)
         else:
             yield path
+
+
+def _sha256_of(path: Path) -> str:
+    with path.open("rb") as stream:
+        digest = hashlib.sha256()
+        while chunk := stream.read(CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
 
 
 def _stamp(path: Path) -> Stamp:

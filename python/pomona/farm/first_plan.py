@@ -112,7 +112,11 @@ def _patterns(parts: tuple[str, ...], suffix: str) -> list[str]:
             if named is not None:
                 found.append(_joined(stems, {number: named}, suffix))
         else:
-            found += [_joined(stems, {number: "{date}", other: "{row}"}, suffix) for other in range(len(stems)) if other != number]
+            found += [
+                _joined(stems, {number: "{date}", other: "{row}"}, suffix)
+                for other in range(len(stems))
+                if other != number
+            ]
     return found
 
 

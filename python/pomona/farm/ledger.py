@@ -1,4 +1,4 @@
-"""What is done: one small file a step, written when the step has ended, and never before."""
+"""What is done: a line a step in a small database, written when the step has ended, and never before."""
 
 from __future__ import annotations
 
@@ -6,92 +6,132 @@ import contextlib
 import hashlib
 import json
 import re
+import sqlite3
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
-from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 
-__all__ = ["Done", "Ledger"]
+__all__ = ["Ledger", "Line", "Stamp"]
+
+Stamp = tuple[int, int]
+"""Of a file: size in bytes, time of the last change in nanoseconds."""
+
+VERSION = 1
+"""Of the tables below; a ledger of another version is begun anew, and its steps with it."""
+
+TABLES = """
+CREATE TABLE steps (
+    name TEXT PRIMARY KEY, kind TEXT NOT NULL, key TEXT NOT NULL, settings TEXT NOT NULL, outputs TEXT NOT NULL,
+    told TEXT NOT NULL, is_incomplete INTEGER NOT NULL, seconds REAL NOT NULL, peak_bytes INTEGER NOT NULL,
+    failure TEXT) WITHOUT ROWID;
+CREATE TABLE hashes (
+    path TEXT PRIMARY KEY, size INTEGER NOT NULL, changed_ns INTEGER NOT NULL, sha256 TEXT NOT NULL) WITHOUT ROWID;
+"""
+
+TIMEOUT_S = 30.0
 
 
 @dataclass(frozen=True)
-class Done:
-    """A step that was begun, or done.
+class Line:
+    """What is known of a step.
 
     Attributes
     ----------
-    step : str
-        Its name.
-    kind : str
-        What it did.
+    name, kind : str
+        The step's.
     key : str
         All that its result follows from, as a hash; empty from when it begins until it has ended well.
     settings : str
         The flags of the plan, with the files that they name, as a hash.
-    outputs : list of str
+    outputs : tuple of str
         What it wrote, named from the folder of the plan.
-    told : list of str
-        What it said on the way.
-    incomplete : bool
+    told : tuple of str
+        What a person should know of it.
+    is_incomplete : bool
         Whether it found no match for some of what it was given: a result, and no failure.
     seconds, peak_bytes : float, int
         What it took.
+    failure : str or None
+        Why it failed the last time.
     """
 
-    step: str
+    name: str
     kind: str
     key: str
     settings: str
-    outputs: list[str]
-    told: list[str]
-    incomplete: bool
-    seconds: float
-    peak_bytes: int
+    outputs: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
+    is_incomplete: bool = False
+    seconds: float = 0.0
+    peak_bytes: int = 0
+    failure: str | None = None
 
 
 class Ledger:
-    """The steps that were done for a farm.
+    """The steps that were done for a farm, and what its files held when they were read.
 
     Parameters
     ----------
     folder : Path
         Where it is kept; made where it does not exist.
+
+    Raises
+    ------
+    PomonaError
+        It cannot be kept there.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        try:
-            for name in ("done", "logs"):
-                (folder / name).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise PomonaError(f"{folder}: cannot be made: {error.strerror}") from None
+        with self._told():
+            (folder / "logs").mkdir(parents=True, exist_ok=True)
+            self.connection = sqlite3.connect(folder / "ledger.sqlite", timeout=TIMEOUT_S, isolation_level=None)
+            self.connection.execute("BEGIN IMMEDIATE")
+            (version,) = self.connection.execute("PRAGMA user_version").fetchone()
+            if version != VERSION:
+                for (name,) in self.connection.execute(
+                    "SELECT name FROM sqlite_master WHERE type = 'table'"
+                ).fetchall():
+                    self.connection.execute(f'DROP TABLE "{name}"')
+                for statement in TABLES.strip().split(";\n"):
+                    self.connection.execute(statement)
+                self.connection.execute(f"PRAGMA user_version = {VERSION}")
+            self.connection.execute("COMMIT")
 
-    def read(self, step: str) -> Done | None:
-        """Return what became of a step the last time that it ended; None where nothing is known."""
-        try:
-            return Done(**json.loads(self._file(step).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
-            return None
+    def read(self) -> dict[str, Line]:
+        """Return what is known of each step."""
+        with self._told():
+            return {row[0]: _line(row) for row in self.connection.execute("SELECT * FROM steps")}
 
-    def write(self, done: Done) -> None:
-        """Note that a step has ended."""
-        with whole_file(self._file(done.step)) as partial:
-            partial.write_text(json.dumps(asdict(done), indent=1) + "\n", encoding="utf-8")
+    def write(self, line: Line) -> None:
+        """Note what became of a step."""
+        cells = (
+            line.name, line.kind, line.key, line.settings, json.dumps(line.outputs), json.dumps(line.told),
+            line.is_incomplete, line.seconds, line.peak_bytes, line.failure,
+        )  # fmt: skip
+        with self._told():
+            self.connection.execute(f"INSERT OR REPLACE INTO steps VALUES ({', '.join('?' * len(cells))})", cells)
+
+    def hashes(self) -> dict[str, tuple[Stamp, str]]:
+        """Return what files held when they were read, with their stamps then, by their paths."""
+        with self._told():
+            rows = self.connection.execute("SELECT path, size, changed_ns, sha256 FROM hashes")
+            return {path: ((size, changed_ns), digest) for path, size, changed_ns, digest in rows}
+
+    def write_hashes(self, found: dict[str, tuple[Stamp, str]]) -> None:
+        """Remember what files hold."""
+        rows = [(path, *stamp, digest) for path, (stamp, digest) in found.items()]
+        with self._told():
+            self.connection.execute("BEGIN")
+            self.connection.executemany("INSERT OR REPLACE INTO hashes VALUES (?, ?, ?, ?)", rows)
+            self.connection.execute("COMMIT")
 
     def log(self, step: str) -> Path:
-        """Where what a step says is kept; the suffix tells which of its streams."""
-        return self.folder / "logs" / _slug(step)
-
-    def peaks_bytes(self) -> dict[str, int]:
-        """Return the most memory that steps of each kind took."""
-        peaks: dict[str, int] = {}
-        for file in (self.folder / "done").glob("*.json"):
-            with contextlib.suppress(OSError, ValueError, TypeError):
-                done = Done(**json.loads(file.read_text(encoding="utf-8")))
-                peaks[done.kind] = max(peaks.get(done.kind, 0), done.peak_bytes)
-        return peaks
+        """Where what a step says is kept; a suffix tells which of its streams."""
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "_", step)[:80]
+        return self.folder / "logs" / f"{plain}-{hashlib.sha256(step.encode()).hexdigest()[:8]}"
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -112,14 +152,32 @@ class Ledger:
         with (self.folder / "lock").open("a+") as lock:
             return not _is_locked_now(lock.fileno())
 
-    def _file(self, step: str) -> Path:
-        return self.folder / "done" / f"{_slug(step)}.json"
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise PomonaError(f"{self.folder}: cannot be written: {error.strerror}") from None
+        except sqlite3.Error as error:
+            raise PomonaError(
+                f"{self.folder / 'ledger.sqlite'}: {error}; without the file all steps are done anew"
+            ) from None
 
 
-def _slug(step: str) -> str:
-    """Make a file name of a step's, one's own whatever letters it has."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", step)[:80]
-    return f"{plain}-{hashlib.sha256(step.encode()).hexdigest()[:8]}"
+def _line(row: tuple[object, ...]) -> Line:
+    name, kind, key, settings, outputs, told, is_incomplete, seconds, peak_bytes, failure = row
+    return Line(
+        str(name),
+        str(kind),
+        str(key),
+        str(settings),
+        tuple(json.loads(str(outputs))),
+        tuple(json.loads(str(told))),
+        bool(is_incomplete),
+        float(str(seconds)),
+        int(str(peak_bytes)),
+        None if failure is None else str(failure),
+    )
 
 
 def _is_locked_now(descriptor: int) -> bool:

@@ -68,7 +68,7 @@ class LocalProcesses:
         slot = min(set(range(self.workers)) - {other.slot for other in self.running})
         out, err = (self.log(job.step).with_name(self.log(job.step).name + suffix) for suffix in (".out", ".err"))
         with out.open("wb") as to, err.open("wb") as errors:
-            process = subprocess.Popen(  # noqa: S603 # this program, with arguments that went through its plan
+            process = subprocess.Popen(  # this program, with arguments that went through its plan
                 [sys.executable, "-m", "pomona.farm.worker"], stdin=subprocess.PIPE, stdout=to, stderr=errors
             )
         assert process.stdin is not None

@@ -152,17 +152,14 @@ def _work(line: bytes) -> tuple[int | None, str, str, int]:
     import resource
     import subprocess
     import sys
-
-    process = subprocess.Popen(
-        [sys.executable, "-m", "pomona.farm.worker"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    # The pipe stays open until the process has ended, so it is not communicate() that writes the line.
-    assert process.stdin is not None and process.stdout is not None and process.stderr is not None
     import threading
 
+    # The pipe to it stays open until it has ended, so it is not communicate() that writes the job.
+    worker, pipe = [sys.executable, "-m", "pomona.farm.worker"], subprocess.PIPE
+    process = subprocess.Popen(worker, stdin=pipe, stdout=pipe, stderr=pipe)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert process.stderr is not None
     said: dict[str, bytes] = {}
     readers = [
         threading.Thread(target=lambda name=name, stream=stream: said.__setitem__(name, stream.read()))

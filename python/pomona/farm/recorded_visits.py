@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 from pomona.errors import PomonaError
@@ -64,7 +65,9 @@ def visits_by_pattern(where: str, folder: Path, pattern: str) -> list[RecordedVi
     """
     for field in FIELDS:
         if pattern.count(f"{{{field}}}") != 1:
-            raise PomonaError(f"{where}: found {pattern!r}, expected {{{field}}} in it, once, as in {{row}}/{{date}}.mp4")
+            raise PomonaError(
+                f"{where}: found {pattern!r}, expected {{{field}}} in it, once, as in {{row}}/{{date}}.mp4"
+            )
     if not folder.is_dir():
         raise PomonaError(f"{where}: {folder}: is not there, expected the folder of the recordings")
     called, depth = _expression(pattern), pattern.count("/") + 1
@@ -137,7 +140,8 @@ def _date(where: str, text: str) -> str:
     try:
         if parts is None:
             raise ValueError
-        date = datetime(*(int(part or 0) for part in parts.groups()))  # noqa: DTZ001 # local, as the clock of the farm
+        year, month, day, hour, minute, second = (int(part or 0) for part in parts.groups())
+        date = datetime(year, month, day, hour, minute, second)  # local, as the farm's clock
     except ValueError:
         raise PomonaError(f"{where}: date: found {shown(text)}, expected one like 2024-08-09") from None
     return date.date().isoformat() if parts[4] is None else date.isoformat()
@@ -146,7 +150,7 @@ def _date(where: str, text: str) -> str:
 def _once(where: str, found: Iterable[RecordedVisit]) -> list[RecordedVisit]:
     """Give them in order; one row has one recording a date, and its name is written in one way."""
     visits = sorted(found)
-    for one, other in zip(visits, visits[1:], strict=False):
+    for one, other in pairwise(visits):
         if (one.row, one.date) == (other.row, other.date):
             raise PomonaError(
                 f"{where}: {one.path} and {other.path} are both row {one.row} on {one.date}, expected one recording of "
@@ -155,5 +159,7 @@ def _once(where: str, found: Iterable[RecordedVisit]) -> list[RecordedVisit]:
     spelt: dict[str, str] = {}
     for visit in visits:
         if spelt.setdefault(visit.row.casefold(), visit.row) != visit.row:
-            raise PomonaError(f"{where}: found the rows {spelt[visit.row.casefold()]} and {visit.row}, expected one name")
+            raise PomonaError(
+                f"{where}: found the rows {spelt[visit.row.casefold()]} and {visit.row}, expected one name"
+            )
     return visits

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from pomona import __version__
 from pomona.errors import PomonaError
-from pomona.farm.file_hashes import FileHashes, Stamp, stamps
+from pomona.farm.file_hashes import FileHashes, stamps
+from pomona.farm.ledger import Stamp
 from pomona.farm.steps import MadeBy, Step
 
 __all__ = ["Keys", "keys_of"]
@@ -40,7 +41,7 @@ class Keys:
 
 
 def keys_of(
-    steps: Iterable[Step], folder: Path, hashes: FileHashes, reading: Callable[[Path], None] = lambda _path: None
+    steps: Iterable[Step], folder: Path, hashes: FileHashes, reading: Callable[[int], None] = lambda _number: None
 ) -> Keys:
     """Read the inputs of all steps, which come behind those that they need, and give their keys.
 
@@ -53,15 +54,15 @@ def keys_of(
     hashes : FileHashes
         Remembers what was read before.
     reading : callable
-        Told of each input.
+        Told the number of each step whose inputs are read.
     """
     keys = Keys()
-    for step in steps:
+    for number, step in enumerate(steps):
+        reading(number)
         try:
             found = {}
             before = stamps(step.inputs)
             for path in step.inputs:
-                reading(path)
                 found[os.path.relpath(path, folder)] = hashes.of(path)
         except (PomonaError, OSError) as error:
             keys.wrong[step.name] = str(error)

@@ -162,24 +162,27 @@ class _Beside:
     """What lies beside recordings and is read with them: calibration, boxes, poses."""
 
     def __init__(self, visits: Sequence[RecordedVisit]) -> None:
-        self.recordings: dict[Path, set[Path]] = {}
+        recordings: dict[Path, set[Path]] = {}
         for visit in visits:
-            self.recordings.setdefault(visit.path.parent, set()).add(visit.path)
+            recordings.setdefault(visit.path.parent, set()).add(visit.path)
+        self.own: dict[tuple[Path, str], list[Path]] = {}
+        self.common: dict[Path, list[Path]] = {}
+        for folder, there in recordings.items():
+            stems = {path.stem for path in there}
+            for path in sorted(folder.iterdir()):
+                if path in there or path.name.startswith(".") or not path.is_file():
+                    continue
+                if path.name.split(".")[0] in stems:
+                    self.own.setdefault((folder, path.name.split(".")[0]), []).append(path)
+                else:
+                    self.common.setdefault(folder, []).append(path)
 
     def of(self, visit: RecordedVisit) -> list[Path]:
-        """Give the files beside a recording that are its own, as ``7.csv`` of ``7.mp4``, or belong to all there.
+        """Give the files beside a recording that are its own, as ``7.csv`` of ``7.mp4``, or of no other there.
 
         A folder has all in it.
         """
         if visit.path.is_dir():
             return []
-        here = self.recordings[visit.path.parent]
-        others = {path.stem for path in here if path != visit.path} - {visit.path.stem}
-        return [
-            path
-            for path in sorted(visit.path.parent.iterdir())
-            if path.is_file()
-            and path not in here
-            and not path.name.startswith(".")
-            and (path.name.split(".")[0] == visit.path.stem or not path.name.startswith(tuple(others)))
-        ]
+        folder = visit.path.parent
+        return [*self.own.get((folder, visit.path.stem), []), *self.common.get(folder, [])]
