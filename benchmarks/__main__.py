@@ -27,6 +27,7 @@ NAMES = (
     "disturbed",
     "endurance",
     "speed",
+    "farm",
     "readme",
 )
 """In the order in which all of them run."""

@@ -88,6 +88,9 @@ class Ledger:
         with self._told():
             (folder / "logs").mkdir(parents=True, exist_ok=True)
             self.connection = sqlite3.connect(folder / "ledger.sqlite", timeout=TIMEOUT_S, isolation_level=None)
+            # A power cut may take the last lines with it, a killed run takes none; a step done twice is all it costs.
+            self.connection.execute("PRAGMA journal_mode = WAL")
+            self.connection.execute("PRAGMA synchronous = NORMAL")
             self.connection.execute("BEGIN IMMEDIATE")
             (version,) = self.connection.execute("PRAGMA user_version").fetchone()
             if version != VERSION:
