@@ -30,6 +30,7 @@ NAMES = (
     "endurance",
     "page",
     "speed",
+    "farm",
     "readme",
 )
 """In the order in which all of them run."""

@@ -21,6 +21,7 @@ __all__ = [
     "DEMO_SEED",
     "DRAWN_BOXES",
     "EXPORTS",
+    "FARM_PLAN",
     "GROWN",
     "KEPT",
     "MERGED",
@@ -310,6 +311,7 @@ CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
 REPORT = Like("a report of a season", _is_report)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
+FARM_PLAN = Like("a plan of a farm", lambda path: b"[recordings]" in _head(path))
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),

@@ -13,6 +13,7 @@ from pomona.cli import (
     detect,
     evaluate,
     export,
+    farm,
     growth,
     import_,
     info,
@@ -70,6 +71,7 @@ app.command()(validate.validate)
 app.command()(view.view)
 app.command()(report.report)
 app.command()(export.export)
+app.add_typer(farm.app, name="farm")
 app.command()(config.config)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(synth.app, name="synth")

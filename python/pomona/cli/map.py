@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.map_team import map_pull, map_push
 from pomona.cli.match_options import (
     Method,
     Scale,
@@ -66,6 +67,12 @@ def map_add(
     new_part: bool = typer.Option(
         False, "--new-part", help="Let a session that is not found start a part of its own: another row, for example."
     ),
+    name: str | None = typer.Option(None, help="Name of the session in the map; else its own, of a cloud its file's."),
+    replace: bool = typer.Option(
+        False,
+        "--replace",
+        help="Take the place of a session of the same name that saw something else; the same one is left as it is.",
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Recognise the fruits of SESSION in ORCHARD and add it.
@@ -74,6 +81,8 @@ def map_add(
     what becomes another fruit is told. The first session starts the map; of several, one that is not found is tried
     again after the others. Exit code 0: added. 1: one was not found in the map. 2: wrong input.
     """
+    import dataclasses
+
     from pomona.cli.progress import working
     from pomona.errors import PomonaError
     from pomona.orchard import add_sessions, load_session
@@ -86,11 +95,16 @@ def map_add(
     if date is not None and len(sessions) > 1:
         found = amount(len(sessions), "session")
         raise PomonaError(f"--date: found it with {found}, expected one; each has a day of its own")
+    if name is not None and len(sessions) > 1:
+        raise PomonaError(f"--name: found it with {len(sessions)} sessions, expected one; each has a name of its own")
     visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
+    visits = [visit if name is None else dataclasses.replace(visit, name=name) for visit in visits]
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
-        answers = add_sessions(orchard, visits, settings=settings, new_part=new_part, waiting=_waiting(orchard))
+        answers = add_sessions(
+            orchard, visits, settings=settings, new_part=new_part, replacing=replace, waiting=_waiting(orchard)
+        )
     told = list(zip(visits, answers, strict=True))
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
@@ -243,6 +257,10 @@ def _row_as_lines(row: TreeRow) -> list[str]:
     ]
 
 
+app.command("push")(map_push)
+app.command("pull")(map_pull)
+
+
 def _waiting(orchard: Path) -> Callable[[], None]:
     """Say on the standard error why nothing happens."""
     from pomona.store.opening import TIMEOUT_S
@@ -324,6 +342,8 @@ def _change_as_text(change: Change) -> str:
 
 def _added_as_text(visit: Session, added: Added) -> str:
     match = added.match
+    if added.was_there:
+        return f"{visit.name}: is in the map already, the very same"
     if match is None:
         return f"{visit.name}: starts the map with {amount(added.n_new, 'fruit')}"
     if not added.is_added:

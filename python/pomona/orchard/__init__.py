@@ -1,6 +1,7 @@
 """The orchard map: fruits with one identity over all sessions, in one GeoPackage file."""
 
-from pomona.orchard.adding import Added, add_session, add_sessions
+from pomona.orchard.added import Added
+from pomona.orchard.adding import add_session, add_sessions
 from pomona.orchard.fruit_ids import Change
 from pomona.orchard.integrity import problems
 from pomona.orchard.loading import load_session

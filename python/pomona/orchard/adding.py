@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import NoLinksError, new_file
-from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.identity import VisitPair
+from pomona.orchard.added import Added
 from pomona.orchard.evidence import Evidence, new_visit, read_evidence
-from pomona.orchard.fruit_ids import Change
 from pomona.orchard.joining import Newcomer, join
 from pomona.orchard.parts import parts_with
 from pomona.orchard.recognising import Recognised, matches_with_visits, recognised, seen_last_by
+from pomona.orchard.removing import take_out
+from pomona.orchard.replacing import NotFoundError, holds, there_already
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, write_changes
 from pomona.orchard.writing import Placement
@@ -31,44 +32,12 @@ from pomona.store.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.store.rows import columns_of
 
 if TYPE_CHECKING:
-    from pomona.matching import Match
+    pass
 
 __all__ = ["Added", "add_session", "add_sessions", "require_new"]
 
 BETWEEN_PARTS_M = 10.0
 """From one part of a map to the next, where nobody knows how they lie to each other."""
-
-
-@dataclass(frozen=True, eq=False)
-class Added:
-    """What became of a session.
-
-    Attributes
-    ----------
-    fruit_ids : (N,) int64
-        Identity of each fruit of the session; 0 for all when the session was not added.
-    n_matched, n_new, n_missed : int
-        Fruits known before, fruits of which the session is the first sight, fruits of the map that hang where the
-        session looked and were not seen.
-    match : Match, optional
-        How the session was found in the map, or not; None for the first session.
-    is_added : bool
-        Whether the map holds the session now.
-    known : FruitCloud, optional
-        The fruits that `match` is with: those of the map that may still hang, before the session came; of a large map
-        those where the session lies.
-    changes : tuple of Change
-        Observations of other sessions that now are of another fruit.
-    """
-
-    fruit_ids: NDArray[np.int64]
-    n_matched: int
-    n_new: int
-    n_missed: int
-    match: Match | None
-    is_added: bool = False
-    known: FruitCloud | None = None
-    changes: tuple[Change, ...] = ()
 
 
 def add_session(
@@ -77,6 +46,7 @@ def add_session(
     *,
     settings: Settings | None = None,
     new_part: bool = False,
+    replacing: bool = False,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
 ) -> Added:
@@ -96,6 +66,9 @@ def add_session(
         How to match; the defaults of `pomona.match` otherwise.
     new_part : bool
         Whether a session that is not found in the map starts a part of its own, as another row of the orchard does.
+    replacing : bool
+        Whether the session takes the place of one of its name that saw something else; the very same session is left
+        as it is. Both in one transaction: where the new one is not found, the old one stays.
     timeout_s : float
         How long to wait for another program that is writing to the map.
     waiting : callable, optional
@@ -119,7 +92,10 @@ def add_session(
             pass
         except NoLinksError:
             return _start_in_place(path, session, settings, timeout_s, waiting)
-    return _add(path, session, settings, timeout_s, waiting, new_part=new_part)
+    try:
+        return _add(path, session, settings, timeout_s, waiting, new_part=new_part, replacing=replacing)
+    except NotFoundError as refused:
+        return refused.added
 
 
 def add_sessions(
@@ -128,6 +104,7 @@ def add_sessions(
     *,
     settings: Settings | None = None,
     new_part: bool = False,
+    replacing: bool = False,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
 ) -> list[Added]:
@@ -138,7 +115,7 @@ def add_sessions(
 
     Parameters
     ----------
-    path, settings, new_part, timeout_s, waiting
+    path, settings, new_part, replacing, timeout_s, waiting
         As for `add_session`.
     sessions : sequence of Session
         The visits to add.
@@ -158,6 +135,7 @@ def add_sessions(
                 sessions[number],
                 settings=settings,
                 new_part=starts_part and place == 0,
+                replacing=replacing,
                 timeout_s=timeout_s,
                 waiting=waiting,
             )
@@ -190,6 +168,7 @@ def _add(
     waiting: Waiting | None,
     *,
     new_part: bool,
+    replacing: bool = False,
     create: bool = False,
 ) -> Added:
     # A file of no bytes is what a killed start leaves where a map cannot appear whole.
@@ -198,6 +177,11 @@ def _add(
         if is_blank:
             return _start(connection, session)
         last_ids(connection)
+        if replacing:
+            if holds(connection, session):
+                return there_already(connection, session)
+            if not take_out(connection, session.name):
+                return _join(connection, session, Evidence((), ()), {})
         require_new(connection, session, session.content_sha256)
         settings = settings or Settings.load(None, {})
         found = recognised(connection, session.cloud, settings)
@@ -207,7 +191,10 @@ def _add(
             added = _join(connection, session, Evidence((), ()), {}, map_from_session=_beside(connection, session))
         else:
             added = Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, None)
-        return replace(added, match=found.match, known=found.known)
+        added = replace(added, match=found.match, known=found.known)
+        if replacing and not added.is_added:
+            raise NotFoundError(added)
+        return added
 
 
 def _start(connection: sqlite3.Connection, session: Session) -> Added:

@@ -16,7 +16,7 @@ from pomona.store.failures import WrongContentError
 from pomona.store.opening import TIMEOUT_S, Waiting, writing
 from pomona.store.rows import columns_of, one_of
 
-__all__ = ["Removed", "remove_session"]
+__all__ = ["Removed", "remove_session", "take_out"]
 
 PARTS = (
     "DELETE FROM crops WHERE session_id = :session",
@@ -92,6 +92,19 @@ def remove_session(
         if len(ids) == 1:
             raise WrongContentError(f"{name} is its only session, and a map has at least one: delete the file instead")
         return _remove(connection, name, ids[names.index(name)], dry=dry)
+
+
+def take_out(connection: sqlite3.Connection, name: str) -> bool:
+    """Remove a session, if it is there, inside the open transaction; tell whether the map has sessions left."""
+    ids, names = columns_of(connection, "sessions", ("id", "name"))
+    if name not in names:
+        return True
+    if len(ids) > 1:
+        _remove(connection, name, ids[names.index(name)], dry=False)
+        return True
+    for part in (*PARTS, "DELETE FROM sessions WHERE id = :session", "DELETE FROM fruits"):
+        connection.execute(part, {"session": ids[0]})
+    return False
 
 
 def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: bool) -> Removed:

@@ -1,0 +1,52 @@
+"""What became of a session that was brought to a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.orchard.fruit_ids import Change
+
+if TYPE_CHECKING:
+    from pomona.matching import Match
+
+__all__ = ["Added"]
+
+
+@dataclass(frozen=True, eq=False)
+class Added:
+    """What became of a session.
+
+    Attributes
+    ----------
+    fruit_ids : (N,) int64
+        Identity of each fruit of the session; 0 for all when the session was not added.
+    n_matched, n_new, n_missed : int
+        Fruits known before, fruits of which the session is the first sight, fruits of the map that hang where the
+        session looked and were not seen.
+    match : Match, optional
+        How the session was found in the map, or not; None for the first session.
+    is_added : bool
+        Whether the map holds the session now.
+    known : FruitCloud, optional
+        The fruits that `match` is with: those of the map that may still hang, before the session came; of a large map
+        those where the session lies.
+    changes : tuple of Change
+        Observations of other sessions that now are of another fruit.
+    was_there : bool
+        Whether the map held the very session before, and stays as it was.
+    """
+
+    fruit_ids: NDArray[np.int64]
+    n_matched: int
+    n_new: int
+    n_missed: int
+    match: Match | None
+    is_added: bool = False
+    known: FruitCloud | None = None
+    changes: tuple[Change, ...] = ()
+    was_there: bool = False

@@ -1,0 +1,263 @@
+"""Maps in a real PostGIS: whole for readers, row by row the same, and nothing lost when the server dies."""
+
+import contextlib
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+import postgres_server
+from pomona.errors import PomonaError
+from pomona.orchard import add_sessions, load_session, problems, remove_session
+from pomona.store.schema import FORMAT_VERSION, LAYERS
+from pomona.synth.seasons import SEASONS, draw_season
+from pomona.synth.seasons.season_files import write_season
+from pomona.team import pull_map, push_map
+from pomona.team.database_url import parsed_url
+
+pg = pytest.importorskip("pg8000.native", reason="pg8000 is not installed: pip install 'pomona[team]'")
+pytestmark = pytest.mark.skipif(
+    postgres_server.programs() is None,
+    reason="no PostgreSQL with PostGIS: apt-get install postgresql postgresql-15-postgis-3",
+)
+
+
+@pytest.fixture(scope="module")
+def server():
+    with postgres_server.running_server() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory):
+    """A map of three visits, and one of another row."""
+    folder = tmp_path_factory.mktemp("maps")
+    easy = SEASONS["easy"]
+    plan = replace(easy, n_visits=3, design=replace(easy.design, n_trees=2, fruits_per_tree=(20, 25)))
+    for seed, name in enumerate(("row", "other")):
+        write_season(draw_season(plan, seed), folder / f"{name}_visits")
+        sessions = [load_session(path, date=path.stem) for path in sorted((folder / f"{name}_visits").glob("2*.csv"))]
+        add_sessions(folder / f"{name}.gpkg", sessions)
+    return folder
+
+
+@pytest.fixture
+def row(maps, tmp_path):
+    shutil.copy(maps / "row.gpkg", tmp_path)
+    return tmp_path / "row.gpkg"
+
+
+@pytest.fixture
+def database(server, request):
+    """An empty database of the test's own."""
+    name = f"t{abs(hash(request.node.name))}"
+    with connection(server) as admin:
+        admin.run(f"CREATE DATABASE {name}")
+    return server.url_of(postgres_server.USER, postgres_server.PASSWORD, name)
+
+
+@contextlib.contextmanager
+def connection(server, url=None, user=postgres_server.USER, password=postgres_server.PASSWORD):
+    name = "postgres" if url is None else parsed_url(url).name
+    opened = pg.Connection(user, host="127.0.0.1", port=server.port, database=name, password=password)
+    try:
+        yield opened
+    finally:
+        with contextlib.suppress(pg.InterfaceError, OSError):
+            opened.close()
+
+
+def content(path):
+    with contextlib.closing(sqlite3.connect(path)) as opened:
+        rows = {layer: opened.execute(f"SELECT * FROM {layer} ORDER BY id").fetchall() for layer, *_ in LAYERS}
+        rows["numbers"] = opened.execute("SELECT name, seq FROM sqlite_sequence WHERE seq > 0 ORDER BY name").fetchall()
+    return rows
+
+
+def push(path, url, *flags):
+    return subprocess.run(
+        [sys.executable, "-m", "pomona", "map", "push", str(path), url, *flags],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_what_is_pulled_is_what_was_pushed_and_pushing_again_changes_nothing(server, database, row, tmp_path):
+    first = push_map(row, parsed_url(database))
+    assert first.n_written == sum(len(rows) for layer, rows in content(row).items() if layer != "numbers")
+    assert push_map(row, parsed_url(database)) == replace(first, n_written=0, n_ended=0)
+    pulled = tmp_path / "pulled.gpkg"
+    assert pull_map(parsed_url(database), "row", pulled) == len(content(row)["fruits"])
+    assert content(pulled) == content(row)
+    assert problems(pulled) == []
+    assert push_map(pulled, parsed_url(database), name="row").n_written == 0
+    with connection(server, database) as reader:
+        assert reader.run("SELECT count(*) FROM pomona.pushes") == [[1]]
+
+
+def test_a_pulled_map_goes_on_as_the_one_that_was_pushed(database, maps, tmp_path):
+    sessions = [load_session(path, date=path.stem) for path in sorted((maps / "row_visits").glob("2*.csv"))]
+    mine = tmp_path / "row.gpkg"
+    add_sessions(mine, sessions[:2])
+    push_map(mine, parsed_url(database))
+    pull_map(parsed_url(database), "row", tmp_path / "theirs.gpkg")
+    add_sessions(tmp_path / "theirs.gpkg", sessions[2:])
+    add_sessions(mine, sessions[2:])
+    assert content(tmp_path / "theirs.gpkg") == content(mine)
+
+
+def test_versions_of_rows_are_kept_and_sessions_only_go_when_that_is_said(server, database, row):
+    push_map(row, parsed_url(database))
+    before = len(content(row)["observations"])
+    name = content(row)["sessions"][1][1]
+    remove_session(row, name)
+    with pytest.raises(PomonaError, match=f"map row has the session {name}, which the file has not"):
+        push_map(row, parsed_url(database))
+    push_map(row, parsed_url(database), drop_sessions=True)
+    with connection(server, database) as reader:
+        ((now,),) = reader.run("SELECT count(*) FROM pomona_now.observations WHERE map = 'row'")
+        ((ended,),) = reader.run("SELECT count(DISTINCT id) FROM pomona.observations WHERE until_push IS NOT NULL")
+        ((then,),) = reader.run("SELECT count(*) FROM pomona.observations WHERE since_push = 1")
+    assert now == len(content(row)["observations"]) < before == then
+    assert ended >= before - now
+
+
+def test_another_orchard_of_the_same_name_is_refused(database, row, maps):
+    push_map(row, parsed_url(database))
+    with pytest.raises(PomonaError, match="has another map row, without a session of this one"):
+        push_map(maps / "other.gpkg", parsed_url(database), name="row")
+    assert push_map(maps / "other.gpkg", parsed_url(database)).n_written
+
+
+def test_readers_see_whole_maps_and_cannot_write(server, database, row):
+    push_map(row, parsed_url(database))
+    with connection(server, database) as admin:
+        admin.run("DROP ROLE IF EXISTS anna")
+        admin.run("CREATE ROLE anna LOGIN PASSWORD 'pear' IN ROLE pomona_reader")
+    with connection(server, database, user="anna", password="pear") as anna:
+        ((count,),) = anna.run("SELECT count(*) FROM pomona_now.fruits WHERE map = 'row'")
+        assert count == len(content(row)["fruits"])
+        ((n_fruits, diameter_mm),) = anna.run("SELECT n_fruits, mean_diameter_mm FROM pomona_now.row_summary")
+        assert 0 < n_fruits <= count
+        assert 10 < diameter_mm < 120
+        places = anna.run(
+            "SELECT type, coord_dimension, srid FROM geometry_columns "
+            "WHERE f_table_schema = 'pomona_now' AND f_table_name = 'fruits'"
+        )
+        assert places == [["POINT", 3, 0]], "QGIS finds the layer by these"
+        for statement in (
+            "DELETE FROM pomona.fruits",
+            "UPDATE pomona_now.fruits SET state = 'gone'",
+            "DROP SCHEMA pomona CASCADE",
+        ):
+            with pytest.raises(pg.DatabaseError, match=r"permission denied|must be owner"):
+                anna.run(statement)
+    refused = push(row, server.url_of("anna", "pear", parsed_url(database).name), "--name", "mine")
+    assert refused.returncode == 2
+    assert "permission denied" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+
+
+def wait_for_a_push_in_the_middle(reader):
+    until = time.monotonic() + 60
+    while not reader.run(
+        "SELECT 1 FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'pomona'"
+    ):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def test_a_server_killed_in_the_middle_of_a_push_keeps_the_map_as_it_was(server, database, row, tmp_path):
+    push_map(row, parsed_url(database))
+    before = content(row)
+    remove_session(row, before["sessions"][2][1])
+    with connection(server, database) as blocker:
+        # The push comes as far as the last layer but a few, which somebody holds.
+        blocker.run("BEGIN")
+        blocker.run("LOCK TABLE pomona.crops IN ACCESS EXCLUSIVE MODE")
+        with subprocess.Popen(
+            [sys.executable, "-m", "pomona", "map", "push", str(row), database, "--drop-sessions"],
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as pushing:
+            with connection(server, database) as reader:
+                wait_for_a_push_in_the_middle(reader)
+                ((seen,),) = reader.run("SELECT count(*) FROM pomona_now.observations WHERE map = 'row'")
+                assert seen == len(before["observations"])
+            server.kill()
+            told = pushing.communicate()[1]
+    assert pushing.returncode == 2
+    assert told.count("\n") == 1
+    assert "nothing was written" in told
+    server.start()
+    pull_map(parsed_url(database), "row", tmp_path / "after.gpkg")
+    assert content(tmp_path / "after.gpkg") == before
+    push_map(row, parsed_url(database), drop_sessions=True)
+    pull_map(parsed_url(database), "row", tmp_path / "again.gpkg")
+    assert content(tmp_path / "again.gpkg") == content(row)
+
+
+def test_no_output_replaces_a_map(database, row):
+    push_map(row, parsed_url(database))
+    before = row.read_bytes()
+    with pytest.raises(PomonaError, match="is there already, expected a new file"):
+        pull_map(parsed_url(database), "row", row)
+    assert row.read_bytes() == before
+
+
+def test_a_password_is_shown_nowhere(server, row):
+    secret = "hunter2%40x"
+    wrong = [
+        server.url_of("postgres", secret),
+        f"postgresql://postgres:{secret}@127.0.0.1:1/orchards",
+        f"mysql://postgres:{secret}@127.0.0.1/orchards",
+        f"postgresql://postgres:{secret}@127.0.0.1:port/orchards",
+        f"postgresql://postgres:{secret}@127.0.0.1",
+        f"postgresql://postgres:{secret}@127.0.0.1/orchards?sslmode=maybe",
+    ]
+    for url in wrong:
+        refused = push(row, url)
+        assert refused.returncode == 2
+        assert refused.stderr.count("\n") == 1
+        assert "hunter2" not in refused.stderr + refused.stdout
+    fine = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pomona",
+            "map",
+            "pull",
+            f"postgresql://postgres@127.0.0.1:{server.port}/postgres",
+            "row",
+            "-o",
+            str(row.with_name("x.gpkg")),
+        ],
+        env={**os.environ, "PGPASSWORD": postgres_server.PASSWORD},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "holds no maps of Pomona" in fine.stderr, "the password of the environment is taken"
+
+
+def test_a_database_without_postgis_or_of_another_format_is_told(server, database, row):
+    with connection(server, database) as admin:
+        admin.run("DROP ROLE IF EXISTS ben")
+        admin.run("CREATE ROLE ben LOGIN PASSWORD 'plum'")
+    refused = push(row, server.url_of("ben", "plum", parsed_url(database).name))
+    assert refused.returncode == 2
+    assert "has no PostGIS yet, ask its administrator for: CREATE EXTENSION postgis" in refused.stderr
+    push_map(row, parsed_url(database))
+    with connection(server, database) as admin:
+        admin.run("UPDATE pomona.format SET format_version = 99")
+    with pytest.raises(PomonaError, match=f"holds maps of format 99, expected {FORMAT_VERSION}"):
+        push_map(row, parsed_url(database))
+    with pytest.raises(PomonaError, match="holds maps of format 99"):
+        pull_map(parsed_url(database), "row", row.with_name("pulled.gpkg"))
+    assert not row.with_name("pulled.gpkg").exists()
