@@ -9,16 +9,19 @@ import pytest
 
 from pomona.errors import PomonaError
 from pomona.farm import read_plan, steps_of
+from pomona.farm.farm_plan import Flag, Takes
 from pomona.farm.first_plan import guessed_pattern
 from pomona.farm.recorded_visits import visits_by_pattern, visits_by_table
 
-FLAGS = {
+TAKES: dict[str, dict[str, Takes]] = {
     "scan": {"model": "path", "detections": "path", "every": "value", "odometry": "switch", "config": "path"},
     "map": {"up": "value", "config": "path"},
     "growth": {"harvest": "value"},
     "report": {},
     "export": {"growth": "switch"},
 }
+FLAGS = {verb: {name: Flag(what, f"--{name}") for name, what in flags.items()} for verb, flags in TAKES.items()}
+FLAGS["scan"]["crops"] = Flag("switch", "--crops", "--no-crops")
 
 
 def touch(folder: Path, *names: str) -> Path:
@@ -112,7 +115,7 @@ def test_a_wrong_table_is_told_by_its_line(tmp_path, lines, told):
     ("text", "told"),
     [
         ("speed = 3\n" + SIMPLE, "found 'speed', expected one of results, recordings, scan"),
-        (SIMPLE + "[scan]\nspeed = 3\n", "[scan]: found 'speed', expected one of config, detections"),
+        (SIMPLE + "[scan]\nspeed = 3\n", "[scan]: found 'speed', expected one of config, crops, detections"),
         (SIMPLE + '[scan]\nodometry = "yes"\n', "[scan] odometry: found 'yes', expected true or false"),
         (SIMPLE + "[scan]\nevery = [2]\n", "[scan] every: found [2], expected a text or a number"),
         (SIMPLE + 'colour = "red"\n', "[recordings]: found 'colour', expected one of folder"),
@@ -137,7 +140,7 @@ def test_a_wrong_plan_is_told_in_one_line(tmp_path, text, told):
 def test_steps_come_behind_those_they_need_and_name_what_they_read(tmp_path):
     touch(tmp_path, "rec/a/2024-08-09.mp4", "rec/a/2024-08-28.mp4", "rec/a/2024-08-28.csv", "rec/a/calibration.json")
     touch(tmp_path, "rec/b/2024-08-09.mp4", "my.onnx")
-    scan = '[scan]\nmodel = "my.onnx"\nevery = 2\nodometry = true\ndetections = "{beside}/{date}.csv"\n'
+    scan = '[scan]\nmodel = "my.onnx"\nevery = 2\nodometry = true\ncrops = false\ndetections = "{beside}/{date}.csv"\n'
     plan = read_plan(plan_of(tmp_path, SIMPLE + scan + '[growth]\n[export]\nto = ["csv", "ply"]\n'), FLAGS)
     steps = {step.name: step for step in steps_of(plan)}
     assert list(steps) == [
@@ -148,8 +151,8 @@ def test_steps_come_behind_those_they_need_and_name_what_they_read(tmp_path):
     assert {path.name for path in first.inputs} == {"2024-08-09.mp4", "calibration.json", "my.onnx"}
     assert {path.name for path in second.inputs} == {"2024-08-28.mp4", "2024-08-28.csv", "calibration.json", "my.onnx"}
     assert second.arguments({})[0][:4] == ["scan", "rec/a/2024-08-28.mp4", "-o", "results/sessions/a/2024-08-28.gpkg"]
-    given = ["--model=my.onnx", "--every=2", "--odometry", "--detections=rec/a/2024-08-28.csv"]
-    assert second.arguments({})[0][-4:] == given
+    given = ["--model=my.onnx", "--every=2", "--odometry", "--no-crops", "--detections=rec/a/2024-08-28.csv"]
+    assert second.arguments({})[0][-5:] == given
     assert steps["map a"].needs == (first.name, second.name)
     made = {first.name: ["1.gpkg", "1-part2.gpkg"], second.name: ["2.gpkg"]}
     added = ["1.gpkg", "1-part2.gpkg", "2.gpkg", "--replace"]

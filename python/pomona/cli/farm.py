@@ -5,9 +5,10 @@ from __future__ import annotations
 import inspect
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
+from typer.models import OptionInfo
 
 from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Verbs, Writes
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from pomona.farm import FarmPlan, FarmRun, Fate, Step
     from pomona.farm.executor import Executor
-    from pomona.farm.farm_plan import Flag
+    from pomona.farm.farm_plan import Flag, Takes
     from pomona.farm.ledger import Ledger, Line
     from pomona.farm.step_keys import Keys
 
@@ -129,22 +130,32 @@ def _flags() -> Mapping[str, Mapping[str, Flag]]:
     from pomona.cli.export import export
     from pomona.cli.growth import growth
     from pomona.cli.map import map_add
+    from pomona.cli.report import report
     from pomona.cli.scan import scan
 
-    verbs = {"scan": scan, "map": map_add, "growth": growth, "export": export}
+    verbs = {"scan": scan, "map": map_add, "growth": growth, "report": report, "export": export}
     return {name: _flags_of(verb) for name, verb in verbs.items()}
 
 
 def _flags_of(verb: Any) -> dict[str, Flag]:
+    from pomona.farm.farm_plan import Flag
+
     found: dict[str, Flag] = {}
     for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
-        if name in GIVEN_BY_THE_FARM or not isinstance(parameter.default, type(typer.Option())):
-            continue
-        kinds = get_args(parameter.annotation) or (parameter.annotation,)
-        long = next((flag for flag in parameter.default.param_decls or () if flag.startswith("--")), f"--{name}")
-        key = long.removeprefix("--").replace("-", "_")
-        found[key] = "switch" if bool in kinds else "path" if Path in kinds else "value"
+        # An option stands as the default, or beside the type in Annotated.
+        kind, *marks = get_args(parameter.annotation) if _is_marked(parameter.annotation) else (parameter.annotation,)
+        option = next((mark for mark in (parameter.default, *marks) if isinstance(mark, OptionInfo)), None)
+        if option is not None and name not in GIVEN_BY_THE_FARM:
+            long = next((flag for flag in option.param_decls or () if flag.startswith("--")), f"--{name}")
+            on, _, off = long.replace("_", "-").partition("/")
+            kinds = get_args(kind) or (kind,)
+            takes: Takes = "switch" if bool in kinds else "path" if Path in kinds else "value"
+            found[on.removeprefix("--").replace("-", "_")] = Flag(takes, on, off or None)
     return found
+
+
+def _is_marked(annotation: Any) -> bool:
+    return get_origin(annotation) is Annotated
 
 
 def _executor(plan: FarmPlan, ledger: Ledger, workers: int | None, ray: str | None) -> Executor:

@@ -12,16 +12,33 @@ from pomona.errors import PomonaError
 from pomona.farm.recorded_visits import RecordedVisit, visits_by_pattern, visits_by_table
 from pomona.reading import read_text, shown
 
-__all__ = ["FarmPlan", "Flag", "read_plan"]
+__all__ = ["FarmPlan", "Flag", "Takes", "read_plan"]
 
-Flag = Literal["path", "switch", "value"]
+Takes = Literal["path", "switch", "value"]
 """What a flag of a verb takes: a file, nothing, or a text."""
 
-VERBS = ("scan", "map", "growth", "export")
+VERBS = ("scan", "map", "growth", "report", "export")
 """Tables of the plan: what is done, with the flags of the verb. The first two are done anyhow."""
 
 RECORDINGS = ("folder", "pattern", "table", "skip")
 FORMATS = ("csv", "geojson", "parquet", "ply", "shp")
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A flag of a verb.
+
+    Attributes
+    ----------
+    takes : str
+        What stands behind it.
+    on, off : str, str or None
+        How it is written on the command line, and the flag that says the opposite of a switch.
+    """
+
+    takes: Takes
+    on: str
+    off: str | None = None
 
 
 @dataclass(frozen=True)
@@ -146,19 +163,18 @@ def _arguments(
     arguments: list[str] = []
     files: list[Path] = []
     for name, value in table.items():
-        kind = flags.get(name)
-        if kind is None:
+        flag = flags.get(name)
+        if flag is None:
             raise PomonaError(f"{where}: found {shown(name)}, expected one of {', '.join(sorted(flags))}")
-        flag = f"--{name.replace('_', '-')}"
-        if kind == "switch":
+        if flag.takes == "switch":
             if not isinstance(value, bool):
                 raise PomonaError(f"{where} {name}: found {shown(value)}, expected true or false")
-            arguments += [flag] if value else []
+            arguments += filter(None, [flag.on if value else flag.off])
             continue
         if isinstance(value, bool | dict | list):
             raise PomonaError(f"{where} {name}: found {shown(value)}, expected a text or a number")
         # Joined by =, so that no value is taken for a flag.
-        arguments.append(f"{flag}={value}")
-        if kind == "path" and (folder / str(value)).is_file():
+        arguments.append(f"{flag.on}={value}")
+        if flag.takes == "path" and (folder / str(value)).is_file():
             files.append(folder / str(value))
     return tuple(arguments), tuple(files)

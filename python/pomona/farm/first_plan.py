@@ -40,6 +40,8 @@ skip = []                   # recordings to leave out, as "row 3/2024-08-09"
 [growth]
 # harvest = "2024-09-25"
 
+[report]
+
 [export]
 to = ["csv"]
 """
