@@ -13,6 +13,7 @@ from typing import Literal
 __all__ = [
     "BOXES",
     "BOXES_DRAWN",
+    "BY_DATE",
     "CALIPER_PAIRS",
     "DEMO",
     "DEMO_DATES",
@@ -291,6 +292,11 @@ def _is_grown(folder: Path) -> bool:
     return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
 
 
+def _has_dates(folder: Path) -> bool:
+    """Tell a folder in which every file by row and date is one of ours."""
+    return all(_is_parquet(path) for path in folder.glob("row=*/date=*/observations.parquet"))
+
+
 def _is_truth(path: Path) -> bool:
     found = json.loads(path.read_text(encoding="utf-8"))
     return isinstance(found, dict) and found.keys() >= TRUTH_KEYS
@@ -311,6 +317,7 @@ CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
 REPORT = Like("a report of a season", _is_report)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
+BY_DATE = Like("a folder of observations by date", _has_dates, is_folder=True)
 FARM_PLAN = Like("a plan of a farm", lambda path: b"[recordings]" in _head(path))
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {

@@ -12,7 +12,7 @@ import typer
 from pomona.cli.match_options import Unit
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Writes
-from pomona.likes import EXPORTS, Like
+from pomona.likes import BY_DATE, EXPORTS, Like
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
@@ -26,11 +26,14 @@ class Format(StrEnum):
     geojson = "geojson"
     shp = "shp"
     parquet = "parquet"
+    parquet_by_date = "parquet-by-date"
 
 
 def _like(given: Mapping[str, Any]) -> Like:
     from pomona.export import format_of
 
+    if given["to"] is Format.parquet_by_date:
+        return BY_DATE
     return EXPORTS[format_of(given["output"], given["to"])]
 
 
@@ -48,7 +51,11 @@ def export(
     output: Annotated[Path, Writes(_like, also=_parts)] = typer.Option(
         ..., "-o", "--output", help="The file to write; - is the standard output."
     ),
-    to: Format | None = typer.Option(None, help="Format of the file to write, where its suffix does not say it."),
+    to: Format | None = typer.Option(
+        None,
+        help="Format of the file to write, where its suffix does not say it; parquet-by-date is a folder with the "
+        "observations of each row and date.",
+    ),
     observations: bool = typer.Option(
         False, "--observations", help="Of a session or map: a row for each fruit and visit that saw it, with the date."
     ),
@@ -64,12 +71,24 @@ def export(
     from pomona.cloud import FruitCloud
     from pomona.export import export_cloud, format_of
 
+    if to is Format.parquet_by_date:
+        _export_by_date(source, output, plain=not (growth or harvest))
+        return
     if growth or harvest is not None:
         cloud = _grown(source, harvest, plain=not growth or observations)
     else:
         cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
     export_cloud(cloud, output, format_of(output, None if to is None else to.value))
     say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
+
+
+def _export_by_date(source: Path, output: Path, *, plain: bool) -> None:
+    from pomona.errors import PomonaError
+    from pomona.parquet_by_date import export_by_date
+
+    if not plain:
+        raise PomonaError("--to parquet-by-date: found it with --growth or --harvest, expected it alone")
+    say(f"{output}: {export_by_date(source, output)} observations")
 
 
 def _grown(source: Path, harvest: str | None, *, plain: bool) -> FruitCloud:

@@ -21,7 +21,7 @@ VERBS = ("scan", "map", "growth", "report", "export")
 """Tables of the plan: what is done, with the flags of the verb. The first two are done anyhow."""
 
 RECORDINGS = ("folder", "pattern", "table", "skip")
-FORMATS = ("csv", "geojson", "parquet", "ply", "shp")
+FORMATS = ("csv", "geojson", "parquet", "parquet-by-date", "ply", "shp")
 
 
 @dataclass(frozen=True)

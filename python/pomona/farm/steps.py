@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Literal
@@ -84,9 +84,8 @@ def _of_row(plan: FarmPlan, row: str, visits: list[RecordedVisit], beside: _Besi
     for kind, output, least_days in (("growth", "", 2), ("report", ".html", 1)):
         if kind in plan.flags and days >= least_days:
             yield _from_map(plan, kind, row, orchard, mapping.name, plan.results / kind / f"{row}{output}")
-    for suffix in plan.formats:
-        output_file = plan.results / "export" / f"{row}.{suffix}"
-        yield _from_map(plan, "export", row, orchard, mapping.name, output_file, f" {suffix}")
+    for to in plan.formats:
+        yield _export(plan, row, orchard, mapping.name, to)
 
 
 def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> Step:
@@ -135,6 +134,15 @@ def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[R
         outputs=(orchard,),
         settings=settings,
     )
+
+
+def _export(plan: FarmPlan, row: str, orchard: str, after: str, to: str) -> Step:
+    if to != "parquet-by-date":
+        return _from_map(plan, "export", row, orchard, after, plan.results / "export" / f"{row}.{to}", f" {to}")
+    # All rows lie in one folder, as analysts open it.
+    step = _from_map(plan, "export", row, orchard, after, plan.results / "export" / "observations", f" {to}")
+    ((*words,),) = step.commands
+    return replace(step, commands=((*words, f"--to={to}"),))
 
 
 def _from_map(plan: FarmPlan, kind: str, row: str, orchard: str, after: str, output: Path, title: str = "") -> Step:
