@@ -2,6 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -77,3 +78,21 @@ def test_contents_know_extent_and_time(layer: sqlite3.Connection) -> None:
 def test_a_bug_is_not_told_as_wrong_input(layer: sqlite3.Connection) -> None:
     with pytest.raises(sqlite3.OperationalError, match="no such table"), told(Path("a.gpkg")):
         layer.execute("SELECT * FROM pebbles")
+
+
+def test_the_extent_of_a_layer_is_that_of_its_points(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    with closing(geopackage.connect(tmp_path / "a.gpkg", create=True)) as connection:
+        connection.execute("BEGIN")
+        geopackage.create(connection)
+        geopackage.add_table(connection, "points", "name TEXT", "some points", "POINT")
+        for geom in geopackage.points(rng.uniform(-50, 50, (1000, 3))):
+            connection.execute("INSERT INTO points (geom) VALUES (?)", (geom,))
+        for gone in ("id > 0 AND id % 3 = 0", "id < 900", "id > 0"):
+            geopackage.touch(connection, "points", "2026-01-01T00:00:00.000Z")
+            told = connection.execute("SELECT min_x, min_y, max_x, max_y FROM gpkg_contents WHERE min_x NOT NULL")
+            bounds = connection.execute("SELECT min(minx), min(miny), max(maxx), max(maxy) FROM rtree_points_geom")
+            assert told.fetchall() == bounds.fetchall()
+            connection.execute(f"DELETE FROM points WHERE {gone}")
+        geopackage.touch(connection, "points", "2026-01-01T00:00:00.000Z")
+        assert connection.execute("SELECT count(min_x) FROM gpkg_contents").fetchone() == (0,)

@@ -1,4 +1,4 @@
-"""The command line on a disk that fails at its N-th change: the map is the one before or the one after."""
+"""The command line on a disk that fails at its N-th change: the map is the one before or the one after; inputs stay."""
 
 import os
 import shutil
@@ -57,7 +57,7 @@ def content(path: Path) -> list[object] | None:
     return rows
 
 
-@pytest.fixture(scope="module", params=["start", "add", "remove"])
+@pytest.fixture(scope="module", params=["start", "add", "remove", "merge"])
 def story(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Story:
     """Small maps: a run makes some hundred changes, and each of them can be the last."""
     folder = tmp_path_factory.mktemp("story")
@@ -68,12 +68,15 @@ def story(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     orchard = folder / "orchard.gpkg"
     if request.param != "start":
         add_session(orchard, load_session(folder / "a.gpkg"))
+    if request.param == "merge":
+        add_session(folder / "other.gpkg", load_session(folder / "b.gpkg"))
     if request.param == "remove":
         add_session(orchard, load_session(folder / "b.gpkg"))
     arguments = {
         "start": ["add", "orchard.gpkg", "a.gpkg"],
         "add": ["add", "orchard.gpkg", "b.gpkg"],
         "remove": ["remove", "orchard.gpkg", "b", "--yes"],
+        "merge": ["merge", "orchard.gpkg", "other.gpkg"],
     }[request.param]
     files = {path.name: path.read_bytes() for path in folder.iterdir()}
     before = content(orchard)
@@ -124,6 +127,8 @@ def test_the_map_is_the_one_before_or_the_one_after(story: Story, way: str, faul
             assert done.returncode in (0, 2), where
             assert done.stderr.count("\n") == (done.returncode == 2), where
         assert orchard.exists() or story.before is None, where
+        for name in story.files.keys() - {"orchard.gpkg"}:
+            assert (folder / name).read_bytes() == story.files[name], where
         if orchard.exists():
             assert problems(orchard) == [], where
         now = content(orchard)

@@ -201,6 +201,26 @@ def test_eight_writers_at_once_all_get_in(tmp_path: Path) -> None:
     assert problems(path) == []
 
 
+def test_maps_and_sessions_that_come_at_once_are_all_there(orchard: Path, tmp_path: Path) -> None:
+    """Two maps are merged in and two sessions added by four programs; each waits its turn."""
+    cloud, rng = scene_pair("base", seed=3).map, np.random.default_rng(6)
+    files = []
+    for number in range(4):
+        seen = cloud.select(np.sort(rng.choice(len(cloud), len(cloud) - 20, replace=False)))
+        files.append(tmp_path / f"later {number}.gpkg")
+        write_session(files[-1], seen, name=f"later {number}", date=f"2025-08-0{number + 1}", recording="test")
+    others = [tmp_path / f"map {number}.gpkg" for number in range(2)]
+    for other, file in zip(others, files[:2], strict=True):
+        add_session(other, load_session(file))
+    begun = [one.name for one in OrchardMap(orchard).visits()]
+    commands = [[*POMONA, "map", "merge", orchard, other] for other in others]
+    commands += [[*POMONA, "map", "add", orchard, file] for file in files[2:]]
+    writers = [subprocess.Popen(one, stdout=subprocess.DEVNULL) for one in commands]
+    assert [writer.wait() for writer in writers] == [0] * 4
+    assert {one.name for one in OrchardMap(orchard).visits()} == {*begun, *(file.stem for file in files)}
+    assert problems(orchard) == []
+
+
 def test_a_writer_that_waits_says_so(orchard: Path, visits: tuple[Path, Path]) -> None:
     other = sqlite3.connect(orchard, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")

@@ -214,6 +214,29 @@ def test_a_read_only_disk_is_read_and_not_written(tmp_path: Path, started: Path,
     assert done.stderr == f"pomona: {orchard}: cannot be written: the file or its folder is read-only\n"
 
 
+def test_a_map_is_merged_from_a_read_only_disk_and_not_into_one(
+    tmp_path: Path, started: Path, visits: tuple[Path, Path]
+) -> None:
+    disk, elsewhere, merged = tmp_path / "disk", tmp_path / "other.gpkg", tmp_path / "merged.gpkg"
+    disk.mkdir()
+    orchard = disk / "orchard.gpkg"
+    add_session(elsewhere, load_session(visits[1]))
+    before = elsewhere.read_bytes()
+    done = on_a_small_disk(
+        disk,
+        4 * started.stat().st_size,
+        f"cp '{started}' '{orchard}'",
+        f"mount -o remount,ro '{disk}'",
+        f"'{POMONA}' map merge '{orchard}' '{elsewhere}' -o '{merged}'",
+        f"'{POMONA}' map merge '{orchard}' '{elsewhere}'",
+    )
+    assert done.returncode == 2
+    assert done.stderr == f"pomona: {orchard}: cannot be written: the file or its folder is read-only\n"
+    assert elsewhere.read_bytes() == before
+    assert len(OrchardMap(merged).visits()) == 2
+    assert problems(merged) == []
+
+
 def test_a_second_writer_waits_and_is_told(orchard: Path, started: Path, visits: tuple[Path, Path]) -> None:
     other = sqlite3.connect(orchard, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")

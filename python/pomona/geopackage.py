@@ -207,15 +207,25 @@ def add_index_triggers(connection: sqlite3.Connection, name: str) -> None:
 def touch(connection: sqlite3.Connection, name: str, last_change: str) -> None:
     """Bring the extent and the time of a layer in the contents up to date; `last_change` is ISO 8601, UTC."""
     has_index = connection.execute("SELECT 1 FROM gpkg_extensions WHERE table_name = ?", (name,)).fetchone()
-    extent: tuple[float | None, ...] = (None, None, None, None)
-    if has_index:
-        extent = connection.execute(
-            f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM rtree_{name}_geom"
-        ).fetchone()
+    extent = _extent(connection, name) if has_index else (None,) * 4
     connection.execute(
         "UPDATE gpkg_contents SET min_x = ?, min_y = ?, max_x = ?, max_y = ?, last_change = ? WHERE table_name = ?",
         (*extent, last_change, name),
     )
+
+
+def _extent(connection: sqlite3.Connection, name: str) -> tuple[float | None, ...]:
+    """Return the least x and y and the largest of a layer: the root of its spatial index bounds all that is in it.
+
+    A node is its depth, the number of its cells, and of each a number and its least and largest x, then y.
+    """
+    (root,) = connection.execute(f"SELECT data FROM rtree_{name}_geom_node WHERE nodeno = 1").fetchone()
+    (count,) = struct.unpack_from(">xxH", root)
+    if not count:
+        return (None,) * 4
+    bounds = np.array([struct.unpack_from(">8x4f", root, 4 + 24 * cell) for cell in range(count)])
+    low, high = bounds[:, ::2].min(axis=0).tolist(), bounds[:, 1::2].max(axis=0).tolist()
+    return (*low, *high)
 
 
 def execute_all(connection: sqlite3.Connection, script: str) -> None:

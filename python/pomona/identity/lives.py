@@ -23,7 +23,9 @@ SHARE_FALSE = 0.05
 
 BELIEF_FALSE = 50.0
 
-LIKELIER_THAN_NOT = 0.5
+SAID_GONE = 0.52
+"""Probability from which a fruit is called gone: a little more than even, as of the living no more than one in fifty
+shall be called so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +121,7 @@ def states_of(
     last_look = n_visits - 1 - in_view[:, ::-1].argmax(axis=1)
     is_seen = seen[np.arange(len(seen)), last_look]
     is_new = is_seen & (seen.sum(axis=1) == 1) & (in_view.sum(axis=1) > 1)
-    is_gone = ~is_seen & (lives.gone > LIKELIER_THAN_NOT)
+    is_gone = ~is_seen & (lives.gone > SAID_GONE)
     states = np.select([is_new, is_seen, is_gone], ["new", "seen", "gone"], "missed")
     probabilities = np.select([is_seen, is_gone], [1.0 - lives.false, lives.gone], 1.0 - lives.gone)
     return states.tolist(), probabilities

@@ -96,14 +96,19 @@ def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], 
 def _shares_of_views(n_views: NDArray[np.int64] | None, positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ranks, 0 to 1, of the views of each fruit against those around it; the middle where nobody counted."""
     from scipy.spatial import cKDTree
-    from scipy.stats import rankdata
 
     n = len(positions)
     if n_views is None:
         return np.full(n, 0.5)
     around = cKDTree(positions).query(positions, k=list(range(1, min(AROUND, n) + 1)))[1]
     possible = np.maximum(np.quantile(n_views[around], MOST_VIEWS, axis=1), 1.0)
-    return np.asarray(rankdata(n_views / possible) / n)
+    return _ranks(n_views / possible) / n
+
+
+def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the place of each value in order, from 1; equal ones share the middle of theirs."""
+    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[which])
 
 
 def chances_of_missing(looks: Looks) -> NDArray[np.float64]:
