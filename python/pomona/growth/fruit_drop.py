@@ -12,7 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FruitDrop", "drop_of"]
+__all__ = ["LARGEST_FRUITLET_MM", "FruitDrop", "drop_of"]
+
+LARGEST_FRUITLET_MM = 45.0
+"""The rule is one of fruitlets in the weeks after bloom; of what is larger, the drop is over (apples, pears)."""
 
 SLOW_SHARE = 0.5
 """Of the fast rate, below which fruits drop."""

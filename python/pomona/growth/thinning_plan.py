@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.growth.clusters import clusters_of
-from pomona.growth.fruit_drop import FruitDrop, drop_of
+from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM, FruitDrop, drop_of
 from pomona.growth.season_clock import CALENDAR
 from pomona.growth.season_growth import SeasonGrowth
 
-__all__ = ["ThinningPlan", "plan_thinning", "rates_are_known"]
+__all__ = ["ThinningPlan", "are_fruitlets", "plan_thinning", "rates_are_known"]
 
 KEEP, DROPS, THIN = "keep", "drops", "thin"
 
@@ -31,7 +31,7 @@ class ThinningPlan:
     sizes_mm, rates_mm_per_day : (M,) float64
         At the last visit, and between the last two days; NaN for a fruit that one of them did not measure.
     drop : FruitDrop
-        Of the M fruits.
+        Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known, and none drops.
     places : (M,) float64
         Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. NaN
         for what drops.
@@ -69,6 +69,8 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     if not rates_are_known(growth):
         raise PomonaError(f"{fruits.path}: found no fruit that was measured on both of the last two days of visits")
     drop = drop_of(rates[rows], noise)
+    if not are_fruitlets(growth):
+        drop = FruitDrop(np.full(len(rows), np.nan), drop.fast_mm_per_day, 0.0)
     clusters = clusters_of(fruits.cloud.positions[rows])
     sizes_mm = growth.foretold.sizes_mm[rows, len(fruits.days) - 1]
     drops = np.nan_to_num(drop.probabilities) > 0.5
@@ -80,6 +82,12 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     thin = np.zeros(len(rows), dtype=bool) if target_per_tree is None else places > target_per_tree
     actions = tuple(DROPS if gone else THIN if taken else KEEP for gone, taken in zip(drops, thin, strict=True))
     return ThinningPlan(rows, clusters, np.bincount(clusters)[clusters], sizes_mm, rates[rows], drop, places, actions)
+
+
+def are_fruitlets(growth: SeasonGrowth) -> bool:
+    """Tell whether the growth-rate rule is for fruits of this size: in their middle, on the last day."""
+    sizes_mm = growth.foretold.sizes_mm[growth.fruits.hanging, len(growth.fruits.days) - 1]
+    return bool(np.nanmedian(sizes_mm) <= LARGEST_FRUITLET_MM)
 
 
 def rates_are_known(growth: SeasonGrowth) -> bool:
