@@ -27,6 +27,7 @@ NAMES = (
     "shipped",
     "disturbed",
     "endurance",
+    "page",
     "speed",
     "readme",
 )

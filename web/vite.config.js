@@ -37,6 +37,6 @@ export default {
     target: "es2022",
     modulePreload: false,
     cssCodeSplit: false,
-    lib: { entry: join(here, "src/main.ts"), formats: ["es"], fileName: () => "page.js", cssFileName: "page" },
+    lib: { entry: join(here, "src/main.ts"), name: "pomona", formats: ["iife"], fileName: () => "page.js", cssFileName: "page" },
   },
 };

@@ -22,7 +22,7 @@ export interface Swatches {
 
 export interface Scheme {
   readonly legend: Ramp | Swatches;
-  readonly of: (fruit: number, time: number) => Rgb;
+  readonly at: (time: number) => (fruit: number) => Rgb;
 }
 
 export const VIRIDIS: readonly Rgb[] = [
@@ -36,6 +36,7 @@ export const VIRIDIS: readonly Rgb[] = [
   [160, 218, 57],
   [253, 231, 37],
 ];
+const STEPS: readonly Rgb[] = Array.from({ length: 257 }, (_, i) => between((i / 256) * (VIRIDIS.length - 1)));
 const UNKNOWN: Rgb = [150, 150, 150];
 const GREEN: Rgb = [0, 158, 115];
 const SKY: Rgb = [86, 180, 233];
@@ -47,8 +48,10 @@ const OF_ACTION = { keep: GREEN, thin: VERMILION, drops: ORANGE, "": UNKNOWN } a
 const ENDS = [0.02, 0.98] as const;
 
 export function ramp(share: number): Rgb {
-  if (Number.isNaN(share)) return UNKNOWN;
-  const at = Math.min(1, Math.max(0, share)) * (VIRIDIS.length - 1);
+  return Number.isNaN(share) ? UNKNOWN : STEPS[Math.round(Math.min(1, Math.max(0, share)) * (STEPS.length - 1))];
+}
+
+function between(at: number): Rgb {
   const [low, part] = [VIRIDIS[Math.floor(at)], at - Math.floor(at)];
   const high = VIRIDIS[Math.min(VIRIDIS.length - 1, Math.floor(at) + 1)];
   return [0, 1, 2].map((i) => Math.round(low[i] + part * (high[i] - low[i]))) as unknown as Rgb;
@@ -64,14 +67,17 @@ const SCHEMES: Record<ColourBy, (page: Page) => Scheme> = {
     const [low, high] = spanOf(rates);
     return {
       legend: { kind: "ramp", title: "growth, mm a day", low: number(low, 2), high: number(high, 2) },
-      of: (fruit) => ramp((rates[fruit] - low) / (high - low)),
+      at: () => (fruit) => ramp((rates[fruit] - low) / (high - low)),
     };
   },
   size: ({ season, history }) => {
     const [low, high] = spanOf(season.growth?.medianMm ?? season.sights.diameterMm);
     return {
       legend: { kind: "ramp", title: "diameter, mm", low: number(low, 0), high: number(high, 0) },
-      of: (fruit, time) => ramp((history.sizeAt(fruit, time) - low) / (high - low)),
+      at: (time) => {
+        const size = history.sizeAt(time);
+        return (fruit) => ramp((size(fruit) - low) / (high - low));
+      },
     };
   },
   state: ({ history }) => ({
@@ -80,13 +86,13 @@ const SCHEMES: Record<ColourBy, (page: Page) => Scheme> = {
       title: "on this date",
       swatches: STATES.map((name) => ({ name, rgb: OF_STATE[name], isRing: name === "missed" || name === "gone" })),
     },
-    of: (fruit, time) => OF_STATE[history.stateAt(fruit, time)],
+    at: (time) => (fruit) => OF_STATE[history.stateAt(fruit, time)],
   }),
   date: ({ history }) => {
     const last = Math.max(1, history.times.length - 1);
     return {
       legend: { kind: "ramp", title: "first seen", low: day(history.times[0]), high: day(history.times[last] ?? history.times[0]) },
-      of: (fruit) => ramp(history.first[fruit] / last),
+      at: () => (fruit) => ramp(history.first[fruit] / last),
     };
   },
   plan: (page) => ({
@@ -99,7 +105,7 @@ const SCHEMES: Record<ColourBy, (page: Page) => Scheme> = {
         { name: "will drop", rgb: ORANGE, isRing: false },
       ],
     },
-    of: (fruit) => OF_ACTION[actionOf(page.season, fruit, page.target.value)],
+    at: () => (fruit) => OF_ACTION[actionOf(page.season, fruit, page.target.value)],
   }),
 };
 

@@ -2,16 +2,20 @@
 import "uplot/dist/uPlot.min.css";
 import "./style/page.css";
 import { element, replaceAll } from "./elements";
-import { layOut } from "./parts/layout";
 import { pageOf } from "./page";
+import { layOut } from "./parts/layout";
 import { readSeason } from "./told/season";
 
-const root = document.getElementById("page") as HTMLElement;
-try {
-  const page = pageOf(await readSeason());
-  document.title = `${page.season.name} · Pomona`;
-  layOut(root, page);
-} catch (error) {
-  replaceAll(root, element("p", { class: "notice", role: "alert" }, `The orchard cannot be shown: ${String(error)}`));
-  throw error;
+async function open(root: HTMLElement): Promise<void> {
+  try {
+    const page = pageOf(await readSeason());
+    document.title = `${page.season.name} · Pomona`;
+    layOut(root, page);
+  } catch (error) {
+    const why = error instanceof Error ? error.message : String(error);
+    replaceAll(root, element("p", { class: "notice", role: "alert" }, `The orchard cannot be shown: ${why}`));
+    throw error;
+  }
 }
+
+void open(document.getElementById("page") as HTMLElement);

@@ -1,15 +1,14 @@
-/** Light, dark, or as the machine is set; and the colours that canvases take from the style sheet. */
+/** Light or dark, as the machine is set until somebody turns it; and the colours that canvases take from the style sheet. */
 import { Signal } from "./signal";
 import type { Rgb } from "./colours";
 
-export type Theme = "auto" | "light" | "dark";
+export type Theme = "light" | "dark";
 
 /** Rises whenever colours have changed. */
 export const repaint = new Signal(0);
 
 export function setTheme(theme: Theme): void {
-  if (theme === "auto") delete document.documentElement.dataset["theme"];
-  else document.documentElement.dataset["theme"] = theme;
+  document.documentElement.dataset["theme"] = theme;
   repaint.set(repaint.value + 1);
 }
 

@@ -15,7 +15,7 @@ __all__ = ["BuiltPage", "built_page", "report_of"]
 
 _DOCTYPE = "<!doctype html>\n"
 _STYLE = '<link rel="stylesheet" href="page.css" />'
-_SCRIPT = '<script type="module" src="page.js"></script>'
+_SCRIPT = '<script src="page.js"></script>'
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def report_of(page: BuiltPage, document: dict[str, Any]) -> str:
     told = f'<script type="application/json" id="season">{_inside_html(document)}</script>'
     html = page.html.replace(_DOCTYPE, f"{_DOCTYPE}{head}", 1)
     html = html.replace(_STYLE, f"<style>{page.style}</style>", 1)
-    return html.replace(_SCRIPT, f'{told}\n<script type="module">{page.script}</script>', 1)
+    return html.replace(_SCRIPT, f"{told}\n<script>{page.script}</script>", 1)
 
 
 def _digest(text: str) -> str:

@@ -1,7 +1,8 @@
-"""The page on a port of this machine: five addresses, all for reading, of one map."""
+"""The page on a port of this machine: a few addresses, all for reading, of one map."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import threading
@@ -12,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 from pomona.errors import PomonaError
 from pomona.viewer.built_page import built_page
 from pomona.viewer.season_page import Wishes, season_document
+from pomona.viewer.told_crops import CropShelf
 from pomona.viewer.visitors import why_refused
 
 if TYPE_CHECKING:
     from fastapi import FastAPI, Request, Response
 
 __all__ = ["listening", "page_app", "serve"]
+
+JPEG = b"\xff\xd8\xff"
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -31,21 +35,29 @@ HEADERS = {
 
 
 class _ServedSeason:
-    """The document of a map, told anew when the file has changed."""
+    """A map as it is now: told anew when the file has changed."""
 
     def __init__(self, path: Path, wishes: Wishes) -> None:
         self._path, self._wishes = path, wishes
         self._lock = threading.Lock()
         self._told_of: tuple[int, int] | None = None
-        self._text = b""
+        self._now = (b"", CropShelf(path))
 
     def text(self) -> bytes:
+        return self._told()[0]
+
+    def picture(self, fruit: int, visit: int | None) -> bytes | None:
+        return self._told()[1].picture(fruit, visit)
+
+    def _told(self) -> tuple[bytes, CropShelf]:
         with self._lock:
             about = self._path.stat()
             if self._told_of != (about.st_mtime_ns, about.st_size):
-                self._text = json.dumps(season_document(self._path, self._wishes), allow_nan=False).encode()
+                shelf = CropShelf(self._path)
+                document = season_document(self._path, self._wishes, shelf.told)
+                self._now = (json.dumps(document, allow_nan=False).encode(), shelf)
                 self._told_of = (about.st_mtime_ns, about.st_size)
-            return self._text
+            return self._now
 
 
 def page_app(path: Path, wishes: Wishes) -> FastAPI:
@@ -75,6 +87,15 @@ def page_app(path: Path, wishes: Wishes) -> FastAPI:
     for address, (text, kind) in kinds.items():
         app.add_api_route(address, _constant(Response(text, media_type=kind)), methods=["GET", "HEAD"])
     app.add_api_route("/season.json", season_json, methods=["GET", "HEAD"])
+
+    def crop(fruit: int, visit: int | None = None) -> Response:
+        picture = season.picture(fruit, visit)
+        if picture is None:
+            return Response("no such picture", 404, media_type="text/plain")
+        return Response(picture, media_type="image/jpeg" if picture.startswith(JPEG) else "image/webp")
+
+    for address in ("/crops/{fruit}", "/crops/{fruit}/{visit}"):
+        app.add_api_route(address, crop, methods=["GET", "HEAD"])
     app.middleware("http")(_guarded)
     return app
 
@@ -93,21 +114,24 @@ async def _guarded(request: Request, answer: Callable[[Request], Awaitable[Respo
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """Take a port, any free one for 0.
+    """Take a port, any free one for 0, so that whoever is told of it can ask at once.
 
     Raises
     ------
     PomonaError
         When it is taken, or the address is none of this machine's.
     """
-    try:
-        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        taken = socket.socket(family, kind)
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        taken.bind(address)
-    except OSError as error:
-        raise PomonaError(f"--host {host} --port {port}: cannot be listened on: {error.strerror}") from None
-    return taken
+    with contextlib.ExitStack() as undone:
+        try:
+            family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            taken = undone.enter_context(socket.socket(family, kind))
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            taken.bind(address)
+            taken.listen()
+        except OSError as error:
+            raise PomonaError(f"--host {host} --port {port}: cannot be listened on: {error.strerror}") from None
+        undone.pop_all()
+        return taken
 
 
 def serve(app: Any, taken: socket.socket) -> None:

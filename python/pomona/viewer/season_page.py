@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -19,11 +19,14 @@ from pomona.growth.season_growth import grow_season
 from pomona.growth.size_classes import FIVE_MM
 from pomona.orchard import OrchardMap
 from pomona.viewer.told_calipers import calipers_told
+from pomona.viewer.told_crops import crops_inside
 from pomona.viewer.told_fruits import FruitsTold, trees_told
 from pomona.viewer.told_growth import growth_told
 from pomona.viewer.told_thinning import thinning_told
 
 __all__ = ["Wishes", "season_document"]
+
+CropsTold = Callable[[Path, FruitsTold], dict[str, Any] | None]
 
 FORMAT = 1
 """Of the document; the page says so when it is another."""
@@ -58,8 +61,16 @@ class Wishes:
     up: NDArray[np.float64] | None = None
 
 
-def season_document(path: Path, wishes: Wishes) -> dict[str, Any]:
+def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside) -> dict[str, Any]:
     """Tell a map as plain values for JSON; the same map and wishes give the same document.
+
+    Parameters
+    ----------
+    path : Path
+        The map.
+    wishes : Wishes
+    crops : callable
+        Tells where the small pictures of fruits are, in the document otherwise.
 
     Raises
     ------
@@ -86,6 +97,7 @@ def season_document(path: Path, wishes: Wishes) -> dict[str, Any]:
         "sights": fruits.sights(orchard.observations(), [visit.name for visit in visits]),
         **_grown(path, wishes, fruits),
         "calipers": calipers_told(path, wishes.calipers, fruits),
+        "crops": crops(path, fruits),
     }
 
 

@@ -1,12 +1,10 @@
 /** What a grower can do now, the most pressing first; one line each. */
 import type { Page } from "../page";
-import { hangingRows, treeSummaries, type TreeSummary } from "../summary";
+import { areFruitlets, hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
-import { fruits, fullDay, percent, whole } from "../words";
+import { day, fruits, percent, whole } from "../words";
 
-/** Fruits that are larger on average are not thinned any more. */
-const THINNED_BELOW_MM = 45;
 /** A tree that grows so much slower than all is worth a look. */
 const SLOW = 0.9;
 const MISSED = STATES.indexOf("missed");
@@ -35,8 +33,7 @@ function thin({ season, target }: Page, trees: readonly TreeSummary[]): string[]
     if (toThin > 0) return [`Thin ${fruits(toThin)}`, `on ${on} of ${trees.length} trees, ${kept}`, ...dropping];
     return ["Nothing to thin", kept, ...dropping];
   }
-  const isEarly = (season.growth?.blocks[0].mean_mm[season.growth.nVisits - 1] ?? 0) < THINNED_BELOW_MM;
-  return isEarly ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
+  return areFruitlets(season) ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
 }
 
 function harvest({ growth }: Season): string[] {
@@ -44,7 +41,7 @@ function harvest({ growth }: Season): string[] {
   const then = growth.classes.filter((one) => Date.parse(one.date) >= (growth.harvest ?? 0));
   const sum = (of: (one: SizeClass) => number): number => then.reduce((total, one) => total + of(one), 0);
   const best = then.reduce((most, one) => (one.n_fruits > most.n_fruits ? one : most), then[0]);
-  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${fullDay(growth.harvest)}`];
+  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${day(growth.harvest)}`];
   const share = best ? best.n_fruits / sum((one) => one.n_fruits) : 0;
   if (best) lines.push(`${percent(share)} of fruits will measure ${between(best)}`);
   return lines;

@@ -3,7 +3,7 @@ import { element, replaceAll, type Child } from "../elements";
 import type { Page } from "../page";
 import { advice } from "./advice";
 import { hangingRows, sizesNow } from "../summary";
-import { fullDay, mm, number, whole } from "../words";
+import { day, mm, number, whole } from "../words";
 
 export function answers(page: Page): HTMLElement {
   const root = element("section", { class: "answers", "aria-label": "At a glance" });
@@ -24,7 +24,7 @@ function howMany({ season }: Page): HTMLElement {
   const named = season.trees.filter((tree) => tree.name).length;
   const gone = season.n - hanging.length;
   const where = named > 0 ? `on ${named} trees, ${whole(hanging.length / named)} a tree` : "no single trees known";
-  const lost = gone > 0 ? `${whole(gone)} more were seen and are gone` : "none is gone so far";
+  const lost = gone > 0 ? gone === 1 ? "1 more was seen and is gone" : `${whole(gone)} more were seen and are gone` : "none is gone so far";
   return answer("How many", whole(hanging.length), "fruits hang", line(where), line(lost));
 }
 
@@ -32,10 +32,10 @@ function howBig({ season }: Page): HTMLElement {
   const all = season.growth?.blocks[0];
   const sizes = sizesNow(season);
   if (sizes.length === 0) return answer("How big", "–", "", line("no diameters in this map"));
-  const middle = `the middle eight of ten: ${number(quantile(sizes, 0.1), 0)} to ${number(quantile(sizes, 0.9), 0)} mm`;
+  const middle = `eight of ten: ${number(quantile(sizes, 0.1), 0)} to ${number(quantile(sizes, 0.9), 0)} mm`;
   if (!season.growth || !all) return answer("How big", number(mean(sizes), 1), "mm on average", line(middle));
   const now = season.growth.nVisits - 1;
-  const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90 %) on ${fullDay(season.growth.times[now])}`;
+  const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90 %)`;
   return answer("How big", number(all.mean_mm[now], 1), "mm on average", line(sure), line(middle));
 }
 
@@ -46,7 +46,7 @@ function howFast({ season }: Page): HTMLElement {
   const sure = line(`${number(low, 2)} to ${number(high, 2)} mm (90 %)`);
   const last = growth.times.length - 1;
   const then = growth.harvest === null ? line("--harvest DATE foretells a day") : line(
-    `${mm(growth.blocks[0].mean_mm[last])} on ${fullDay(growth.harvest)}: ${number(growth.blocks[0].low_mm[last], 1)} to ${number(growth.blocks[0].high_mm[last], 1)}`,
+    `${day(growth.harvest)}: ${mm(growth.blocks[0].mean_mm[last])}, ${number(growth.blocks[0].low_mm[last], 1)} to ${number(growth.blocks[0].high_mm[last], 1)}`,
   );
   return answer("How fast", number(rate, 2), "mm a day", sure, then);
 }

@@ -1,8 +1,10 @@
 /** What the row is coloured by, from where it is looked at, and what the colours mean. */
 import { schemeOf, VIRIDIS, type ColourBy, type Ramp, type Swatches } from "../colours";
 import { choice, element, replaceAll } from "../elements";
+import { ANY, isAny, passing } from "../filter";
 import type { Page } from "../page";
 import type { Orbit, View } from "../scene/orbit";
+import { fruits, whole } from "../words";
 
 const VIEWS: readonly (readonly [View, string])[] = [
   ["side", "Side"],
@@ -36,9 +38,24 @@ export function legend(page: Page): HTMLElement {
   const root = element("div", { class: "legend" });
   page.colour.watch(() => {
     const { legend } = schemeOf(page);
-    replaceAll(root, element("span", { class: "label" }, legend.title), legend.kind === "ramp" ? ramp(legend) : swatches(legend));
+    const title = element("span", { class: "label" }, legend.title);
+    replaceAll(root, title, legend.kind === "ramp" ? ramp(legend) : swatches(legend), legend.kind === "ramp" ? unseen() : null);
   });
   return root;
+}
+
+function unseen(): HTMLElement {
+  return element("span", { class: "swatch soft" }, element("span", { class: "dot ring", "aria-hidden": "true" }), "not seen then");
+}
+
+/** Says that not all fruits are looked at, and ends it. */
+export function filtered(page: Page): HTMLElement {
+  const button = element("button", { type: "button", class: "filtered", click: () => page.filter.set(ANY) });
+  page.filter.watch((now) => {
+    button.hidden = isAny(now);
+    button.textContent = `Only ${whole(passing(page).length)} of ${fruits(page.season.n)} ✕`;
+  });
+  return button;
 }
 
 function ramp({ low, high }: Ramp): HTMLElement {

@@ -52,7 +52,8 @@ export function rowView(page: Page): RowView {
 function paintFruits(page: Page, stage: Stage): void {
   const { history, season } = page;
   const time = page.time.value;
-  const [scheme, passes, place] = [schemeOf(page), passesOf(page), history.placeAt(time)];
+  const [scheme, passes] = [schemeOf(page), passesOf(page)];
+  const [place, size, colour] = [history.placeAt(time), history.sizeAt(time), scheme.at(time)];
   const visit = history.visitAt(time);
   const isOfStates = page.colour.value === "state";
   const { positions, diameters, colours } = stage.fruits;
@@ -60,9 +61,9 @@ function paintFruits(page: Page, stage: Stage): void {
     const isKnown = history.first[fruit] <= visit;
     const isShown = history.isThere(fruit, time) || (isKnown && isOfStates);
     const look = !isShown ? "hidden" : !passes(fruit) ? "faded" : history.wasSeen(fruit, visit) ? "solid" : "ring";
-    colours.set(scheme.of(fruit, time), 4 * fruit);
+    colours.set(colour(fruit), 4 * fruit);
     colours[4 * fruit + 3] = LOOKS[look];
-    diameters[fruit] = history.sizeAt(fruit, time) / 1000;
+    diameters[fruit] = size(fruit) / 1000;
     place(fruit, positions, 3 * fruit);
   }
   stage.fruits.changed();
@@ -75,7 +76,7 @@ function mark({ selected, time, history }: Page, stage: Stage): void {
   marks.colours.set([...inkRgb("accent"), fruit === null ? LOOKS.hidden : LOOKS.ring]);
   if (fruit !== null) {
     history.placeAt(time.value)(fruit, marks.positions, 0);
-    marks.diameters[0] = (1.7 * history.sizeAt(fruit, time.value)) / 1000;
+    marks.diameters[0] = (1.7 * history.sizeAt(time.value)(fruit)) / 1000;
   }
   marks.changed();
   stage.redraw();
@@ -85,7 +86,7 @@ function showTip(page: Page, tip: HTMLElement, fruit: number | null, x: number, 
   tip.hidden = fruit === null;
   if (fruit === null) return;
   const facts = factsOf(page, fruit);
-  const size = mm(page.history.sizeAt(fruit, page.time.value));
+  const size = mm(page.history.sizeAt(page.time.value)(fruit));
   const rate = Number.isNaN(facts.rate) ? "" : ` · ${number(facts.rate, 2)} mm a day`;
   tip.textContent = `Fruit ${facts.id} · ${size}${rate}`;
   tip.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;

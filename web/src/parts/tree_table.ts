@@ -8,12 +8,12 @@ export function treeTable(page: Page): HTMLElement {
   const { season, filter, target } = page;
   const body = element("tbody");
   const growth = season.growth;
-  const heads = ["Tree", "Fruits", "mm now", "mm a day"];
-  if (growth?.harvest) heads.push(`mm on ${day(growth.harvest)}`);
+  const heads = ["Tree", "Fruits", "mm", "a day"];
+  if (growth?.harvest) heads.push(day(growth.harvest));
   const isPlanned = (): boolean => season.thinning !== null && target.value !== null;
   const head = element("tr");
   const show = (): void => {
-    const titles = isPlanned() ? [...heads, "To thin"] : heads;
+    const titles = isPlanned() ? [...heads, "thin"] : heads;
     replaceAll(head, ...titles.map((title) => element("th", { scope: "col" }, title)));
     const trees = treeSummaries(page);
     const most = Math.max(...trees.map((tree) => tree.fruits));
@@ -32,7 +32,7 @@ function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPla
   const pick = (): void => filter.set({ ...filter.value, tree: isChosen ? null : tree.tree });
   const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, tree.label);
   const bar = element("span", { class: "bar", "aria-hidden": "true" });
-  bar.style.width = `${(64 * tree.fruits) / Math.max(1, most)}px`;
+  bar.style.width = `${(36 * tree.fruits) / Math.max(1, most)}px`;
   const cells = [
     element("td", {}, bar, whole(tree.fruits)),
     element("td", {}, number(tree.block?.mean_mm[now] ?? NaN, 1)),

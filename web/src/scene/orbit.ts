@@ -18,7 +18,7 @@ export interface Looking {
 
 export const FIELD_OF_VIEW_DEG = 28;
 const STRAIGHT_DOWN = Math.PI / 2 - 1e-3;
-const MARGIN = 1.12;
+const MARGIN = 1.04;
 const ANGLES: Record<View, readonly [number, number]> = {
   side: [0, 0.1],
   above: [0, STRAIGHT_DOWN],
@@ -28,13 +28,15 @@ const ANGLES: Record<View, readonly [number, number]> = {
 export class Orbit {
   readonly looking = new Signal<Looking>({ target: [0, 0, 0], azimuth: 0, elevation: 0, distance: 1 });
 
-  constructor(
-    private readonly extent: Extent,
-    private aspect = 2,
-  ) {}
+  private whole: View | null = null;
+  private aspect = 2;
 
+  constructor(private readonly extent: Extent) {}
+
+  /** The whole row stays in the picture until somebody moves the camera. */
   setAspect(aspect: number): void {
     this.aspect = aspect;
+    if (this.whole !== null) this.see(this.whole);
   }
 
   /** Shows the whole row: from as near as its box fits into the picture. */
@@ -50,10 +52,12 @@ export class Orbit {
       return nearer + MARGIN * Math.max(Math.abs(right) / this.aspect, Math.abs(up)) / slope;
     });
     this.looking.set({ target, azimuth, elevation, distance: Math.max(...distances) });
+    this.whole = view;
   }
 
   turn(byAzimuth: number, byElevation: number): void {
     const { azimuth, elevation, ...rest } = this.looking.value;
+    this.whole = null;
     const raised = Math.min(STRAIGHT_DOWN, Math.max(-0.3, elevation + byElevation));
     this.looking.set({ ...rest, azimuth: azimuth + byAzimuth, elevation: raised });
   }
@@ -61,6 +65,7 @@ export class Orbit {
   /** Moves the target to the right and upwards in the picture, in shares of its height. */
   shift(right: number, up: number): void {
     const { target, azimuth, elevation, distance } = this.looking.value;
+    this.whole = null;
     const seen = 2 * distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
     const [r, u] = [right * seen, up * seen];
     const flat = u * Math.sin(elevation);
@@ -73,12 +78,9 @@ export class Orbit {
   }
 
   zoom(factor: number): void {
+    this.whole = null;
     const now = this.looking.value;
     this.looking.set({ ...now, distance: Math.min(1e4, Math.max(0.2, now.distance * factor)) });
-  }
-
-  lookAt(target: readonly [number, number, number], distance: number): void {
-    this.looking.set({ ...this.looking.value, target, distance });
   }
 }
 

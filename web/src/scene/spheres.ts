@@ -11,19 +11,20 @@ in vec4 colour;
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform float pixels, least;
 out vec3 tint;
-flat out float look;
+flat out float look, rim;
 void main() {
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   gl_PointSize = max(pixels * diameter / gl_Position.w, least);
   tint = colour.rgb;
   look = colour.a;
+  rim = 1.0 - 3.0 / gl_PointSize;
   if (look < 0.1) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 
 const FRAGMENT = `#version 300 es
 precision mediump float;
 in vec3 tint;
-flat in float look;
+flat in float look, rim;
 uniform vec3 background;
 out vec4 shown;
 void main() {
@@ -34,7 +35,9 @@ void main() {
   float light = 0.62 + 0.42 * dot(normal, vec3(-0.38, 0.56, 0.73));
   float shine = 0.22 * pow(max(dot(normal, vec3(-0.25, 0.42, 0.87)), 0.0), 24.0);
   vec3 lit = look > 0.8 ? tint * light + shine : tint;
-  shown = vec4(look < 0.5 ? mix(background, tint, 0.28) : lit, 1.0);
+  // The rim fades where it has two pixels for it: most fruits hang before nothing.
+  float solid = rim > 0.3 ? 1.0 - smoothstep(rim, 1.0, sqrt(r2)) * 0.7 : 1.0;
+  shown = vec4(look < 0.5 ? mix(background, tint, 0.28) : mix(background, lit, solid), 1.0);
 }`;
 
 export interface Spheres {

@@ -7,6 +7,8 @@ import { strokes, type Strokes } from "./strokes";
 
 const LEAST_PX = 2.5;
 const MOST_RATIO = 2;
+/** Without a graphics card four samples a pixel take three times as long, and more fruits leave fewer pixels to each. */
+const FEW = 2000;
 
 export interface OnCanvas {
   readonly x: number;
@@ -31,7 +33,8 @@ export class Stage {
     private readonly orbit: Orbit,
     n: number,
   ) {
-    this.renderer = new Renderer({ dpr: Math.min(devicePixelRatio, MOST_RATIO), antialias: true, alpha: false });
+    const dpr = Math.min(devicePixelRatio, MOST_RATIO);
+    this.renderer = new Renderer({ dpr, antialias: n <= FEW, alpha: false });
     const gl = this.renderer.gl;
     this.canvas = gl.canvas;
     holder.append(this.canvas);

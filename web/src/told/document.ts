@@ -22,6 +22,16 @@ export interface Told {
   readonly thinning: ToldThinning | null;
   readonly no_growth: string | null;
   readonly calipers: Calipers | null;
+  readonly crops: ToldCrops | null;
+}
+
+export interface ToldCrops {
+  /** Rows of the fruits that have a picture. */
+  readonly best: Packed;
+  /** Of these, in base64, in a report. */
+  readonly pictures: readonly string[] | null;
+  /** What the server has. */
+  readonly sights: { readonly fruit: Packed; readonly visit: Packed } | null;
 }
 
 export interface Block {

@@ -19,7 +19,7 @@ export interface History {
   readonly isThere: (fruit: number, time: number) => boolean;
   readonly stateAt: (fruit: number, time: number) => State;
   /** Diameter by the curve; where there is none, the last one that was measured. */
-  readonly sizeAt: (fruit: number, time: number) => number;
+  readonly sizeAt: (time: number) => (fruit: number) => number;
   readonly placeAt: (time: number) => (fruit: number, into: Float32Array, at: number) => void;
 }
 
@@ -53,11 +53,10 @@ export function historyOf(season: Season): History {
     if (!seen[fruit * nVisits + v]) return "missed";
     return v > 0 && v === first[fruit] ? "new" : "seen";
   };
-  const sizeAt = (fruit: number, time: number): number => {
-    const known = growth ? between(growth.times, growth.medianMm, fruit, time) : NaN;
-    if (!Number.isNaN(known)) return known;
-    const measured = sizes[fruit * nVisits + visitAt(time)];
-    return Number.isNaN(measured) ? USUAL_MM : measured;
+  const sizeAt = (time: number) => {
+    const v = visitAt(time);
+    const curve = growth ? between(growth.times, growth.medianMm, time) : () => NaN;
+    return (fruit: number): number => curve(fruit) || sizes[fruit * nVisits + v] || USUAL_MM;
   };
   const placeAt = (time: number) => {
     const v = visitAt(time);
@@ -87,13 +86,15 @@ export function historyOf(season: Season): History {
   };
 }
 
-/** A curve at a time, on lines between its days. */
-function between(times: readonly number[], rows: Float64Array, fruit: number, time: number): number {
+/** Curves at a time, on lines between their days; NaN where there is none. */
+function between(times: readonly number[], rows: Float64Array, time: number): (fruit: number) => number {
   const q = times.length;
-  const after = Math.min(q - 1, Math.max(1, times.findIndex((one) => one >= time)));
-  const right = times[after] < time ? q - 1 : after;
+  const after = times.findIndex((one) => one >= time);
+  const right = after < 0 ? q - 1 : Math.max(1, after);
   const left = right - 1;
   const share = Math.min(1, Math.max(0, (time - times[left]) / (times[right] - times[left] || 1)));
-  const [low, high] = [rows[fruit * q + left], rows[fruit * q + right]];
-  return Number.isNaN(high) ? low : low + share * (high - low);
+  return (fruit) => {
+    const [low, high] = [rows[fruit * q + left], rows[fruit * q + right]];
+    return Number.isNaN(high) ? low : low + share * (high - low);
+  };
 }

@@ -1,6 +1,7 @@
 /** The season in memory: columns of N fruits, K sights and Q days of curves. */
 import { timeOf } from "../words";
 import { unpacked, unpackedTexts } from "./columns";
+import { cropsOf, type Crops } from "./crops";
 import { FORMAT, type Block, type Calipers, type SizeClass, type Told } from "./document";
 
 export const STATES = ["new", "seen", "missed", "gone"] as const;
@@ -75,6 +76,7 @@ export interface Season {
   readonly noGrowth: string | null;
   readonly thinning: Thinning | null;
   readonly calipers: Calipers | null;
+  readonly crops: Crops | null;
 }
 
 /** Takes the document out of the report, or asks the server for it. */
@@ -107,6 +109,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     noGrowth: told.no_growth,
     thinning: await thinningOf(told),
     calipers: told.calipers,
+    crops: await cropsOf(told.crops, ids),
   };
 }
 

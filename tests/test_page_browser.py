@@ -1,0 +1,291 @@
+"""The page in a real browser: what a grower does, what a stranger's map tries."""
+
+import contextlib
+import csv
+import http.server
+import re
+import threading
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
+from page_maker import chromium, served
+from pomona.orchard import OrchardMap
+from pomona.viewer.season_page import Wishes
+from pomona.viewer.season_report import write_report
+from test_calipers import long_table
+
+AXE = Path(__file__).parents[1] / "web" / "node_modules" / "axe-core" / "axe.min.js"
+HOSTILE = '</script><img src=x onerror="window.owned=1"><b>\'&quot;\u202e\x1b[31m%s' + "w" * 3000
+N = 3 * FRUITS_OF_TREE
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
+
+
+@pytest.fixture(scope="module")
+def report(row: GrownRow, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    calipers = long_table(row, folder / "calipers.csv")
+    write_report(row.path, folder / "report.html", Wishes(harvest=date(2024, 9, 1), target=20, calipers=calipers))
+    return folder / "report.html"
+
+
+@contextlib.contextmanager
+def opened(browser: Any, address: str, **settings: Any) -> Iterator[Any]:
+    """A page that has drawn its row; nothing may have gone wrong by the end, and nobody else have been asked."""
+    context = browser.new_context(**{"viewport": {"width": 1280, "height": 860}, **settings})
+    page = context.new_page()
+    wrong: list[str] = []
+    asked: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text) if said.type in ("error", "warning") else None)
+    page.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address)
+    page.wait_for_selector("canvas")
+    yield page
+    context.close()
+    own = re.compile(rf"{re.escape(address)}|data:|blob:")
+    assert [text for text in wrong if "GPU stall" not in text] == []
+    assert [url for url in asked if not own.match(url)] == []
+
+
+@pytest.fixture
+def page(browser: Any, report: Path) -> Iterator[Any]:
+    with opened(browser, report.as_uri()) as found:
+        yield found
+
+
+def shown_rows(page: Any) -> list[list[str]]:
+    return [line.locator("[role=cell]").all_inner_texts() for line in page.locator(".lines .line").all()]
+
+
+def wait_for(locator: Any, text: str) -> None:
+    from playwright.sync_api import expect
+
+    expect(locator).to_contain_text(text, timeout=20_000)
+
+
+def touch_a_fruit(page: Any) -> None:
+    """Click here and there in the row, as one does who cannot aim, until a fruit is hit."""
+    box = page.locator("canvas").first.bounding_box()
+    for y in range(4, 9):
+        for x in range(10, 90):
+            page.mouse.move(box["x"] + box["width"] * x / 100, box["y"] + box["height"] * y / 10)
+            if page.locator(".tip").is_visible():
+                page.mouse.down()
+                page.mouse.up()
+                return
+    pytest.fail("no fruit anywhere in the row")
+
+
+def test_the_first_look_answers_four_questions(page: Any, row: GrownRow) -> None:
+    many, big, fast, to_do = page.locator(".answer").all_inner_texts()
+    hanging = sum(state != "gone" for state in OrchardMap(row.path).fruits().extras["state"])
+    assert f"{hanging} fruits hang" in " ".join(many.split())
+    assert re.search(r"\d\d\.\d mm on average", " ".join(big.split()))
+    assert re.search(r"0\.\d\d mm a day", " ".join(fast.split()))
+    assert re.search(r"Thin \d+ fruits", to_do)
+    assert len(page.locator(".trees tbody tr").all()) == 3
+
+
+def test_the_slider_goes_through_the_season(page: Any) -> None:
+    last = page.locator("canvas").first.screenshot()
+    assert "visit 4 of 4" in page.locator(".when").inner_text()
+    slider = page.get_by_label("Date", exact=True)
+    slider.fill("0")
+    assert "visit 1 of 4" in page.locator(".when").inner_text()
+    page.wait_for_timeout(300)
+    assert page.locator("canvas").first.screenshot() != last
+    slider.focus()
+    page.keyboard.press("End")
+    assert "foretold" in page.locator(".when").inner_text()
+    page.get_by_label("Play the season").click()
+    wait_for(page.locator(".when"), "visit 2")
+    page.get_by_label("Pause").click()
+
+
+def test_a_touched_fruit_shows_its_card(page: Any, row: GrownRow) -> None:
+    touch_a_fruit(page)
+    card = page.locator(".fruit-card").first
+    fruit_id = int(re.search(r"Fruit (\d+)", card.inner_text())[1])
+    seen = OrchardMap(row.path).observations()
+    sizes_mm = 1000.0 * seen.diameters_m[seen.fruit_ids == fruit_id]
+    shown = [float(cell) for cell in card.locator(".sights td:nth-child(3)").all_inner_texts()]
+    assert shown == pytest.approx(sizes_mm.tolist(), abs=0.11)
+    card.locator(".curve canvas").wait_for()
+    assert "90 %" in card.locator(".curve").get_attribute("aria-label")
+    card.get_by_label("Close").click()
+    assert page.locator(".fruit-card").count() == 0
+
+
+def test_the_table_filters_sorts_and_is_saved(page: Any, row: GrownRow, tmp_path: Path) -> None:
+    page.get_by_role("tab", name="Fruits").click()
+    assert page.locator(".filter-bar output").inner_text() == f"{N} of {N} fruits"
+    assert len(shown_rows(page)) < N, "only what is on the screen is in the page"
+    page.get_by_label("Tree", exact=True).select_option(label="Tree 2")
+    assert page.locator(".filter-bar output").inner_text() == f"{FRUITS_OF_TREE} of {N} fruits"
+    page.get_by_role("button", name="mm now").click()
+    sizes = [float(cells[5]) for cells in shown_rows(page)]
+    assert sizes == sorted(sizes)
+    page.get_by_role("button", name="mm now").click()
+    largest = max(float(line["diameter_mm"]) for line in saved(page, tmp_path))
+    assert float(shown_rows(page)[0][5]) == pytest.approx(largest, abs=0.06)
+    lines = saved(page, tmp_path)
+    assert {line["tree"] for line in lines} == {"2"}
+    fruits = OrchardMap(row.path).fruits()
+    place_of = dict(zip(fruits.ids, fruits.positions, strict=True))
+    for line in lines:
+        found = [float(line[axis]) for axis in "xyz"]
+        assert found == pytest.approx(place_of[line["fruit_id"]].tolist(), abs=0.002)
+
+
+def saved(page: Any, folder: Path) -> list[dict[str, str]]:
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save CSV").click()
+    assert download.value.suggested_filename == "orchard-fruits.csv"
+    download.value.save_as(folder / "saved.csv")
+    with (folder / "saved.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_everything_goes_with_keys(page: Any) -> None:
+    page.get_by_role("tab", name="Row").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.get_by_role("tab", name="Fruits").get_attribute("aria-selected") == "true"
+    page.get_by_role("table", name="Fruits").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    assert shown_rows(page)[1][0] == re.search(r"Fruit (\d+)", page.locator("#panel-fruits h2").inner_text())[1]
+    page.get_by_role("tab", name="Row").click()
+    canvas = page.locator("#panel-row canvas").first
+    canvas.focus()
+    page.wait_for_timeout(300)
+    before = canvas.screenshot()
+    page.keyboard.press("d")
+    page.keyboard.press("+")
+    page.wait_for_timeout(300)
+    assert canvas.screenshot() != before
+
+
+def test_thinning_follows_the_target(page: Any) -> None:
+    page.get_by_role("tab", name="Thinning").click()
+    to_thin = page.locator("#panel-thinning .total td:nth-child(5)")
+    before = int(to_thin.inner_text())
+    page.get_by_label("Each tree shall keep").fill("10")
+    stay = int(page.locator("#panel-thinning .total td:nth-child(4)").inner_text())
+    assert int(to_thin.inner_text()) == stay - 30 > before
+    page.get_by_role("button", name="List them").click()
+    assert page.locator(".filter-bar output").inner_text() == f"{stay - 30} of {N} fruits"
+
+
+def test_two_dates_and_calipers_are_told(page: Any) -> None:
+    page.get_by_role("tab", name="Two dates").click()
+    page.wait_for_selector("#panel-dates canvas")
+    page.get_by_label("Date above").select_option(index=0)
+    wait_for(page.locator("#panel-dates [role=status]"), f"{N} fruits on both")
+    page.get_by_role("tab", name="Calipers").click()
+    assert page.locator("#panel-calipers circle").count() == 4 * N
+    assert page.locator("#panel-calipers tbody tr").first.inner_text().split()[1] == str(4 * N)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(browser: Any, report: Path, scheme: str) -> None:
+    if not AXE.exists():
+        pytest.skip(f"no axe-core: {AXE} is not there; make page")
+    with opened(browser, report.as_uri(), color_scheme=scheme, bypass_csp=True) as page:
+        page.add_script_tag(path=str(AXE))
+        touch_a_fruit(page)
+        for tab in ("Row", "Fruits", "Two dates", "Sizes", "Thinning", "Calipers"):
+            page.get_by_role("tab", name=tab).click()
+            page.wait_for_timeout(200)
+            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+            serious = [one for one in found if one["impact"] in ("serious", "critical")]
+            assert [(one["id"], one["nodes"][0]["html"][:160]) for one in serious] == [], tab
+
+
+def test_a_phone_shows_it_without_scrolling_sideways(browser: Any, report: Path) -> None:
+    with opened(browser, report.as_uri(), viewport={"width": 390, "height": 844}, has_touch=True) as page:
+        for tab in ("Row", "Fruits", "Two dates", "Sizes", "Thinning", "Calipers"):
+            page.get_by_role("tab", name=tab).click()
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    """A map whose names all try to be more than names."""
+    path = tmp_path_factory.mktemp("hostile") / "<img src=x onerror=alert(1)>'\u202egkpg.gpkg"
+    return grow_row(path, (50, 65), n_trees=1, labels=HOSTILE + " {}", name=HOSTILE + " {}")
+
+
+def test_names_of_strangers_are_texts(browser: Any, hostile: GrownRow, tmp_path: Path) -> None:
+    calipers = tmp_path / "=calipers<b>.csv"
+    with calipers.open("w", newline="") as file:
+        csv.writer(file).writerows([("label", "date", "diameter_mm"), (f"{HOSTILE} 7", hostile.day(50), 40)])
+    write_report(hostile.path, tmp_path / "report.html", Wishes(calipers=calipers))
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        assert_harmless(page, hostile)
+        page.get_by_role("tab", name="Calipers").click()
+        assert HOSTILE in page.locator("circle title").first.text_content()
+        assert_harmless(page, hostile)
+
+
+def test_names_of_strangers_are_texts_from_the_server_too(browser: Any, hostile: GrownRow) -> None:
+    with served(hostile.path) as address, opened(browser, address) as page:
+        assert_harmless(page, hostile)
+
+
+def assert_harmless(page: Any, hostile: GrownRow) -> None:
+    assert page.locator("h1").text_content() == hostile.path.name
+    assert page.evaluate("window.owned") is None
+    assert page.locator("img, b").count() == 0
+    assert page.evaluate("document.scripts.length") <= 2
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+
+
+def test_a_page_from_elsewhere_learns_nothing(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("<!doctype html><title>elsewhere</title>")
+    with served(row.path) as address, elsewhere(tmp_path) as foreign:
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(foreign)
+        for mode in ("cors", "no-cors"):
+            ask = f"fetch('{address}season.json', {{mode: '{mode}'}}).then((r) => r.text()).catch(() => '')"
+            assert page.evaluate(ask) == ""
+        load = f"""new Promise((done) => {{
+            const script = document.createElement('script');
+            script.onload = () => done('run'); script.onerror = () => done('refused');
+            script.src = '{address}page.js'; document.head.append(script); }})"""
+        assert page.evaluate(load) == "refused"
+        page.evaluate(f"document.body.append(Object.assign(document.createElement('iframe'), {{src: '{address}'}}))")
+        page.wait_for_timeout(500)
+        assert all("pomona" not in frame.content().lower() for frame in page.frames[1:])
+        context.close()
+
+
+@contextlib.contextmanager
+def elsewhere(folder: Path) -> Iterator[str]:
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(folder))
+
+        def log_message(self, *_: Any) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()

@@ -1,0 +1,62 @@
+/** How many fruits to take from each tree, for a number that it shall keep. */
+import { element, replaceAll } from "../elements";
+import { ANY } from "../filter";
+import type { Page } from "../page";
+import { areFruitlets, treeSummaries, type TreeSummary } from "../summary";
+import { fullDay, number, whole } from "../words";
+
+const LATE = "These fruits are past the size at which one thins, and the rule below is one of fruitlets.";
+
+export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTMLElement {
+  const plan = page.season.thinning;
+  if (plan === null) {
+    const why = page.season.noGrowth ?? "no fruit was measured on both of the last two days";
+    return element("p", { class: "notice" }, `Thinning needs the growth between two days: ${why}.`);
+  }
+  const most = Math.max(...treeSummaries(page).map((tree) => tree.fruits));
+  const input = element("input", { type: "number", min: 0, max: most, id: "target", input: () => set(input.value) });
+  const slider = element("input", { type: "range", min: 0, max: most, "aria-label": "Fruits that a tree shall keep", input: () => set(slider.value) });
+  const set = (value: string): void => page.target.set(value === "" ? null : Math.max(0, Math.round(Number(value))));
+  const body = element("tbody");
+  const show = element("button", { type: "button", click: () => (page.colour.set("plan"), goTo("row")) }, "Show in the row");
+  const list = element("button", { type: "button", click: () => (page.filter.set({ ...ANY, action: "thin" }), goTo("fruits")) }, "List them");
+  page.target.watch((target) => {
+    slider.value = String(target ?? most);
+    if (document.activeElement !== input) input.value = target === null ? "" : String(target);
+    const trees = treeSummaries(page);
+    replaceAll(body, ...trees.map(lineOf), totalOf(trees));
+  });
+  const late = areFruitlets(page.season) ? null : element("p", { class: "late" }, LATE);
+  const heads = ["Tree", "Fruits", "will drop", "stay", "to thin", "clusters to visit"];
+  const head = element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name)));
+  const table = element("table", { class: "plain" }, element("thead", {}, head), body);
+  return element(
+    "section",
+    { class: "card" },
+    element("h2", {}, "Thinning"),
+    late,
+    element("p", { class: "target" }, element("label", { for: "target" }, "Each tree shall keep "), input, slider, show, list),
+    element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Thinning by tree" }, table),
+    element("p", { class: "soft" }, rule(plan.fast, plan.from, plan.to)),
+  );
+}
+
+function rule(fast: number, from: number, to: number): string {
+  return (
+    `From ${fullDay(from)} to ${fullDay(to)} the fastest fruits grew ${number(fast, 2)} mm a day; what grows less than half as fast will drop. ` +
+    "Of the others a tree gives those of its fullest clusters first, the smallest of each."
+  );
+}
+
+function lineOf({ label, fruits, drops, thin, clustersToThin }: TreeSummary): HTMLElement {
+  const numbers = [fruits, drops, fruits - drops, thin, clustersToThin];
+  return element("tr", {}, element("th", { scope: "row" }, label), ...numbers.map((n) => element("td", {}, whole(n))));
+}
+
+function totalOf(trees: readonly TreeSummary[]): HTMLElement {
+  const sum = (of: (tree: TreeSummary) => number): number => trees.reduce((total, tree) => total + of(tree), 0);
+  const all = { fruits: sum((tree) => tree.fruits), drops: sum((tree) => tree.drops), thin: sum((tree) => tree.thin) };
+  const line = lineOf({ tree: -1, label: "All", gone: 0, block: null, ...all, clustersToThin: sum((tree) => tree.clustersToThin) });
+  line.className = "total";
+  return line;
+}

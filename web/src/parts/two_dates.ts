@@ -1,0 +1,161 @@
+/** Two dates, one over the other: the same fruits joined by lines, the others told apart. */
+import type { Rgb } from "../colours";
+import { element, replaceAll } from "../elements";
+import type { Page } from "../page";
+import { extentOf } from "../scene/extent";
+import { steer } from "../scene/gestures";
+import { Orbit } from "../scene/orbit";
+import { fruitAt } from "../scene/picking";
+import { LOOKS } from "../scene/spheres";
+import { Stage } from "../scene/stage";
+import type { Ink, Stroke } from "../scene/strokes";
+import { onceAFrame, Signal, watchAll } from "../signal";
+import { inkRgb, repaint } from "../theme";
+import { fruits, fullDay, number } from "../words";
+
+const GAP_M = 0.5;
+const BOTH: Rgb = [0, 158, 115];
+const FIRST_ONLY: Rgb = [230, 159, 0];
+const SECOND_ONLY: Rgb = [86, 180, 233];
+const UNSURE: Rgb = [213, 94, 0];
+const FAINT = 0.35;
+/** Probability below which a line stands out. */
+const SURE = 0.9;
+
+interface Dates {
+  readonly first: Signal<number>;
+  readonly second: Signal<number>;
+}
+
+export function twoDates(page: Page): HTMLElement {
+  const { history, season } = page;
+  if (history.times.length < 2) return element("p", { class: "notice" }, "Two dates need a second visit.");
+  const last = history.times.length - 1;
+  const dates: Dates = { first: new Signal(last - 1), second: new Signal(last) };
+  const said = element("p", { class: "soft", role: "status" });
+  const head = element("div", { class: "row-tools" }, pick(page, "Date above", dates.first), pick(page, "Date below", dates.second), key());
+  const holder = element("div", { class: "row-view tall" });
+  const root = element("section", { class: "card row-card", "aria-label": "Two dates" }, head, holder, said);
+
+  const extent = extentOf(season);
+  const half = (extent.high[2] - extent.low[2] + GAP_M) / 2;
+  const [low, high] = [[...extent.low], [...extent.high]] as [[number, number, number], [number, number, number]];
+  [low[2], high[2]] = [low[2] - half, high[2] + half];
+  const orbit = new Orbit({ low, high });
+  const stage = new Stage(holder, orbit, 2 * season.n);
+  stage.canvas.tabIndex = 0;
+  stage.canvas.setAttribute("role", "application");
+  stage.canvas.setAttribute("aria-label", "Two dates in 3D. The card of a fruit has the same facts. Arrows move, A D W S turn, plus and minus zoom.");
+  steer(stage.canvas, orbit, {
+    hover: () => undefined,
+    leave: () => undefined,
+    press: (x, y) => {
+      const found = fruitAt(stage, x, y);
+      page.selected.set(found === null ? null : found % season.n);
+    },
+  });
+  orbit.see("side");
+  const paint = onceAFrame(() => {
+    const counts = compare(page, stage, dates, half);
+    replaceAll(said, summary(page, dates, counts));
+  });
+  watchAll([dates.first, dates.second, page.selected, page.filter], paint);
+  repaint.watch(() => {
+    stage.setBackground(inkRgb("sky"));
+    paint();
+  });
+  return root;
+}
+
+function pick({ season }: Page, label: string, chosen: Signal<number>): HTMLElement {
+  const options = season.visits.map((visit, v) => element("option", { value: v }, fullDay(visit.time)));
+  const select = element("select", { "aria-label": label, change: () => chosen.set(Number(select.value)) }, ...options);
+  chosen.watch((v) => (select.value = String(v)));
+  return select;
+}
+
+function key(): HTMLElement {
+  const kinds: [string, Rgb][] = [
+    ["on both dates", BOTH],
+    ["above only", FIRST_ONLY],
+    ["below only", SECOND_ONLY],
+  ];
+  const items = kinds.map(([name, rgb]) => {
+    const dot = element("span", { class: "dot", "aria-hidden": "true" });
+    dot.style.color = `rgb(${rgb.join(",")})`;
+    return element("span", { class: "swatch" }, dot, name);
+  });
+  return element("span", { class: "swatches" }, ...items);
+}
+
+interface Counts {
+  both: number;
+  first: number;
+  second: number;
+  growthMm: number;
+  measured: number;
+}
+
+function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
+  const { season, history, selected } = page;
+  const [a, b] = [dates.first.value, dates.second.value];
+  const [placeA, placeB] = [history.placeAt(history.times[a]), history.placeAt(history.times[b])];
+  const [sizeA, sizeB] = [history.sizeAt(history.times[a]), history.sizeAt(history.times[b])];
+  const { positions, diameters, colours } = stage.fruits;
+  const counts: Counts = { both: 0, first: 0, second: 0, growthMm: 0, measured: 0 };
+  const strokes: Stroke[] = [];
+  const tree = page.filter.value.tree;
+  for (let fruit = 0; fruit < season.n; fruit++) {
+    const [inA, inB] = [history.wasSeen(fruit, a), history.wasSeen(fruit, b)];
+    const other = season.n + fruit;
+    const isFaded = tree !== null && season.tree[fruit] !== tree;
+    const look = isFaded ? LOOKS.faded : LOOKS.solid;
+    placeA(fruit, positions, 3 * fruit);
+    placeB(fruit, positions, 3 * other);
+    positions[3 * fruit + 2] += half;
+    positions[3 * other + 2] -= half;
+    const rgb = inA && inB ? BOTH : inA ? FIRST_ONLY : SECOND_ONLY;
+    colours.set([...rgb, inA ? look : LOOKS.hidden], 4 * fruit);
+    colours.set([...rgb, inB ? look : LOOKS.hidden], 4 * other);
+    diameters[fruit] = sizeA(fruit) / 1000;
+    diameters[other] = sizeB(fruit) / 1000;
+    if (inA && inB) counts.both++;
+    else if (inA) counts.first++;
+    else if (inB) counts.second++;
+    if (!inA || !inB || isFaded) continue;
+    const isChosen = selected.value === fruit;
+    const isSure = sureOf(page, fruit, Math.max(a, b)) >= SURE;
+    const ink: Ink = isChosen ? [...inkRgb("accent"), 1] : isSure ? [...inkRgb("soft"), FAINT] : [...UNSURE, 0.9];
+    strokes.push({ from: at(positions, fruit), to: at(positions, other), ink });
+    const grown = measured(page, fruit, b) - measured(page, fruit, a);
+    if (Number.isNaN(grown)) continue;
+    counts.growthMm += grown;
+    counts.measured++;
+  }
+  stage.fruits.changed();
+  stage.lines.set(strokes);
+  stage.redraw();
+  return counts;
+}
+
+const at = (positions: Float32Array, i: number): [number, number, number] => [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
+
+function rowOf({ season }: Page, fruit: number, visit: number): number {
+  const { sights } = season;
+  for (let row = sights.starts[fruit]; row < sights.starts[fruit + 1]; row++) if (sights.visit[row] === visit) return row;
+  return -1;
+}
+
+const measured = (page: Page, fruit: number, visit: number): number => page.season.sights.diameterMm[rowOf(page, fruit, visit)];
+
+/** Probability that the later sight is this fruit. */
+function sureOf(page: Page, fruit: number, visit: number): number {
+  const sure = page.season.sights.probability[rowOf(page, fruit, visit)];
+  return Number.isNaN(sure) ? 1 : sure;
+}
+
+function summary({ history }: Page, { first, second }: Dates, counts: Counts): string {
+  const [a, b] = [fullDay(history.times[first.value]), fullDay(history.times[second.value])];
+  const grown = counts.measured > 0 ? `, where the mean of their measured diameters differs by ${number(counts.growthMm / counts.measured, 1)} mm` : "";
+  return `${fruits(counts.both)} on both dates${grown}; ${fruits(counts.first)} on ${a} only, ${fruits(counts.second)} on ${b} only. Lines join the same fruit; red ones are less than 90 % sure.`;
+}
