@@ -31,7 +31,7 @@ PREVIEW_EVERY, PREVIEW_MS = 3, 200
 
 CHROMIUM = "/usr/bin/chromium"
 CHROMIUM_FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox")
-PAGE_PX = {"width": 1200, "height": 699}
+PAGE_PX = {"width": 1240, "height": 722}
 DAYS_A_FRAME, PAGE_MS, LAST_MS = 3, 180, 2500
 
 

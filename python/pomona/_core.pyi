@@ -217,6 +217,8 @@ class _TrackViews(TypedDict):
     glimpses: NDArray[np.int64]
     shown_m2: NDArray[np.float64]
     fruitness: NDArray[np.float64]
+    diameters_m: NDArray[np.float64]
+    diameter_sigmas_m: NDArray[np.float64]
     missed_boxes: float
 
 @final

@@ -200,6 +200,10 @@ pub struct TrackArrays<'py> {
     #[pyo3(item)]
     fruitness: PyReadonlyArray1<'py, f64>,
     #[pyo3(item)]
+    diameters_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
+    diameter_sigmas_m: PyReadonlyArray1<'py, f64>,
+    #[pyo3(item)]
     missed_boxes: f64,
 }
 
@@ -225,7 +229,9 @@ pub fn believed<'py>(
     let (depths_m, shown_m2) = (numbers(&tracks.depths_m), numbers(&tracks.shown_m2));
     let fruitness = numbers(&tracks.fruitness);
     let (views, glimpses) = (rows("views", &tracks.views)?, rows("glimpses", &tracks.glimpses)?);
-    if [depths_m.len(), shown_m2.len(), fruitness.len(), views.len(), glimpses.len()] != [n; 5] {
+    let (diameters_m, sigmas_m) = (numbers(&tracks.diameters_m), numbers(&tracks.diameter_sigmas_m));
+    let numbers_of = [depths_m.len(), shown_m2.len(), fruitness.len(), diameters_m.len(), sigmas_m.len()];
+    if numbers_of != [n; 5] || [views.len(), glimpses.len()] != [n; 2] {
         return Err(wrong("tracks: expected one row for each track in every array"));
     }
     let camera = camera.to_camera()?;
@@ -238,6 +244,8 @@ pub fn believed<'py>(
         glimpses: &glimpses,
         shown_m2: &shown_m2,
         fruitness: &fruitness,
+        diameters_m: &diameters_m,
+        diameter_sigmas_m: &sigmas_m,
         missed_boxes: tracks.missed_boxes,
     };
     let colours = Colours { boxes: &boxes, elsewhere: &elsewhere };

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pomona.recording import Calibration
 from pomona.survey.seeing import Look
+from pomona.survey.sightings import Sightings, sizes_of
 from pomona.survey.tracking import Belief, Tracks, TrackViews, believed
 
 __all__ = ["Believing"]
@@ -36,8 +37,13 @@ class Believing:
     calibration: Calibration
     config: Mapping[str, Any]
 
-    def __call__(self, tracks: Tracks, looks: Sequence[Look], session_from_camera: Array) -> Belief:
-        """Weigh tracks that these frames, from these poses (F, 4, 4), saw; where nobody looked does not count."""
+    def __call__(
+        self, tracks: Tracks, looks: Sequence[Look], session_from_camera: Array, *, sized: bool = True
+    ) -> Belief:
+        """Weigh tracks that these frames, from these poses (F, 4, 4), saw; where nobody looked does not count.
+
+        Their sizes are asked too where `sized` says so.
+        """
         row_of_frame = {look.frame: row for row, look in enumerate(looks)}
         frames = np.array([row_of_frame[frame] for frame in tracks.frames.tolist()], np.int64)
         poses = session_from_camera[frames]
@@ -45,6 +51,8 @@ class Believing:
         boxes = np.cumsum([0, *(len(look.detections) for look in looks)])[frames] + tracks.rows
         fruitness, fruit_px = (_of_boxes(looks, name) for name in ("fruitness", "fruit_px"))
         shown_m2 = fruit_px[boxes] * depths_m**2 / (self.calibration.fx * self.calibration.fy)
+        unknown = np.full(len(tracks), np.nan)
+        sizes = _sizes(tracks, boxes, looks, session_from_camera) if sized else (unknown, unknown)
         belief = believed(
             TrackViews(
                 centres=tracks.centres,
@@ -53,6 +61,8 @@ class Believing:
                 n_glimpses=tracks.n_glimpses,
                 shown_m2=_means(shown_m2, tracks),
                 fruitness=_means(fruitness[boxes], tracks),
+                diameters_m=sizes[0],
+                diameter_sigmas_m=sizes[1],
                 missed_boxes=tracks.missed_boxes,
             ),
             session_from_camera[[look.detections.looked for look in looks]],
@@ -63,6 +73,16 @@ class Believing:
         )
         seen_again = tracks.n_views + tracks.n_glimpses >= SEEN_AGAIN
         return replace(belief, is_believed=belief.is_believed & seen_again)
+
+
+def _sizes(
+    tracks: Tracks, boxes: NDArray[np.int64], looks: Sequence[Look], session_from_camera: Array
+) -> tuple[Array, Array]:
+    """Give diameters of the tracks and their sigmas; `boxes` has the box of each of their sightings."""
+    track_of = np.full(sum(len(look.detections) for look in looks), -1, np.int64)
+    track_of[boxes[~tracks.shared]] = tracks.fruits[~tracks.shared]
+    sightings = Sightings.of(looks)
+    return sizes_of(sightings, track_of[sightings.boxes], session_from_camera, len(tracks))
 
 
 def _of_boxes(looks: Sequence[Look], name: str) -> Array:

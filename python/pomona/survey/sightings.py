@@ -13,7 +13,7 @@ from pomona import _core
 from pomona.cloud import FruitCloud, Views
 from pomona.survey.seeing import Look
 
-__all__ = ["Sightings", "fruits_of", "places_of"]
+__all__ = ["Sightings", "fruits_of", "places_of", "sizes_of"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -107,6 +107,15 @@ def places_of(sightings: Sightings, fruits: Rows, session_from_camera: Array) ->
     """Give only the centres (N, 3) and covariances (N, 3, 3) of the fruits; parameters as in `fruits_of`."""
     positions, covariances, _, _ = _fused(sightings, fruits, session_from_camera)
     return positions, covariances
+
+
+def sizes_of(sightings: Sightings, fruits: Rows, session_from_camera: Array, n: int) -> tuple[Array, Array]:
+    """Give only diameters (N,) and their sigmas of `n` fruits, NaN for one without a sighting; -1 is of no fruit."""
+    rows = np.flatnonzero(fruits >= 0)
+    found, owners = np.unique(fruits[rows], return_inverse=True)
+    diameters_m, sigmas_m = np.full(n, np.nan), np.full(n, np.nan)
+    _, _, diameters_m[found], sigmas_m[found] = _fused(sightings.select(rows), owners, session_from_camera)
+    return diameters_m, sigmas_m
 
 
 def _fused(sightings: Sightings, fruits: Rows, session_from_camera: Array) -> tuple[Array, Array, Array, Array]:

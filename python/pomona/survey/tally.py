@@ -52,7 +52,7 @@ class TrackFate(StrEnum):
     FRUIT = "a fruit"
     JOINED = "joined with another, the same fruit"
     FEW_VIEWS = "seen in too few frames"
-    LEAVES = "coloured as leaves are"
+    LEAVES = "coloured as leaves are, or larger than fruits"
     NO_PLACE = "never measured"
 
 
@@ -164,9 +164,9 @@ def track_fates(
 def often_enough(
     believing: Believing, tracks: Tracks, looks: Sequence[Look], poses: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell which tracks would be fruits if nothing was known of their colour, (N,)."""
+    """Tell which tracks would be fruits if nothing was known of their colours and sizes, (N,)."""
     colourless = [replace(look, fruitness=None, elsewhere=None) for look in looks]
-    return believing(tracks, colourless, poses).is_believed
+    return believing(tracks, colourless, poses, sized=False).is_believed
 
 
 def tell_little(path: Path, n_frames: int, tally: Tally) -> None:

@@ -175,6 +175,8 @@ class TrackViews:
         Mean area that their boxes show, square metres at that depth.
     fruitness : (N,) float64
         Mean fruitness of their boxes.
+    diameters_m, diameter_sigmas_m : (N,) float64
+        As all their sightings have them.
     missed_boxes : float
         As in `Tracks`.
     """
@@ -185,6 +187,8 @@ class TrackViews:
     n_glimpses: NDArray[np.int64]
     shown_m2: Array
     fruitness: Array
+    diameters_m: Array
+    diameter_sigmas_m: Array
     missed_boxes: float = 0.0
 
 
@@ -244,6 +248,8 @@ def believed(
                 "glimpses": np.ascontiguousarray(tracks.n_glimpses, np.int64),
                 "shown_m2": np.ascontiguousarray(tracks.shown_m2, np.float64),
                 "fruitness": np.ascontiguousarray(tracks.fruitness, np.float64),
+                "diameters_m": np.ascontiguousarray(tracks.diameters_m, np.float64),
+                "diameter_sigmas_m": np.ascontiguousarray(tracks.diameter_sigmas_m, np.float64),
                 "missed_boxes": tracks.missed_boxes,
             },
             box_fruitness=np.ascontiguousarray(box_fruitness, np.float64),

@@ -1,7 +1,7 @@
 //! Which tracks are fruits, and how sure that is.
 //!
-//! A detector finds a fruit in part of the frames in which it stays in view, and takes leaves for fruits. So two questions
-//! are asked of a track, and the probability that it is a fruit is the product of both answers.
+//! A detector finds a fruit in part of the frames in which it stays in view, and takes leaves for fruits. So three
+//! questions are asked of a track, and the probability that it is a fruit is the product of the answers.
 //!
 //! **Was it seen often enough?** `min_views` boxes are, however long it was in view. Where the camera moves on so fast
 //! that a fruit stays in view for n <= 2 `min_views` frames, the same way past it shows it in fewer, in proportion:
@@ -22,6 +22,16 @@
 //!
 //! where places without a box are measured, and w and the fruits' normal distribution are those that explain all boxes
 //! best. Where fruits look like leaves both distributions are alike and p is w for all: nothing is dropped.
+//!
+//! **Is it as large as one fruit?** A cluster of the row behind in one box, or a fruit whose depth is that of what stands
+//! behind it, is larger than any fruit beside it. With d the diameter of a track, s its standard deviation, m the median
+//! diameter of the tracks that the first two questions leave and r their spread,
+//!
+//! ```text
+//! p = w N(ln d; ln m, r^2 + s^2 / d^2) / (w N(ln d; ln m, r^2 + s^2 / d^2) + (1 - w) / ln 1000)    for d > m,
+//! ```
+//!
+//! sizes of what is no single fruit being any from 1 mm to 1 m. What is smaller may be half of a fruit behind a leaf: p is 1.
 
 use super::config::TrackingConfig;
 use crate::camera::Camera;
@@ -50,6 +60,18 @@ const TRUE_BOXES: f64 = 0.9;
 /// Least standard deviation of fruitness: of fewer the pixels of a small box make more.
 const LEAST_SIGMA: f64 = 0.04;
 
+/// Of a hundred tracks one is of something else than a fruit at its own depth.
+const OF_ONE_FRUIT: f64 = 0.99;
+
+/// Logarithm of the largest size over the smallest, 1 m and 1 mm.
+const SIZES_LN: f64 = 6.908;
+
+/// Least standard deviation of the logarithm of a diameter: fruits of one tree differ by 8 to 12 %.
+const LEAST_SPREAD: f64 = 0.1;
+
+/// From the lower to the upper quartile of a normal distribution, in standard deviations.
+const QUARTILES_SIGMAS: f64 = 1.349;
+
 /// Rounds of expectation and maximisation; it settles in ten.
 const ROUNDS: usize = 30;
 
@@ -68,6 +90,10 @@ pub struct TrackViews<'a> {
     pub shown_m2: &'a [f64],
     /// Mean fruitness of its boxes; NaN where nobody knows.
     pub fruitness: &'a [f64],
+    /// Diameters, metres, and their standard deviations; NaN where nothing was measured.
+    pub diameters_m: &'a [f64],
+    /// See `diameters_m`.
+    pub diameter_sigmas_m: &'a [f64],
     /// Boxes that the detector missed; 0 where no picture was looked at.
     pub missed_boxes: f64,
 }
@@ -109,6 +135,8 @@ pub fn belief(
         tracks.glimpses.len(),
         tracks.shown_m2.len(),
         tracks.fruitness.len(),
+        tracks.diameters_m.len(),
+        tracks.diameter_sigmas_m.len(),
     ] {
         assert_eq!(length, n, "one row for each track");
     }
@@ -122,6 +150,13 @@ pub fn belief(
         let looks = colour.as_ref().map_or(1.0, |colour| colour.probability(tracks.fruitness[row]));
         probability.push(often * looks);
         is_believed.push(often >= 0.5 && looks >= 0.5);
+    }
+    if let Some(sizes) = Sizes::of(tracks, &is_believed) {
+        for row in 0..n {
+            let single = sizes.probability(tracks.diameters_m[row], tracks.diameter_sigmas_m[row]);
+            probability[row] *= single;
+            is_believed[row] &= single >= 0.5;
+        }
     }
     Belief { probability, is_believed, frames_in_view }
 }
@@ -221,6 +256,40 @@ impl FruitOrLeaf {
     }
 }
 
+/// How large the fruits are.
+#[derive(Debug, Clone, Copy)]
+struct Sizes {
+    ln_median: f64,
+    spread: f64,
+}
+
+impl Sizes {
+    /// Of some of the tracks; None where too few of them are known.
+    fn of(tracks: &TrackViews<'_>, chosen: &[bool]) -> Option<Self> {
+        let known = tracks.diameters_m.iter().zip(chosen).filter(|(size_m, chosen)| **chosen && **size_m > 0.0);
+        let mut logs: Vec<f64> = known.map(|(size_m, _)| size_m.ln()).collect();
+        if logs.len() < ENOUGH {
+            return None;
+        }
+        logs.sort_by(f64::total_cmp);
+        let [low, ln_median, high] = [1, 2, 3].map(|quarter| logs[quarter * logs.len() / 4]);
+        Some(Self { ln_median, spread: ((high - low) / QUARTILES_SIGMAS).max(LEAST_SPREAD) })
+    }
+
+    /// That a track of this size is one fruit.
+    fn probability(&self, diameter_m: f64, sigma_m: f64) -> f64 {
+        let off = diameter_m.ln() - self.ln_median;
+        // Not a number compares as false: of what nobody measured nothing is said.
+        if !(off > 0.0) {
+            return 1.0;
+        }
+        let sigma = self.spread.hypot(sigma_m / diameter_m);
+        let density = (-0.5 * (off / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt());
+        let fruit = OF_ONE_FRUIT * density;
+        fruit / (fruit + (1.0 - OF_ONE_FRUIT) / SIZES_LN)
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Normal {
     mean: f64,
@@ -261,9 +330,39 @@ mod tests {
             glimpses,
             shown_m2: &vec![f64::NAN; n],
             fruitness,
+            diameters_m: &vec![f64::NAN; n],
+            diameter_sigmas_m: &vec![f64::NAN; n],
             missed_boxes: 0.0,
         };
         belief(&tracks, colours, (&CAMERA, &poses), &TrackingConfig::default())
+    }
+
+    #[test]
+    fn what_is_larger_than_any_fruit_is_no_fruit_and_half_a_fruit_is_one() {
+        let mut sizes_m: Vec<f64> = (0..60).map(|k| 0.07 * (1.0 + 0.01 * f64::from(k % 15 - 7))).collect();
+        sizes_m.extend([0.09, 0.179, 0.179, 0.035, f64::NAN]);
+        let mut sigmas_m = vec![0.004; sizes_m.len()];
+        sigmas_m[62] = 0.09;
+        let n = sizes_m.len();
+        let tracks = TrackViews {
+            centres: &vec![Vector3::new(4.0, 0.0, 1.25); n],
+            depths_m: &vec![1.25; n],
+            views: &vec![9; n],
+            glimpses: &vec![0; n],
+            shown_m2: &vec![f64::NAN; n],
+            fruitness: &vec![f64::NAN; n],
+            diameters_m: &sizes_m,
+            diameter_sigmas_m: &sigmas_m,
+            missed_boxes: 0.0,
+        };
+        let poses: Vec<_> = (0..50)
+            .map(|k| Pose { translation: Vector3::new(0.15 * f64::from(k), 0.0, 0.0), ..Pose::IDENTITY })
+            .collect();
+        let found = belief(&tracks, &NO_COLOUR, (&CAMERA, &poses), &TrackingConfig::default());
+        assert!(found.is_believed[..61].iter().all(|&one| one));
+        // 179 mm, sure; 179 mm, give or take 90; 35 mm; nobody knows.
+        assert_eq!(found.is_believed[61..], [false, true, true, true]);
+        assert!(found.probability[61] < 1e-6, "{}", found.probability[61]);
     }
 
     #[test]
