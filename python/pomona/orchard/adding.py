@@ -17,6 +17,7 @@ from pomona.errors import PomonaError
 from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, new_visit, read_evidence
 from pomona.orchard.fruit_ids import Change
+from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.recognising import matches_with_visits
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, settle, settlement_of, write_changes
@@ -237,6 +238,7 @@ def _join(
             insert_matches(connection, pair, *ids)
     settle(connection, together, settlement)
     write_changes(connection, "added", session.name, settlement.changes)
+    write_growth(connection, fruit_ids.tolist(), settlement.changes)
     follow_trees(connection)
     update_layers(connection)
     return _told(settlement, own)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pomona.orchard.evidence import read_evidence
 from pomona.orchard.fruit_ids import Change
+from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.settling import FruitRow, fruit_rows, settle, settlement_of, write_changes
 from pomona.orchard.tree_tables import follow_trees
 from pomona.orchard.writing import update_layers
@@ -107,6 +108,7 @@ def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: 
         settle(connection, rest, settlement)
         write_changes(connection, "removed", name, settlement.changes)
         connection.execute("DELETE FROM sessions WHERE id = ?", (session_id,))
+        write_growth(connection, going.fruit_ids.tolist(), settlement.changes)
         follow_trees(connection)
         update_layers(connection)
     n_changed = sum(_place_and_state(row) != before[fruit_id] for fruit_id, row in after.items() if fruit_id in before)
