@@ -69,7 +69,11 @@ def test_the_fullest_clusters_are_thinned_of_their_smallest(pomona: Pomona, row:
 def test_without_a_target_none_is_thinned(pomona: Pomona, row: GrownRow) -> None:
     code, printed, _ = pomona("thinning", row.path)
     assert code == 0
-    assert [line.split()[4] for line in printed.splitlines()[2:]] == ["0", "0"]
+    lines = printed.splitlines()
+    header = next(number for number, line in enumerate(lines) if line.split()[0] == "tree")
+    assert [line.split()[4] for line in lines[header + 1 :]] == ["0", "0"]
+    assert "no fruitlets, which are up to 45 mm" in lines[header - 1]
+    assert [line.split()[2] for line in lines[header + 1 :]] == ["0", "0"], "of apples nobody knows which will drop"
     assert pomona("thinning", row.path, "--target", "-3")[0] == 2
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud, csv_file, ply_file
@@ -14,7 +16,10 @@ from pomona.cloud.columns import COVARIANCE, COVARIANCE_CELLS, POSITION, typed_c
 from pomona.errors import PomonaError
 from pomona.geopackage import LOCAL_METRES
 from pomona.geoparquet import write_geoparquet
-from pomona.shapefile import write_shapefile
+from pomona.shapefile import WGS84_TEXT, write_shapefile
+
+if TYPE_CHECKING:
+    from pomona.earth import Anchor
 
 __all__ = ["SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
 
@@ -31,7 +36,7 @@ SUFFIXES: dict[str, ExportFormat] = {
 """What the name of a file says of its format."""
 
 
-def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
+def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat, anchor: Anchor | None = None) -> None:
     """Write fruits with their ids, in metres, in the frame they are in; the file appears whole or not at all.
 
     Parameters
@@ -42,10 +47,15 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
         The file to write; its suffix is yours to choose.
     to : {"csv", "ply", "geojson", "shp", "parquet"}
         Its format. Rows without ids get their row numbers in the last three.
+    anchor : Anchor, optional
+        Where on Earth the frame lies, for example ``OrchardMap("orchard.gpkg").anchor()``. The last three then have
+        longitude, latitude (WGS 84) and height, and a CSV has them as further columns.
     """
     path = Path(path)
-    if to == "csv":
-        csv_file.write(path, cloud)
+    if anchor is not None and to in ("geojson", "shp", "parquet"):
+        _write_on_earth(path, cloud, anchor.geodetic(cloud.positions), to)
+    elif to == "csv":
+        csv_file.write(path, cloud if anchor is None else _with_earth(cloud, anchor))
     elif to == "ply":
         ply_file.write(path, cloud)
     elif to == "geojson":
@@ -58,21 +68,40 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat) -> None:
         raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(ExportFormat))}")
 
 
+def _write_on_earth(path: Path, cloud: FruitCloud, geodetic: NDArray[np.float64], to: ExportFormat) -> None:
+    if to == "geojson":
+        # RFC 7946: longitude, latitude, height, and no member crs.
+        _write_features(path, cloud, geodetic, {"comment": "fruits by pomona"})
+    elif to == "shp":
+        write_shapefile(path, geodetic, _plain_columns(cloud), WGS84_TEXT)
+    else:
+        write_geoparquet(path, geodetic, _plain_columns(cloud), on_earth=True)
+
+
+def _with_earth(cloud: FruitCloud, anchor: Anchor) -> FruitCloud:
+    names = ("longitude_deg", "latitude_deg", "height_m")
+    texts = (
+        tuple(f"{number:.{digits}f}" for number in column)
+        for column, digits in zip(anchor.geodetic(cloud.positions).T.tolist(), (10, 10, 4), strict=True)
+    )
+    return replace(cloud, extras={**cloud.extras, **dict(zip(names, texts, strict=True))})
+
+
 def _write_geojson(path: Path, cloud: FruitCloud) -> None:
     """Write GeoJSON whose coordinates are local metres.
 
     RFC 7946 knows longitude and latitude only. The specification of 2008, which QGIS and GDAL read, names a coordinate
     system: with ours, programs that know it do not take the metres for degrees, and the others skip the name.
     """
-    head = {
-        "type": "FeatureCollection",
-        "name": path.stem,
-        "crs": {"type": "name", "properties": {"name": LOCAL_METRES}},
-    }
+    _write_features(path, cloud, cloud.positions, {"crs": {"type": "name", "properties": {"name": LOCAL_METRES}}})
+
+
+def _write_features(path: Path, cloud: FruitCloud, places: NDArray[np.float64], about: dict[str, Any]) -> None:
+    head = {"type": "FeatureCollection", "name": path.stem, **about}
     columns = _properties(cloud)
     with whole_file(path) as partial, partial.open("w", encoding="utf-8") as file:
         file.write(json.dumps(head)[:-1] + ', "features": [')
-        for row, position in enumerate(cloud.positions.tolist()):
+        for row, position in enumerate(places.tolist()):
             feature = {
                 "type": "Feature",
                 "id": columns["id"][row],

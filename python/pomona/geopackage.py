@@ -21,6 +21,7 @@ __all__ = [
     "APPLICATION_ID",
     "LOCAL_METRES",
     "USER_VERSION",
+    "WGS84",
     "add_functions",
     "add_index_triggers",
     "add_table",
@@ -238,11 +239,11 @@ def execute_all(connection: sqlite3.Connection, script: str) -> None:
             statement = ""
 
 
-def points(positions: ArrayLike) -> list[bytes]:
-    """Encode (N, 3) coordinates as GeoPackage points."""
+def points(positions: ArrayLike, srs_id: int = UNDEFINED_CARTESIAN) -> list[bytes]:
+    """Encode (N, 3) coordinates as GeoPackage points, in local metres unless said otherwise."""
     xyz = np.asarray(positions, dtype=np.float64)
     blobs = np.zeros(len(xyz), dtype=POINT_Z)
-    blobs["magic"], blobs["flags"], blobs["srs_id"] = b"GP", LITTLE_ENDIAN, UNDEFINED_CARTESIAN
+    blobs["magic"], blobs["flags"], blobs["srs_id"] = b"GP", LITTLE_ENDIAN, srs_id
     blobs["wkb_order"], blobs["wkb_type"], blobs["xyz"] = LITTLE_ENDIAN, WKB_POINT_Z, xyz
     whole = blobs.tobytes()
     return [whole[start : start + POINT_Z.itemsize] for start in range(0, len(whole), POINT_Z.itemsize)]

@@ -43,16 +43,20 @@ class _Column:
     cells: Sequence[Any]
 
 
-def write_geoparquet(path: Path, positions_m: NDArray[np.float64], columns: Mapping[str, Sequence[Any]]) -> None:
-    """Write points in local metres with their columns; the file appears whole or not at all.
+def write_geoparquet(
+    path: Path, positions_m: NDArray[np.float64], columns: Mapping[str, Sequence[Any]], *, on_earth: bool = False
+) -> None:
+    """Write points with their columns; the file appears whole or not at all.
 
     Parameters
     ----------
     path : Path
     positions_m : (N, 3) float64
-        Become the column ``geometry``, points Z as WKB, without a reference system.
+        Become the column ``geometry``, points Z as WKB.
     columns : mapping of str to N int, float or str
         None for unknown; another column called ``geometry`` gets a line below its name.
+    on_earth : bool
+        Whether they are longitude and latitude in degrees and height; else local metres, without a reference system.
     """
     taken = [_column(f"{name}_" if name == "geometry" else name, cells) for name, cells in columns.items()]
     points = _Column("geometry", _BYTE_ARRAY, False, _points(positions_m))
@@ -68,7 +72,7 @@ def write_geoparquet(path: Path, positions_m: NDArray[np.float64], columns: Mapp
                 file.write(page)
                 chunks.append(_chunk(column, rows.stop - rows.start, offset, len(page)))
             groups.append(_group(chunks, rows.stop - rows.start))
-        footer = _footer(everything, groups, positions_m)
+        footer = _footer(everything, groups, positions_m, on_earth)
         file.write(footer + struct.pack("<I", len(footer)) + MAGIC)
 
 
@@ -129,7 +133,9 @@ def _group(chunks: list[ThriftValue], n_rows: int) -> ThriftValue:
     return structure({1: listed(chunks), 2: i64(sum(len(chunk.encoded) for chunk in chunks)), 3: i64(n_rows)})
 
 
-def _footer(columns: list[_Column], groups: list[ThriftValue], positions_m: NDArray[np.float64]) -> bytes:
+def _footer(
+    columns: list[_Column], groups: list[ThriftValue], positions_m: NDArray[np.float64], on_earth: bool
+) -> bytes:
     root = structure({4: text("schema"), 5: i32(len(columns))})
     elements = [
         structure(
@@ -137,7 +143,7 @@ def _footer(columns: list[_Column], groups: list[ThriftValue], positions_m: NDAr
         )
         for column in columns
     ]
-    geo = structure({1: text("geo"), 2: text(_geo(positions_m))})
+    geo = structure({1: text("geo"), 2: text(_geo(positions_m, on_earth))})
     mark = structure({1: text("comment"), 2: text(PARQUET_MARK.decode())})
     return structure(
         {
@@ -151,9 +157,11 @@ def _footer(columns: list[_Column], groups: list[ThriftValue], positions_m: NDAr
     ).encoded
 
 
-def _geo(positions_m: NDArray[np.float64]) -> str:
-    """Say what the geometry is; a null reference system means unknown, as local metres are to the Earth."""
-    column: dict[str, Any] = {"encoding": "WKB", "geometry_types": ["Point Z"], "crs": None}
+def _geo(positions_m: NDArray[np.float64], on_earth: bool) -> str:
+    """Say what the geometry is; a null reference system means unknown, none at all longitude and latitude."""
+    column: dict[str, Any] = {"encoding": "WKB", "geometry_types": ["Point Z"]}
+    if not on_earth:
+        column["crs"] = None
     if len(positions_m):
         column["bbox"] = [*positions_m.min(axis=0).tolist(), *positions_m.max(axis=0).tolist()]
     return json.dumps({"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}})

@@ -63,6 +63,12 @@ PLY_MARK = "comment fruits written by pomona, metres"
 MODEL_MARK = b"pomona_training"
 """Key in the metadata of the models that are trained here."""
 
+GEOJSON_MARK = b'"comment": "fruits by pomona"'
+"""In a GeoJSON on Earth, whose reference system tells nothing."""
+
+DBASE_MARK = bytes([3, 80, 1, 1])
+"""How the table of a Shapefile begins: dBASE III of the first day of 1980, the same for the same input."""
+
 PARQUET_MARK = b"fruits written by pomona"
 """In the footer of the Parquet files that are written here."""
 
@@ -180,12 +186,16 @@ def _is_ply(path: Path) -> bool:
 
 
 def _is_geojson(path: Path) -> bool:
-    return _head(path).startswith(b'{"type": "FeatureCollection"') and b"LOCAL_CS" in _head(path)
+    head = _head(path)
+    return head.startswith(b'{"type": "FeatureCollection"') and (b"LOCAL_CS" in head or GEOJSON_MARK in head)
 
 
 def _is_shapefile(path: Path) -> bool:
-    """Tell any of the files of a Shapefile by the one that says where it lies: nowhere on Earth, as ours do."""
-    return b"LOCAL_CS" in _head(path.with_suffix(".prj"))
+    """Tell any of the files of a Shapefile by those that say where it lies, and from which day: in 1980, as ours do."""
+    if not _head(path.with_suffix(".dbf")).startswith(DBASE_MARK):
+        return False
+    head = _head(path.with_suffix(".prj"))
+    return b"LOCAL_CS" in head or head.startswith(b'GEOGCS["GCS_WGS_1984"')
 
 
 def _is_parquet(path: Path) -> bool:

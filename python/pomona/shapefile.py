@@ -18,7 +18,13 @@ from pomona.errors import PomonaError
 from pomona.geopackage import LOCAL_METRES
 from pomona.streams import is_stream
 
-__all__ = ["PARTS", "parts_of", "write_shapefile"]
+__all__ = ["PARTS", "WGS84_TEXT", "parts_of", "write_shapefile"]
+
+WGS84_TEXT = (
+    'GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],'
+    'PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]]'
+)
+"""Longitude and latitude as Shapefiles say it."""
 
 PARTS = (".shx", ".dbf", ".prj", ".cpg", ".shp")
 """In the order in which they are written: the one that is opened comes last."""
@@ -41,8 +47,10 @@ def parts_of(path: Path) -> tuple[Path, ...]:
     return tuple(path.with_suffix(part) for part in PARTS)
 
 
-def write_shapefile(path: Path, positions_m: NDArray[np.float64], columns: Mapping[str, Sequence[Any]]) -> None:
-    """Write points in local metres with their columns; each file appears whole or not at all.
+def write_shapefile(
+    path: Path, positions_m: NDArray[np.float64], columns: Mapping[str, Sequence[Any]], system: str = LOCAL_METRES
+) -> None:
+    """Write points with their columns; each file appears whole or not at all.
 
     Parameters
     ----------
@@ -51,6 +59,8 @@ def write_shapefile(path: Path, positions_m: NDArray[np.float64], columns: Mappi
     positions_m : (N, 3) float64
     columns : mapping of str to N int, float or str
         None for unknown. Names are cut to ten bytes, text to 254.
+    system : str
+        The reference system as well-known text; local metres otherwise.
 
     Raises
     ------
@@ -62,7 +72,7 @@ def write_shapefile(path: Path, positions_m: NDArray[np.float64], columns: Mappi
     contents = {
         ".shx": _header(positions_m, _HEADER_BYTES + 8 * len(positions_m)) + _index(len(positions_m)),
         ".dbf": _table(columns, len(positions_m)),
-        ".prj": LOCAL_METRES.encode(),
+        ".prj": system.encode(),
         ".cpg": b"UTF-8",
         ".shp": _header(positions_m, _HEADER_BYTES + _RECORD_BYTES * len(positions_m)) + _records(positions_m),
     }

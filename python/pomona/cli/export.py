@@ -65,11 +65,17 @@ def export(
         help="Of a map: with each fruit's tree, rate of growth, and forecast for --harvest.",
     ),
     harvest: str | None = typer.Option(None, metavar="DATE", help="With --growth: day to foretell, as 2024-09-10."),
+    local: bool = typer.Option(False, "--local", help="Local metres, also where the map has a georeference."),
     unit: Unit = typer.Option(Unit.m, help="Unit of the coordinates of a .csv or .ply."),
 ) -> None:
-    """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen."""
+    """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen.
+
+    A map with a georeference (`pomona map georeference`) gives longitude, latitude and height to GeoJSON, Shapefile,
+    GeoParquet, and to CSV as further columns.
+    """
     from pomona.cloud import FruitCloud
     from pomona.export import export_cloud, format_of
+    from pomona.orchard import OrchardMap
 
     if to is Format.parquet_by_date:
         _export_by_date(source, output, plain=not (growth or harvest))
@@ -78,7 +84,8 @@ def export(
         cloud = _grown(source, harvest, plain=not growth or observations)
     else:
         cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
-    export_cloud(cloud, output, format_of(output, None if to is None else to.value))
+    anchor = None if local or source.suffix.lower() != ".gpkg" else OrchardMap(source).anchor()
+    export_cloud(cloud, output, format_of(output, None if to is None else to.value), anchor)
     say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
 
 

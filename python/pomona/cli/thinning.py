@@ -31,8 +31,8 @@ def thinning(
     Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop. What a
     tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first.
     """
-    from pomona.growth.season_growth import grow_season
     from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM
+    from pomona.growth.season_growth import grow_season
     from pomona.growth.thinning_plan import are_fruitlets, plan_thinning
 
     grown = grow_season(orchard)
@@ -46,7 +46,9 @@ def thinning(
     before, last = sorted(set(grown.fruits.days))[-2:]
     say(f"{orchard}: from {before} to {last}, the fastest fruits grew {plan.drop.fast_mm_per_day:.2f} mm a day")
     if not are_fruitlets(grown):
-        say(f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which of them will drop")
+        say(
+            f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which of them will drop"
+        )
     say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
     for tree in trees:
         counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"

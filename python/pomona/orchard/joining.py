@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from pomona.orchard.evidence import Evidence, KnownVisit
+from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.session import Session
 from pomona.orchard.settling import SettledPart, Settlement, settle, settlement_of
 from pomona.orchard.tree_tables import follow_trees
@@ -62,6 +63,8 @@ def join(connection: sqlite3.Connection, together: Evidence, newcomers: Mapping[
         _insert_matches(connection, part.evidence, added)
     settlement = replace(settlement, parts=parts)
     settle(connection, settlement)
+    own = [part.fruit_ids_of(number) for part, number in map(settlement.part_with, sorted(added))]
+    write_growth(connection, (one for ids in own for one in ids.tolist()), settlement.changes)
     follow_trees(connection)
     update_layers(connection)
     return settlement

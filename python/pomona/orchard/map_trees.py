@@ -19,8 +19,9 @@ from pomona.orchard.writing import update_layers
 from pomona.store.cells import finite_json
 from pomona.store.opening import TIMEOUT_S, Waiting, writing
 from pomona.store.rows import columns_of
-from pomona.tree_rows import Crowns, Planting, RowLine, planting_at, planting_of, row_lines
+from pomona.tree_rows import Crowns, Planting, RowLine, planting_at
 from pomona.tree_rows.numbering_of_trees import UNNUMBERED, numbers_along, same_trees
+from pomona.tree_rows.told_rows import told_rows
 from pomona.tree_rows.tree_spacing import SPACINGS_M
 
 __all__ = ["TreeRow", "find_trees"]
@@ -138,10 +139,10 @@ class _Finding:
 
     def rows(self) -> list[TreeRow]:
         believed = np.flatnonzero(self.fruits.believed)
-        lines = row_lines(self.fruits.positions[believed], self.fruits.ways)
-        self._require_beside(lines)
+        rows = told_rows(self.fruits.positions[believed], self.fruits.ways, self.spacing_m)
+        self._require_beside([line for line, _ in rows])
         bear(self.connection, self.fruits.ids, np.zeros(len(self.fruits.ids), np.int64), None)
-        told = [self._row(line, believed[line.members]) for line in lines]
+        told = [self._row(line, planting, believed[line.members]) for line, planting in rows]
         gone = [(tree.tree_id,) for tree in self.before if tree.tree_id not in self.used]
         self.connection.executemany("DELETE FROM trees WHERE id = ?", gone)
         self.connection.execute(
@@ -149,7 +150,7 @@ class _Finding:
         )
         return sorted(told, key=lambda row: row.number)
 
-    def _row(self, line: RowLine, members: NDArray[np.int64]) -> TreeRow:
+    def _row(self, line: RowLine, planting: Planting, members: NDArray[np.int64]) -> TreeRow:
         positions = self.fruits.positions[members]
         given = sorted(
             (float(line.along_of(tree.place_in_map[None])[0]), number)
@@ -161,10 +162,8 @@ class _Finding:
             source = GIVEN
             places = np.array([along for along, _ in given])
             planting = planting_at(positions, line.along_m, line.beside_m, places)
-        else:
-            planting = planting_of(positions, line.along_m, line.beside_m, self.spacing_m)
-            if planting.crowns is None and self.segment_m is not None:
-                kind, planting = "segments", _segments(line, self.segment_m)
+        elif planting.crowns is None and self.segment_m is not None:
+            kind, planting = "segments", _segments(line, self.segment_m)
         if planting.crowns is None:
             return TreeRow(0, "none", FOUND, len(members), planting.spacing_m, planting.log_odds, ())
         return self._written(line, members, planting, kind, source, [self.known[number] for _, number in given])

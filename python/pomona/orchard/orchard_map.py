@@ -16,6 +16,8 @@ from pomona import geopackage
 from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
+from pomona.earth import Anchor
+from pomona.orchard.earth_layers import stored_anchor
 from pomona.orchard.fruit_ids import Change
 from pomona.store.cells import finite_json
 from pomona.store.failures import told
@@ -182,6 +184,11 @@ class OrchardMap:
         visits = self.visits()
         rows = [(visit.name, visit.date, visit.n_fruits, visit.n_matched) for visit in visits]
         return as_table(f"{self.path}: {self.kind}", ("visit", "date", "fruits", "known before"), rows)
+
+    def anchor(self) -> Anchor | None:
+        """Return where on Earth the map lies, None where nobody has said: `pomona map georeference`."""
+        with snapshot(self.path) as (connection, _):
+            return stored_anchor(connection)
 
     def fruits(self) -> FruitCloud:
         """Return every fruit where it was last seen, with its identity as id."""

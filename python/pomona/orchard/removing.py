@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pomona.orchard.evidence import Evidence, read_evidence
 from pomona.orchard.fruit_ids import Change
+from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.parts import parts_with
 from pomona.orchard.settling import FruitRow, fruit_rows, settle, settlement_of, write_changes
 from pomona.orchard.tree_tables import follow_trees
@@ -120,6 +121,7 @@ def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: 
     if not dry:
         connection.executemany("DELETE FROM fruits WHERE id = ?", ((one,) for one in before.keys() - after.keys()))
         connection.execute("DELETE FROM sessions WHERE id = ?", (session_id,))
+        write_growth(connection, going.fruit_ids.tolist(), changes)
         follow_trees(connection)
         update_layers(connection)
     n_changed = sum(_place_and_state(row) != before[fruit_id] for fruit_id, row in after.items() if fruit_id in before)

@@ -16,6 +16,7 @@ from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
 from pomona.fruit_crop import FruitCrop
 from pomona.identity import VisitPair
+from pomona.orchard.earth_layers import write_earth_layers
 from pomona.orchard.session import Session
 from pomona.settings import Settings
 from pomona.store import schema
@@ -230,6 +231,7 @@ def covariance_cells(cloud: FruitCloud) -> NDArray[np.float64]:
 
 def update_layers(connection: sqlite3.Connection) -> None:
     """Bring extents and times up to date; the time is the newest visit's: the same input gives the same file."""
+    write_earth_layers(connection)
     (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
     day, _, time = newest.partition("T")
     for name in ("pomona_format", *(layer[0] for layer in (*schema.LAYERS, *schema.VIEWS))):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.tree_rows import planting_of, row_lines
+from pomona.tree_rows.told_rows import told_rows
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
@@ -56,9 +56,8 @@ class Trees:
 
 def _found(axis: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the trees of the only row; several rows would be drawn over each other."""
-    lines = row_lines(positions)
-    if len(lines) != 1:
+    rows = told_rows(positions)
+    if len(rows) != 1:
         return np.empty(0)
-    members = positions[lines[0].members]
-    crowns = planting_of(members, lines[0].along_m, lines[0].beside_m).crowns
-    return np.empty(0) if crowns is None else np.sort(lines[0].places(crowns.places_m) @ axis)
+    line, planting = rows[0]
+    return np.empty(0) if planting.crowns is None else np.sort(line.places(planting.crowns.places_m) @ axis)

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.store.cells import finite_json
 from pomona.store.failures import WrongContentError
+from pomona.store.layer_styles import add_styles
 from pomona.store.older_layers import INDEXES_OF_VERSION_2, layers_of
 from pomona.store.rows import columns_of
-from pomona.store.schema import FORMAT_VERSION, INDEXES, LAYERS, VIEWS, add_styles
+from pomona.store.schema import FORMAT_VERSION, INDEXES, LAYERS, VIEWS
 
 __all__ = ["migrate", "migrated_copy"]
 

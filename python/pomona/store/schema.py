@@ -6,8 +6,9 @@ import sqlite3
 from typing import Literal
 
 from pomona import __version__, geopackage
+from pomona.store.layer_styles import add_styles
 
-__all__ = ["FORMAT_VERSION", "INDEXES", "LAYERS", "VIEWS", "Kind", "add_format", "add_styles", "create"]
+__all__ = ["FORMAT_VERSION", "INDEXES", "LAYERS", "VIEWS", "Kind", "add_format", "create"]
 
 FORMAT_VERSION = 3
 """Counts the changes of the tables below; `older_layers.py` says what they were, `migration.py` brings files up."""
@@ -142,23 +143,6 @@ CREATE INDEX fruits_by_tree ON fruits (tree_id);
 CREATE INDEX fruits_by_last_session ON fruits (last_session_id);
 CREATE INDEX crops_by_session ON crops (session_id);
 """
-
-STYLES = """
-CREATE TABLE layer_styles (
-    id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, f_table_catalog TEXT(256), f_table_schema TEXT(256),
-    f_table_name TEXT(256), f_geometry_column TEXT(256), styleName TEXT(30), styleQML TEXT, styleSLD TEXT,
-    useAsDefault BOOLEAN, description TEXT, owner TEXT(30), ui TEXT(30),
-    update_time DATETIME DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')));
-INSERT INTO gpkg_contents (table_name, data_type, identifier, description, last_change)
-VALUES ('layer_styles', 'attributes', 'layer_styles', 'how QGIS draws the layers', '2026-01-01T00:00:00.000Z');
-"""
-"""As QGIS makes it. It is the user's from then on: never read, and not asked for when a file is opened."""
-
-
-def add_styles(connection: sqlite3.Connection) -> None:
-    """Say how QGIS shall draw the layers, unless somebody has."""
-    if connection.execute("SELECT 1 FROM sqlite_master WHERE lower(name) = 'layer_styles'").fetchone() is None:
-        geopackage.execute_all(connection, STYLES)
 
 
 def create(connection: sqlite3.Connection, kind: Kind) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.tree_rows.row_lines import row_lines
-from pomona.tree_rows.tree_spacing import planting_of
+from pomona.tree_rows.told_rows import told_rows
 
 __all__ = ["tree_name", "tree_names"]
 
@@ -19,9 +18,8 @@ def tree_name(row: int, n_rows: int, number: int) -> str:
 def tree_names(positions: NDArray[np.float64]) -> tuple[str, ...]:
     """Return the tree of each fruit, (N,), blank where none can be told."""
     names = np.full(len(positions), "", dtype=object)
-    lines = row_lines(positions)
-    for row, line in enumerate(lines, 1):
-        planting = planting_of(positions[line.members], line.along_m, line.beside_m)
+    lines = told_rows(positions)
+    for row, (line, planting) in enumerate(lines, 1):
         bearers, _ = planting.bearers(line.along_m, line.beside_m)
         told = bearers >= 0
         names[line.members[told]] = [tree_name(row, len(lines), number + 1) for number in bearers[told].tolist()]

@@ -76,7 +76,11 @@ class RowLine:
         return np.asarray(inside + (asked - np.clip(asked, forwards[0], forwards[-1])))
 
 
-def row_lines(positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]] = ()) -> list[RowLine]:
+def row_lines(
+    positions: NDArray[np.float64],
+    ways: Sequence[NDArray[np.float64]] = (),
+    direction: NDArray[np.float64] | None = None,
+) -> list[RowLine]:
     """Part fruits into rows, in order across them; fruits of none are in none.
 
     Parameters
@@ -86,10 +90,13 @@ def row_lines(positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]
     ways : sequence of (F, 3) float64
         Where cameras went, one array a session: they drive along the rows. Without, a row is seen end on where its
         fruits cover least.
+    direction : (3,) float64, optional
+        Along the rows, where it is known.
     """
     if len(positions) < LEAST_FRUITS:
         return []
-    direction = _travelled(ways)
+    if direction is None:
+        direction = _travelled(ways)
     if direction is None:
         direction = _seen_end_on(positions)
     direction = direction * (1.0 if direction[np.argmax(np.abs(direction))] > 0 else -1.0)

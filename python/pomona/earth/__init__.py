@@ -1,0 +1,7 @@
+"""Where on Earth local metres lie: WGS 84, its tangent planes and its UTM zones, by formulas alone."""
+
+from pomona.earth.anchor import Anchor, anchored
+from pomona.earth.ellipsoid import east_north_up, ecef_from_geodetic, geodetic_from_ecef
+from pomona.earth.utm import from_utm
+
+__all__ = ["Anchor", "anchored", "east_north_up", "ecef_from_geodetic", "from_utm", "geodetic_from_ecef"]

@@ -1,0 +1,46 @@
+"""Rows with what they tell of their trees; where nobody drove along them, the fruits say which way they run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.tree_rows.row_lines import RowLine, row_lines
+from pomona.tree_rows.tree_spacing import Planting, planting_of
+
+__all__ = ["told_rows"]
+
+ToldRows = list[tuple[RowLine, Planting]]
+
+
+def told_rows(
+    positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]] = (), spacing_m: float | None = None
+) -> ToldRows:
+    """Return the rows of fruits, in order across them, and how each is planted.
+
+    Without ways of cameras a short row can be taken for trees one above the other. Then the longest extent of all
+    fruits is asked too, and the direction is taken in which more speaks for trees.
+
+    Parameters
+    ----------
+    positions : (N, 3) float64
+    ways : sequence of (F, 3) float64
+    spacing_m : float, optional
+        As in `row_lines` and `planting_of`.
+    """
+    told = _told(positions, row_lines(positions, ways), spacing_m)
+    if len(positions) < 2 or any(len(way) > 1 for way in ways):
+        return told
+    longest = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][0]
+    other = _told(positions, row_lines(positions, direction=longest), spacing_m)
+    return other if _evidence(other) > _evidence(told) else told
+
+
+def _told(positions: NDArray[np.float64], lines: Sequence[RowLine], spacing_m: float | None) -> ToldRows:
+    return [(line, planting_of(positions[line.members], line.along_m, line.beside_m, spacing_m)) for line in lines]
+
+
+def _evidence(told: ToldRows) -> float:
+    return sum(planting.log_odds for _, planting in told if planting.crowns is not None)
