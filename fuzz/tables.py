@@ -1,4 +1,4 @@
-"""Texts beside the pictures: settings in TOML, pairs of a match, boxes of every kind, calipers, temperatures."""
+"""Texts beside the pictures: settings in TOML, pairs of a match, boxes of every kind, calipers, trees, points."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from pomona.detect.from_file import FileDetector
 from pomona.detect.picture_boxes import boxes_within, read_boxes
 from pomona.growth.caliper_file import read_calipers
 from pomona.growth.season_clock import read_temperatures
+from pomona.orchard.control_points import read_control_points
+from pomona.orchard.given_trees import read_trees
 from pomona.pairs import read_pairs
 from pomona.recording import Calibration
 from pomona.settings import Settings
@@ -31,6 +33,11 @@ CALIPERS = (
 TEMPERATURES = (
     b"date,mean_c\n2024-06-14,20.5\n2024-06-15,21\n",
     b"date,min_c,max_c\n2024-06-14,9,20\n2024-06-15,8,21\n",
+)
+TREES = b"name,x,y,z\nA,0,0,1\nB,1.5,0.1,2\n"
+POINTS = (
+    b"name,x,y,z,lon,lat,height\nA,0,0,1,9.1,47.6,420\nB,6,0,1,9.2,47.6,\n",
+    b"frame,easting,northing\n0,512345,5277000\n9,512351,5277001\n",
 )
 PAIRS = b"query,map,probability,distance_m\na,b,0.9,0.01\nb,c,0.8,0.02\n"
 
@@ -53,8 +60,9 @@ def seeds() -> list[bytes]:
     pairs = [packed("pairs", {"pairs": each}) for each in (PAIRS, *_dumped(answer))]
     by_hand = [packed("calipers", {"calipers": each}) for each in CALIPERS]
     weather = [packed("temperatures", {"temperatures": each}) for each in TEMPERATURES]
+    places = [packed("trees", {"trees": TREES}), *(packed("points", {"points": each}) for each in POINTS)]
     single = [packed("settings", {"settings.toml": TOML}), packed("named", {"named": NAMED})]
-    return [*single, *boxes, *pairs, *by_hand, *weather]
+    return [*single, *boxes, *pairs, *by_hand, *weather, *places]
 
 
 def _dumped(*contents: object) -> list[bytes]:
@@ -75,5 +83,10 @@ def target(content: bytes) -> None:
             read_pairs(folder / "pairs", CLOUD, CLOUD)
         if (folder / "calipers").is_file():
             read_calipers(folder / "calipers")
+        if (folder / "trees").is_file():
+            read_trees(folder / "trees")
+        if (folder / "points").is_file():
+            is_utm = b"easting" in (folder / "points").read_bytes()
+            read_control_points(folder / "points", 32632 if is_utm else None)
         if (folder / "temperatures").is_file():
             read_temperatures(folder / "temperatures", [date(2024, 6, 14), date(2024, 6, 15)])

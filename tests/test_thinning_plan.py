@@ -69,12 +69,21 @@ def test_the_fullest_clusters_are_thinned_of_their_smallest(pomona: Pomona, row:
 def test_without_a_target_none_is_thinned(pomona: Pomona, row: GrownRow) -> None:
     code, printed, _ = pomona("thinning", row.path)
     assert code == 0
-    lines = printed.splitlines()
-    header = next(number for number, line in enumerate(lines) if line.split()[0] == "tree")
-    assert [line.split()[4] for line in lines[header + 1 :]] == ["0", "0"]
-    assert "no fruitlets, which are up to 45 mm" in lines[header - 1]
-    assert [line.split()[2] for line in lines[header + 1 :]] == ["0", "0"], "of apples nobody knows which will drop"
+    assert [line.split()[4] for line in printed.splitlines()[2:]] == ["0", "0"]
     assert pomona("thinning", row.path, "--target", "-3")[0] == 2
+
+
+def test_of_apples_near_the_harvest_none_is_foretold_to_drop(pomona: Pomona, tmp_path: Path) -> None:
+    """The rule is one of fruitlets: an apple of 60 mm that grows at a quarter of the rate hangs on."""
+    path = tmp_path / "orchard.gpkg"
+    grow_row(path, days=(100, 114), n_trees=2, noise_mm=0.5, scales=(1.0, 1.0), dropping=DROPPING, slowed_from=100.0)
+    code, printed, _ = pomona("thinning", path, "--target", 20, "-o", tmp_path / "thin.csv")
+    assert code == 0
+    assert "no fruitlets, which are up to 45 mm" in printed
+    with (tmp_path / "thin.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert {line["drop_probability"] for line in lines} == {""}
+    assert [line["action"] for line in lines].count("thin") == 20
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.4])

@@ -46,9 +46,7 @@ def thinning(
     before, last = sorted(set(grown.fruits.days))[-2:]
     say(f"{orchard}: from {before} to {last}, the fastest fruits grew {plan.drop.fast_mm_per_day:.2f} mm a day")
     if not are_fruitlets(grown):
-        say(
-            f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which of them will drop"
-        )
+        say(f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which will drop")
     say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
     for tree in trees:
         counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"

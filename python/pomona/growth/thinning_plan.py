@@ -31,7 +31,7 @@ class ThinningPlan:
     sizes_mm, rates_mm_per_day : (M,) float64
         At the last visit, and between the last two days; NaN for a fruit that one of them did not measure.
     drop : FruitDrop
-        Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known, and none drops.
+        Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known.
     places : (M,) float64
         Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. NaN
         for what drops.

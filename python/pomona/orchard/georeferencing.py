@@ -90,6 +90,8 @@ def georeference(
     PomonaError
         When the file is not a map of ours, or the points are too few, too near each other, or contradict each other.
     """
+    if not within_m > 0:  # NaN is not
+        raise PomonaError(f"--within: found {within_m:g}, expected metres above 0")
     with writing(Path(path), "map", timeout_s=timeout_s, waiting=waiting) as (connection, _):
         named, frames, positions = _in_map(connection, table, session)
         up = _up(connection) if up_in_map is None else np.asarray(up_in_map, np.float64)

@@ -120,7 +120,7 @@ def _labelled(colour: str, size_mm: float, column: str) -> str:
 
 def _style(kind: str, about: dict[str, str]) -> tuple[ElementTree.Element, ElementTree.Element]:
     root = ElementTree.Element("qgis", version=VERSION, styleCategories="Symbology|Labeling", labelsEnabled="1")
-    return root, ElementTree.SubElement(root, "renderer-v2", type=kind, **about)
+    return root, ElementTree.SubElement(root, "renderer-v2", {"type": kind, **about})
 
 
 def _marker(symbols: ElementTree.Element, name: str, colour: str, size_mm: float) -> None:
