@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pomona.earth import from_utm
 from pomona.errors import PomonaError
 from pomona.reading import number_in, shown
-from pomona.store.values import FARTHEST_M
 from pomona.table_lines import table_lines
 
 __all__ = ["ControlTable", "read_control_points"]
@@ -71,12 +70,7 @@ def read_control_points(path: Path, epsg: int | None = None) -> ControlTable:
         rows.append(dict(zip(header, cells, strict=True)))
     places = np.array([[number_in(at, name, row[name]) for name in place] for at, row in zip(where, rows, strict=True)])
     plan = np.array([[number_in(at, name, row[name]) for name in earth] for at, row in zip(where, rows, strict=True)])
-    if len(rows) and np.abs(places).max() > FARTHEST_M:
-        row = int(np.abs(places).max(axis=1).argmax())
-        raise PomonaError(
-            f"{where[row]}: {place[0]}: found {np.abs(places[row]).max():g}, expected at most {FARTHEST_M:g}"
-        )
-    if not len(rows):
+    if not rows:
         raise PomonaError(f"{path}: found no known points, expected two or more")
     if epsg is not None:
         plan = from_utm(epsg, plan[:, 0], plan[:, 1])
