@@ -9,7 +9,7 @@ FUZZ_SEED ?= 1
 NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop demo test test-rust test-python lint format animation bench experiments fuzz audit wheel docs clean help
+.PHONY: all install develop page demo animation test test-rust test-python lint format bench experiments fuzz audit wheel docs clean help
 
 all: lint docs test ## what CI runs
 
@@ -23,6 +23,9 @@ install: $(UV) ## build pomona and install it with its tools into .venv
 
 develop: $(UV) ## rebuild the extension in place after an edit of Rust sources, fast (dev profile)
 	PATH="$(CURDIR)/.tools/bin:$$PATH" $(UV) run --no-sync maturin develop --uv --skip-install
+
+page: ## rebuild the page of `view` and `report` out of web/, with Node
+	cd web && npm ci && npm run build
 
 demo: install ## the whole story in three minutes: three recordings of a row, one map, growth, a report to open
 	$(RUN) pomona demo examples/row

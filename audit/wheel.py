@@ -11,6 +11,7 @@ MOST_EXTENSION_BYTES = 8_000_000
 """Of the compiled core: some 3 MB without debug symbols, 27 MB with them."""
 
 MODELS = "pomona/detect/model/"
+PAGE = "pomona/viewer/page/"
 MOST_MODEL_BYTES = 6_000_000
 """Of the shipped detector, in 32 and in 8 bits."""
 
@@ -54,6 +55,7 @@ def _of_files(sizes: dict[str, int]) -> list[str]:
         "pomona/py.typed",
         "pomona/_core.pyi",
         *(f"{MODELS}{name}" for name in ("fruits.onnx", "fruits_int8.onnx", "CARD.md")),
+        *(f"{PAGE}{name}" for name in ("index.html", "page.js", "page.css")),
     )
     missing = [f"found no {name}" for name in needed if name not in sizes]
     models = sum(size for name, size in sizes.items() if name.startswith(MODELS))

@@ -24,6 +24,15 @@ def test_the_page_was_built_from_these_sources() -> None:
     assert noted["page"] == digest(BUILT, ["index.html", "page.css", "page.js"]), "the page was edited: make page"
 
 
+def test_the_page_carries_the_notices_of_what_is_inside() -> None:
+    script = (BUILT / "page.js").read_text("utf-8")
+    assert "Copyright (c) 2022 Leon Sorokin" in script
+    assert "Permission is hereby granted, free of charge" in script
+    inside = json.loads((WEB / "package.json").read_text())["dependencies"]
+    assert f"ogl {inside['ogl']}" in script
+    assert f"uPlot {inside['uplot']}" in script
+
+
 def test_the_page_can_stand_inside_html() -> None:
     """A report holds script and style as they are."""
     assert "</script" not in (BUILT / "page.js").read_text("utf-8").lower()

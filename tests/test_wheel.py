@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from audit.wheel import MODELS, MOST_EXTENSION_BYTES, MOST_MODEL_BYTES, NEEDED, faults
+from audit.wheel import MODELS, MOST_EXTENSION_BYTES, MOST_MODEL_BYTES, NEEDED, PAGE, faults
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -16,6 +16,7 @@ GOOD = {
     "pomona/_core.pyi": b"",
     "pomona/py.typed": b"",
     **{f"{MODELS}{name}": b"" for name in ("fruits.onnx", "fruits_int8.onnx", "CARD.md")},
+    **{f"{PAGE}{name}": b"" for name in ("index.html", "page.js", "page.css")},
     "pomona-0.1.0.dist-info/METADATA": "".join(f"{name}: something\n" for name in NEEDED).encode(),
 }
 
@@ -40,6 +41,7 @@ def test_a_good_wheel_has_no_faults(tmp_path: Path) -> None:
         ({f"{MODELS}fruits.onnx": None}, "found no pomona/detect/model/fruits.onnx"),
         ({f"{MODELS}fruits.onnx": bytes(MOST_MODEL_BYTES + 1)}, "expected at most 6000000"),
         ({"pomona/py.typed": None}, "found no pomona/py.typed"),
+        ({f"{PAGE}page.js": None}, "found no pomona/viewer/page/page.js"),
         ({"pomona-0.1.0.dist-info/METADATA": b"Author: us\n"}, "METADATA: found no Classifier"),
         ({"pomona/_core.abi3.so": f"\0{Path.home()}/.cargo/a.rs".encode()}, "names a folder of who built it"),
         ({"pomona-0.1.0.dist-info/a.json": f"file://{ROOT}/crates".encode()}, "a.json: names a folder"),

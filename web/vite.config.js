@@ -29,6 +29,12 @@ function noted() {
   };
 }
 
+/** What is inside the page, and what its licences ask to be carried along; ogl is public domain (Unlicense). */
+function notices() {
+  const licence = readFileSync(join(here, "node_modules/uplot/LICENSE"), "utf8").trim();
+  return `/*! ogl 1.0.11: Unlicense, public domain.\nuPlot 1.6.32: ${licence} */`;
+}
+
 export default {
   plugins: [noted()],
   build: {
@@ -37,6 +43,7 @@ export default {
     target: "es2022",
     modulePreload: false,
     cssCodeSplit: false,
+    rolldownOptions: { output: { postBanner: notices() } },
     lib: { entry: join(here, "src/main.ts"), name: "pomona", formats: ["iife"], fileName: () => "page.js", cssFileName: "page" },
   },
 };

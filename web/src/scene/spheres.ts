@@ -30,13 +30,13 @@ out vec4 shown;
 void main() {
   vec2 at = 2.0 * gl_PointCoord - 1.0;
   float r2 = dot(at, at);
-  if (r2 > 1.0 || (look > 0.5 && look < 0.8 && r2 < 0.45)) discard;
+  if (r2 > 1.0 || (look > 0.5 && look < 0.8 && r2 < 0.4)) discard;
   vec3 normal = vec3(at.x, -at.y, sqrt(1.0 - r2));
   float light = 0.62 + 0.42 * dot(normal, vec3(-0.38, 0.56, 0.73));
   float shine = 0.22 * pow(max(dot(normal, vec3(-0.25, 0.42, 0.87)), 0.0), 24.0);
   vec3 lit = look > 0.8 ? tint * light + shine : tint;
   // The rim fades where it has two pixels for it: most fruits hang before nothing.
-  float solid = rim > 0.3 ? 1.0 - smoothstep(rim, 1.0, sqrt(r2)) * 0.7 : 1.0;
+  float solid = rim > 0.3 && look > 0.8 ? 1.0 - smoothstep(rim, 1.0, sqrt(r2)) * 0.7 : 1.0;
   shown = vec4(look < 0.5 ? mix(background, tint, 0.28) : mix(background, lit, solid), 1.0);
 }`;
 
