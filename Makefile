@@ -9,7 +9,7 @@ FUZZ_SEED ?= 1
 NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
 
 .DEFAULT_GOAL := help
-.PHONY: all install develop page demo test test-rust test-python lint format animation bench experiments fuzz audit wheel docs clean help
+.PHONY: all install develop page demo animation test test-rust test-python lint format bench experiments fuzz audit wheel docs clean help
 
 all: lint docs test ## what CI runs
 

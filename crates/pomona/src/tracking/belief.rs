@@ -279,8 +279,8 @@ impl Sizes {
     /// That a track of this size is one fruit.
     fn probability(&self, diameter_m: f64, sigma_m: f64) -> f64 {
         let off = diameter_m.ln() - self.ln_median;
-        // Not a number compares as false: of what nobody measured nothing is said.
-        if !(off > 0.0) {
+        // Of what nobody measured nothing is said.
+        if off.is_nan() || off <= 0.0 {
             return 1.0;
         }
         let sigma = self.spread.hypot(sigma_m / diameter_m);
