@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from benchmarks.page_draw import drawn_document
 
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from page_maker import chromium, served
 from pomona.orchard import OrchardMap
+from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.season_page import Wishes
 from pomona.viewer.season_report import write_report
 from test_calipers import long_table
@@ -246,6 +248,23 @@ def test_names_of_strangers_are_texts(browser: Any, hostile: GrownRow, tmp_path:
 def test_names_of_strangers_are_texts_from_the_server_too(browser: Any, hostile: GrownRow) -> None:
     with served(hostile.path) as address, opened(browser, address) as page:
         assert_harmless(page, hostile)
+
+
+def test_names_of_trees_are_texts_in_the_page_and_in_a_spreadsheet(browser: Any, tmp_path: Path) -> None:
+    document = drawn_document(300, with_pictures=False)
+    names = [HOSTILE, "=1+1", '@"a,b"']
+    for number, name in enumerate(names):
+        document["trees"][number]["name"] = document["growth"]["blocks"][1 + number]["name"] = name
+    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        assert page.locator(".trees tbody th").all_text_contents() == [f"Tree {name}" for name in names]
+        page.get_by_role("tab", name="Fruits").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save CSV").click()
+        with Path(download.value.path()).open(newline="", encoding="utf-8") as file:
+            trees = {line["tree"] for line in csv.DictReader(file)}
+        assert trees == {HOSTILE, "'=1+1", '\'@"a,b"'}
+        assert page.evaluate("window.owned") is None
 
 
 def assert_harmless(page: Any, hostile: GrownRow) -> None:

@@ -41,7 +41,7 @@ class _ServedSeason:
         self._path, self._wishes = path, wishes
         self._lock = threading.Lock()
         self._told_of: tuple[int, int] | None = None
-        self._now = (b"", CropShelf(path))
+        self._now = self._told()
 
     def text(self) -> bytes:
         return self._told()[0]
@@ -55,8 +55,8 @@ class _ServedSeason:
             if self._told_of != (about.st_mtime_ns, about.st_size):
                 shelf = CropShelf(self._path)
                 document = season_document(self._path, self._wishes, shelf.told)
-                self._now = (json.dumps(document, allow_nan=False).encode(), shelf)
-                self._told_of = (about.st_mtime_ns, about.st_size)
+                self._now = json.dumps(document, allow_nan=False).encode(), shelf
+                self._told_of = about.st_mtime_ns, about.st_size
             return self._now
 
 
@@ -73,7 +73,6 @@ def page_app(path: Path, wishes: Wishes) -> FastAPI:
     except ImportError:
         raise PomonaError("the live page needs fastapi and uvicorn: pip install fastapi uvicorn") from None
     season, page = _ServedSeason(path, wishes), built_page()
-    season.text()
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     def season_json() -> Response:
