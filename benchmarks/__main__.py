@@ -9,6 +9,7 @@ import sys
 NAMES = (
     "robustness",
     "cells",
+    "false_alarms",
     "units",
     "detector",
     "stereo",

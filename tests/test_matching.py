@@ -52,6 +52,30 @@ def test_an_answer_has_pairs() -> None:
     assert dict(match.stages)["verified"] == 1.0, "no longer what it tests"
 
 
+@pytest.mark.parametrize("seed", [9, 11])
+def test_a_frame_that_stands_out_of_all_other_poses_is_found(seed: int) -> None:
+    pair = scene_pair("frame25", seed)
+    match = pomona.match(pair.query, pair.map)
+    assert match.status == "Found"
+    assert match.map_from_query is not None
+    error_m = (match.map_from_query - pair.map_from_query) @ [*pair.query.positions.mean(axis=0), 1.0]
+    assert np.linalg.norm(error_m) < 0.05
+    stages = dict(match.stages)
+    # The threshold for clouds of this size is 42 nats; here the second pose says what chance reaches.
+    assert stages["threshold_nats"] < stages["best_nats"] < 42.0
+
+
+def test_the_false_alarm_rate_is_the_share_of_unrelated_frames_that_are_answered() -> None:
+    pairs = [scene_pair("frame25-noov", seed) for seed in range(24)]
+
+    def answered(rate: float) -> int:
+        config = {"verified": {"false_alarm_rate": rate}}
+        return sum(pomona.match(pair.query, pair.map, config=config).status == "Found" for pair in pairs)
+
+    assert answered(3e-4) == 0
+    assert 7 <= answered(0.5) <= 17
+
+
 @pytest.mark.parametrize("seed", [9, 24, 53])
 def test_rows_on_wires_without_a_common_fruit_are_no_match(seed: int) -> None:
     pair = scene_pair("trellis-noovup", seed)

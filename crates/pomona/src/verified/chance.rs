@@ -1,6 +1,6 @@
 //! What chance puts at each place of a cloud: the density of strangers, near a fruit and at a distance from one.
 
-use super::landscape::{Neighbours, SHARE_OF_ROWS};
+use super::nearest::{Neighbours, SHARE_OF_ROWS};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 

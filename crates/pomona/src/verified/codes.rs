@@ -3,12 +3,16 @@
 //! A k-d tree prunes badly in six dimensions and is slow to build. A grid with about as many cells as codes is built by
 //! counting; a search lists the rows of cells that are near enough and measures what is in them, eight codes at once.
 
-use super::seeds::Code;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Numbers of a code.
 const NUMBERS: usize = 6;
+
+/// Length of AB, then C (along, across) and D (along, across, above) in the frame of the seed, metres.
+///
+/// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
+pub(crate) type Code = [f32; NUMBERS];
 
 /// Codes in the order of a grid's cells.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::decision::{Finding, Findings, Search, Stages};
+use super::case::{Finding, Findings, Search, Stages};
 use super::overlap::Overlap;
 use super::pairing::Pairing;
 use crate::answer::{Match, Pair, Registration, Verdict};

@@ -5,6 +5,9 @@ use crate::neighbours::cells::CellMap;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
+/// Edge of a cell in spacings of the query: some ten fruits.
+pub(super) const EDGE: f64 = 2.5;
+
 /// Fruits that share one pose.
 #[derive(Debug, Clone)]
 pub(crate) struct Cell {

@@ -1,21 +1,19 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::{VerifiedConfig, pattern, poses};
+use super::acceptance::VerifiedConfig;
+use super::case::{Finding, Findings, Log, SETTLED, Search, Stages, VerifiedMap};
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
-use super::growth::{Growth, grow, hold};
+use super::growth::{grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
-use super::overlap::Overlap;
 use super::placement::Placement;
-use super::search::{Contender, Effort, Starts, of_some_fruits, round};
-use super::seeds::{self, Seed, SeedIndex};
-use super::settlement::{Settled, settle};
+use super::search::{Contender, Starts, of_some_fruits, round};
+use super::seeds::{self, Seed};
 use super::size::Diameters;
-use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
-use crate::geometry::{Scale, Similarity};
+use crate::geometry::Similarity;
 use crate::matching::Request;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
@@ -23,12 +21,6 @@ const MIN_FRUITS: usize = 5;
 
 /// Fruits of one cloud at the most: the map's seeds take some 10 kB a fruit.
 pub(crate) const MAX_FRUITS: usize = 300_000;
-
-/// Noise in spacings that seeds are searched with: 2 cm in an orchard.
-pub(crate) const SEED_SIGMA: f64 = 0.075;
-
-/// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
-pub(super) const DETECTION: f64 = 0.55;
 
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
 const SHARP: f64 = 0.18;
@@ -56,52 +48,8 @@ const GROWN: usize = 6;
 /// A pose with this many times the evidence needed is no local optimum.
 const SURE: f64 = 6.0;
 
-/// Share of the evidence needed that must be left when every fruit is predicted without its own partner.
-const SETTLED: f64 = 0.8;
-
 /// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
 const UPRIGHT_SEEDS: u64 = 2;
-
-/// A map made ready for many queries.
-#[derive(Debug, Clone)]
-pub(crate) struct VerifiedMap {
-    landscape: Landscape,
-    seeds: SeedIndex,
-    scale: Scale,
-}
-
-impl VerifiedMap {
-    pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
-        let landscape = Landscape::new(map);
-        let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
-        Self { landscape, seeds, scale }
-    }
-}
-
-/// An overlap with the region it was found from.
-pub(super) struct Finding<'a> {
-    pub(super) growth: Growth<'a>,
-    /// As it grew.
-    pub(super) overlap: Overlap,
-    pub(super) seed: Hypothesis,
-    /// As it stands in the end, once it was looked at closely.
-    pub(super) settled: Option<Settled>,
-}
-
-/// What a search has found.
-#[derive(Default)]
-pub(super) struct Findings<'a> {
-    /// Those with enough evidence, most first.
-    pub(super) accepted: Vec<Finding<'a>>,
-    /// Other poses that it grew: what chance and the planting's own pattern reach.
-    pub(super) others: Vec<Finding<'a>>,
-}
-
-impl<'a> Finding<'a> {
-    pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
-        Self { overlap: growth.overlap(), growth, seed, settled: None }
-    }
-}
 
 /// Finds the query in the map.
 pub(crate) fn search(
@@ -153,94 +101,10 @@ pub(crate) fn pairs_under(
     search.answer(Findings { accepted: vec![finding], others: Vec::new() }, Vec::new())
 }
 
-pub(super) struct Search<'a> {
-    pub(super) query: &'a Landscape,
-    pub(super) map: &'a Landscape,
-    seeds: &'a SeedIndex,
-    pub(super) model: Model,
-    pub(super) config: VerifiedConfig,
-    noise_m: Option<f64>,
-    sizes: Option<Diameters>,
-}
-
-pub(super) type Stages = Vec<(&'static str, f64)>;
-
-/// What the search did.
-struct Log {
-    seeds: usize,
-    effort: Effort,
-    refined: usize,
-    grown: u32,
-    /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
-    best: f64,
-    settled: f64,
-}
-
-impl Default for Log {
-    fn default() -> Self {
-        let none = f64::NEG_INFINITY;
-        Self { seeds: 0, effort: Effort::default(), refined: 0, grown: 0, best: none, settled: none }
-    }
-}
-
 impl<'a> Search<'a> {
-    fn new(
-        prepared: &'a VerifiedMap,
-        query: &'a Landscape,
-        sizes: Option<Diameters>,
-        request: &Request,
-        config: &VerifiedConfig,
-    ) -> Self {
-        let map = &prepared.landscape;
-        // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
-        let common = SEED_SIGMA * map.spacing;
-        let sigma = request.noise_m.unwrap_or(common).max(common);
-        Self {
-            query,
-            map,
-            seeds: &prepared.seeds,
-            model: Model {
-                sigma: sigma.min(2.0 * common),
-                detection: DETECTION,
-                scale: prepared.scale,
-                vertical: request.up.map(Vertical::new),
-            },
-            config: *config,
-            noise_m: request.noise_m,
-            sizes,
-        }
-    }
-
-    /// Evidence that a grown pose must exceed, nats.
-    fn threshold(&self) -> f64 {
-        let (poses, share) = self.offered();
-        self.config.threshold(poses, share)
-    }
-
-    /// Evidence from which on another pose counts as a rival, accepted or not, nats.
-    pub(super) fn pattern(&self) -> f64 {
-        let (poses, share) = self.offered();
-        pattern(poses, share)
-    }
-
-    /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
-    fn offered(&self) -> (f64, f64) {
-        let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
-        (poses(self.query.len(), self.map.len(), self.model.scale), share)
-    }
-
-    /// The same once it is settled.
-    fn settled_threshold(&self) -> f64 {
-        SETTLED * self.threshold()
-    }
-
-    pub(super) fn admits(&self, pose: &Placement) -> bool {
-        self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
-    }
-
     /// Rounds of seeds until a pose is accepted, then the outline.
     fn run(&self) -> (Findings<'a>, Stages) {
-        let mut log = Log::default();
+        let mut log = Log::new(self.threshold());
         let mut findings = Findings::default();
         let mut longest = Vec::new();
         for (index, plan) in ROUNDS.into_iter().enumerate() {
@@ -258,6 +122,9 @@ impl<'a> Search<'a> {
             if !findings.accepted.is_empty() {
                 break;
             }
+        }
+        if findings.accepted.is_empty() {
+            findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let stages = self.stages(&log, findings.accepted.len());
@@ -312,28 +179,10 @@ impl<'a> Search<'a> {
                 continue;
             }
             log.best = log.best.max(finding.overlap.log_odds);
-            if finding.overlap.log_odds > self.threshold() {
-                let evidence = self.settle(&mut finding);
-                log.settled = log.settled.max(evidence);
-                if evidence > self.settled_threshold() {
-                    findings.accepted.push(finding);
-                    continue;
-                }
-            }
-            findings.others.push(finding);
+            let sorted =
+                if self.holds(&mut finding, SETTLED, log) { &mut findings.accepted } else { &mut findings.others };
+            sorted.push(finding);
         }
-    }
-
-    /// Looks closely at a finding, over all that it reaches; returns its evidence.
-    fn settle(&self, finding: &mut Finding) -> f64 {
-        let Finding { growth, settled, .. } = finding;
-        let settled = settled.get_or_insert_with(|| {
-            if !growth.whole {
-                growth.reach_all();
-            }
-            settle(growth, self.noise_m, self.sizes.as_ref())
-        });
-        settled.evidence
     }
 
     fn stages(&self, log: &Log, verified: usize) -> Stages {
@@ -347,9 +196,9 @@ impl<'a> Search<'a> {
             ("fitted", log.effort.fitted as f64),
             ("refined", log.refined as f64),
             ("grown", f64::from(log.grown)),
-            ("threshold_nats", self.threshold()),
+            ("threshold_nats", log.threshold),
             ("best_nats", known(log.best)),
-            ("settled_threshold_nats", self.settled_threshold()),
+            ("settled_threshold_nats", log.settled_threshold),
             ("settled_nats", known(log.settled)),
             ("verified", verified as f64),
         ]

@@ -1,6 +1,7 @@
 //! What a fruit's displacement shares with its neighbours': sag and drift do, noise does not.
 
-use super::landscape::{Landscape, SHARE_OF_ROWS};
+use super::landscape::Landscape;
+use super::nearest::SHARE_OF_ROWS;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 

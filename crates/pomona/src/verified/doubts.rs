@@ -1,10 +1,11 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
-use super::decision::{Finding, Search};
+use super::case::{Finding, Search};
 use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
-use super::landscape::single;
-use super::overlap::{Landing, Overlap};
+use super::nearest::single;
+use super::overlap::Overlap;
+use super::placement::Landing;
 use super::placement::{Moments, Placement};
 use super::search::{Contender, Starts, refined};
 use nalgebra::{Matrix3, Vector3};
@@ -151,9 +152,11 @@ impl<'a> Search<'a> {
 
     /// Whether another optimum has nearly as much evidence, and puts most fruits of the overlap elsewhere.
     pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
-        if other.log_odds <= self.pattern().max(RIVAL * best.log_odds) {
-            return false;
-        }
+        other.log_odds > self.pattern().max(RIVAL * best.log_odds) && self.apart(best, other)
+    }
+
+    /// Whether another optimum puts most fruits of the overlap elsewhere.
+    pub(super) fn apart(&self, best: &Overlap, other: &Overlap) -> bool {
         let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
             at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)

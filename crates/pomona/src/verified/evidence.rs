@@ -13,10 +13,10 @@
 //! when it grew, below zero where nothing was selected.
 
 use super::beliefs::{Beliefs, Edge};
-use super::decision::DETECTION;
+use super::hypothesis::DETECTION;
 use super::landscape::Landscape;
-use super::overlap::Landing;
 use super::pairing::{Meeting, meetings};
+use super::placement::Landing;
 use super::placement::Placement;
 
 /// Steps of expectation and maximisation of the share that is seen again, from [`DETECTION`].
@@ -40,7 +40,7 @@ pub(super) fn evidence(
 ) -> f64 {
     let here: Vec<f64> = predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
     let met = meetings(query, map, predictions, pose, 0.0, |meeting| Some(*meeting));
-    let due: f64 = here.iter().sum();
+    let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..STEPS {
@@ -48,11 +48,20 @@ pub(super) fn evidence(
         let edges: Vec<Edge> = met.iter().filter_map(edge).collect();
         let beliefs = Beliefs::new(&edges, query.len(), map.len());
         let alone: f64 = here.iter().chain(there).map(|support| (1.0 - share * support).ln()).sum();
-        evidence = beliefs.log_sum + alone + share * due;
-        let found: f64 = beliefs.probabilities.iter().sum();
-        share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
+        evidence = beliefs.log_sum + alone + share * due[0];
+        share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
     }
     evidence
+}
+
+/// The share p under which `found` pairs are likeliest, where the query and the map show so many fruits in the overlap.
+///
+/// With m and n of them and f pairs the evidence is `f ln p + (m + n - 2 f) ln(1 - p) + p m` and a constant: its largest value
+/// is where `m p^2 + (n - f) p = f`. Visits that show as many give p = f / n; a frame that ends amid a crown gives less than
+/// the share of its own fruits that are found.
+fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
+    let (here, missed) = (here.max(1.0), (there - found).max(0.0));
+    ((missed * missed + 4.0 * here * found).sqrt() - missed) / (2.0 * here)
 }
 
 fn edge(map: &Landscape, meeting: &Meeting, share: f64, back: f64) -> Option<Edge> {
@@ -67,6 +76,16 @@ mod tests {
     use super::*;
     use crate::verified::fixture::visits;
     use nalgebra::Vector3;
+
+    #[test]
+    fn the_share_seen_again_makes_the_evidence_largest() {
+        let [found, here, there] = [19.0, 23.0, 76.0];
+        let evidence = |p: f64| found * p.ln() + (here + there - 2.0 * found) * (1.0 - p).ln() + p * here;
+        let share = seen_again(found, [here, there]);
+        assert!([-0.01, 0.01].iter().all(|step| evidence(share + step) < evidence(share)));
+        assert!((seen_again(60.0, [100.0, 100.0]) - 0.6).abs() < 1e-12);
+        assert!(seen_again(0.0, [0.0, 5.0]).abs() < 1e-12);
+    }
 
     #[test]
     fn the_true_pose_has_evidence_and_the_same_pose_moved_along_has_less_than_none() {

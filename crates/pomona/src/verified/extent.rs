@@ -4,8 +4,7 @@
 //! trees still have the same extent. The principal axes give the pose up to half-turns; annealed least squares, from
 //! the width of a branch down to the noise, decides between them.
 
-use super::decision::DETECTION;
-use super::hypothesis::{Hypothesis, gaussian};
+use super::hypothesis::{DETECTION, Hypothesis, gaussian};
 use super::landscape::Landscape;
 use super::placement::{Moments, Placement};
 use crate::geometry::Scale;

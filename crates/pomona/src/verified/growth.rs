@@ -7,12 +7,9 @@
 use super::cut::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
-use super::overlap::Landing;
+use super::placement::Landing;
 use super::placement::{Moments, Placement};
 use nalgebra::Vector3;
-
-/// Edge of a cell in spacings of the query: some ten fruits.
-pub(super) const CELL: f64 = 2.5;
 
 /// Growth ends at the latest after this many steps from cell to cell beyond the extent of the cloud.
 const EXTRA_ROUNDS: usize = 6;

@@ -6,6 +6,9 @@ use super::vertical::Vertical;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 
+/// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
+pub(super) const DETECTION: f64 = 0.55;
+
 /// What is assumed of one pair of visits while poses are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Model {
@@ -109,7 +112,7 @@ pub(crate) fn refine(
     scratch.owner.resize(map.len(), (0, 0));
     let region = &mut scratch.region;
     region.clear();
-    query.tree.within(&super::landscape::single(place), reach as f32, |row, _| region.push(row));
+    query.tree.within(&super::nearest::single(place), reach as f32, |row, _| region.push(row));
     region.sort_unstable();
     let mut pose = *start;
     let mut sigma = model.sigma;
@@ -174,7 +177,7 @@ fn other_side(
     let due: f64 = scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>()
         * model.detection;
     let mut missing = Evidence::default();
-    map.tree.within(&super::landscape::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
+    map.tree.within(&super::nearest::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
         if scratch.owner[row as usize].0 != scratch.stamp {
             missing.multiply(model.missed(query.support(&pose.apply_inverse(&map.points[row as usize]))));
         }

@@ -1,18 +1,15 @@
 //! One cloud prepared for verification: its grid, its typical spacing, and what chance predicts at each place.
 
 use super::chance::{Companions, crowding, kinship, local_density};
-use super::cut::Cut;
+use super::cut::{Cut, EDGE};
+use super::nearest::{Neighbours, single};
 use super::support::Support;
 use crate::cloud::FruitCloud;
 use crate::neighbours::grid::Grid;
 use crate::neighbours::tree::Tree;
 use crate::neighbours::vicinity::Vicinity;
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use std::sync::OnceLock;
-
-/// Neighbours kept per fruit: enough for the seeds (the nearest ten) and for the first look at a hypothesis.
-pub(crate) const NEIGHBOURS: usize = 24;
 
 /// Edge of a grid's cell in spacings.
 const CELL: f64 = 0.6;
@@ -132,7 +129,7 @@ impl Landscape {
 
     /// The cells that growth goes by.
     pub(super) fn cut(&self) -> &Cut {
-        self.cut.get_or_init(|| Cut::new(&self.points, super::growth::CELL * self.spacing))
+        self.cut.get_or_init(|| Cut::new(&self.points, EDGE * self.spacing))
     }
 
     /// The nearest point within `gate`, with its squared distance.
@@ -191,44 +188,6 @@ impl Nearest<'_> {
             self.row = Some(row);
         }
     }
-}
-
-/// The nearest other fruits of every fruit, the same number for each.
-#[derive(Debug, Clone)]
-pub(super) struct Neighbours {
-    each: usize,
-    rows: Vec<u32>,
-}
-
-impl Neighbours {
-    fn new(points: &[[f32; 3]], tree: &Tree) -> Self {
-        let each = NEIGHBOURS.min(points.len().saturating_sub(1));
-        let mut rows = vec![0; points.len() * each];
-        if each > 0 {
-            rows.par_chunks_mut(each).enumerate().with_min_len(SHARE_OF_ROWS).for_each_init(
-                Vec::new,
-                |found, (row, near)| {
-                    tree.nearest(&points[row], each + 1, found);
-                    let others = found.iter().map(|entry| entry.0).filter(|&other| other as usize != row);
-                    near.iter_mut().zip(others).for_each(|(slot, other)| *slot = other);
-                },
-            );
-        }
-        Self { each, rows }
-    }
-
-    #[inline]
-    pub(super) fn of(&self, row: usize) -> &[u32] {
-        &self.rows[row * self.each..(row + 1) * self.each]
-    }
-}
-
-/// Rows at the least that are worth a thread of their own.
-pub(crate) const SHARE_OF_ROWS: usize = 256;
-
-#[inline]
-pub(crate) fn single(p: &Vector3<f64>) -> [f32; 3] {
-    [p.x as f32, p.y as f32, p.z as f32]
 }
 
 pub(crate) fn median(values: &mut [f64]) -> f64 {

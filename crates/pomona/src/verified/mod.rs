@@ -6,13 +6,15 @@
 //!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
-//!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`).
+//!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
+//!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
 
 mod acceptance;
 mod beliefs;
+mod case;
 mod chance;
 mod codes;
 mod conclusion;
@@ -27,6 +29,8 @@ mod fixture;
 mod growth;
 mod hypothesis;
 mod landscape;
+mod nearest;
+mod outlier;
 mod overlap;
 mod pairing;
 mod patches;
@@ -41,6 +45,8 @@ mod support;
 mod vertical;
 
 pub use acceptance::VerifiedConfig;
-pub(crate) use decision::{MAX_FRUITS, SEED_SIGMA, VerifiedMap, pairs_under, search};
-pub(crate) use landscape::{Landscape, median, single};
+pub(crate) use case::{SEED_SIGMA, VerifiedMap};
+pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
+pub(crate) use landscape::{Landscape, median};
+pub(crate) use nearest::single;
 pub(crate) use seeds::{COMPANIONS, Quad, SeedIndex, canonical, frame, near_ties, shuffled};

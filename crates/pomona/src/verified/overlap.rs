@@ -3,19 +3,11 @@
 use super::cut::{key_of, total};
 use super::growth::{Growth, Partner};
 use super::hypothesis::gaussian;
-use super::placement::Placement;
+use super::placement::{Landing, Placement};
 use nalgebra::Vector3;
 
 /// Shares of fruits seen again that are tried: heavy occlusion to a bare tree.
 const SHARES_SEEN_AGAIN: [f64; 4] = [0.35, 0.55, 0.75, 0.9];
-
-/// A fruit of the query where the grown pose puts it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Landing {
-    pub(crate) place: Vector3<f64>,
-    /// Variance per axis of the distance to the partner, square metres of the map.
-    pub(crate) variance: f64,
-}
 
 /// The overlap that a hypothesis explains.
 #[derive(Debug, Clone)]

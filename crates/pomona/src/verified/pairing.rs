@@ -1,8 +1,9 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
 use super::beliefs::{Beliefs, Edge};
-use super::landscape::{Landscape, SHARE_OF_ROWS};
-use super::overlap::Landing;
+use super::landscape::Landscape;
+use super::nearest::SHARE_OF_ROWS;
+use super::placement::Landing;
 use super::placement::Placement;
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};

@@ -76,6 +76,14 @@ impl Placement {
     }
 }
 
+/// A fruit of the query where the grown pose puts it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Landing {
+    pub(crate) place: Vector3<f64>,
+    /// Variance per axis of the distance to the partner, square metres of the map.
+    pub(crate) variance: f64,
+}
+
 /// Sums of weighted pairs, enough for one least-squares step from a current pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moments {

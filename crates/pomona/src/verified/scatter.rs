@@ -8,8 +8,9 @@
 //! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
 //! true one where fruits crowd, so that the noise comes out small and the share large.
 
-use super::landscape::{Landscape, SHARE_OF_ROWS, single};
-use super::overlap::Landing;
+use super::landscape::Landscape;
+use super::nearest::{SHARE_OF_ROWS, single};
+use super::placement::Landing;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 

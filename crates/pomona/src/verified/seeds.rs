@@ -4,8 +4,9 @@
 //! it. Four fruits survive occlusion far more often than five (0.55^4 against 0.55^5 at 45 %), and verification is
 //! cheap enough to sort out the additional false candidates.
 
-use super::codes::CodeGrid;
-use super::landscape::{Landscape, SHARE_OF_ROWS};
+use super::codes::{Code, CodeGrid};
+use super::landscape::Landscape;
+use super::nearest::SHARE_OF_ROWS;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -21,11 +22,6 @@ const MIN_FLATNESS: f64 = 0.15;
 
 /// Four rows labelled A, B, C, D.
 pub(crate) type Quad = [u32; STARS];
-
-/// Length of AB, then C (along, across) and D (along, across, above) in the frame of the seed, metres.
-///
-/// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
-pub(crate) type Code = [f32; 6];
 
 /// A labelled set with its code.
 pub(crate) type Seed = (Quad, Code);

@@ -1,0 +1,182 @@
+//! One query against one map: what is asked, what was found, when it is enough.
+
+use super::acceptance::{VerifiedConfig, pattern, poses};
+use super::growth::Growth;
+use super::hypothesis::{DETECTION, Hypothesis, Model};
+use super::landscape::Landscape;
+use super::overlap::Overlap;
+use super::placement::Placement;
+use super::search::Effort;
+use super::seeds::SeedIndex;
+use super::settlement::{Settled, settle};
+use super::size::Diameters;
+use super::vertical::Vertical;
+use crate::cloud::FruitCloud;
+use crate::geometry::Scale;
+use crate::matching::Request;
+
+/// Noise in spacings that seeds are searched with: 2 cm in an orchard.
+pub(crate) const SEED_SIGMA: f64 = 0.075;
+
+/// Share of the evidence needed that must be left when every fruit is predicted without its own partner.
+pub(super) const SETTLED: f64 = 0.8;
+
+/// A map made ready for many queries.
+#[derive(Debug, Clone)]
+pub(crate) struct VerifiedMap {
+    pub(super) landscape: Landscape,
+    seeds: SeedIndex,
+    scale: Scale,
+}
+
+impl VerifiedMap {
+    pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
+        let landscape = Landscape::new(map);
+        let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
+        Self { landscape, seeds, scale }
+    }
+}
+
+/// An overlap with the region it was found from.
+pub(super) struct Finding<'a> {
+    pub(super) growth: Growth<'a>,
+    /// As it grew.
+    pub(super) overlap: Overlap,
+    pub(super) seed: Hypothesis,
+    /// As it stands in the end, once it was looked at closely.
+    pub(super) settled: Option<Settled>,
+}
+
+/// What a search has found.
+#[derive(Default)]
+pub(super) struct Findings<'a> {
+    /// Those with enough evidence, most first.
+    pub(super) accepted: Vec<Finding<'a>>,
+    /// Other poses that it grew: what chance and the planting's own pattern reach.
+    pub(super) others: Vec<Finding<'a>>,
+}
+
+impl<'a> Finding<'a> {
+    pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
+        Self { overlap: growth.overlap(), growth, seed, settled: None }
+    }
+}
+
+pub(super) struct Search<'a> {
+    pub(super) query: &'a Landscape,
+    pub(super) map: &'a Landscape,
+    pub(super) seeds: &'a SeedIndex,
+    pub(super) model: Model,
+    pub(super) config: VerifiedConfig,
+    noise_m: Option<f64>,
+    sizes: Option<Diameters>,
+}
+
+pub(super) type Stages = Vec<(&'static str, f64)>;
+
+/// What the search did.
+pub(super) struct Log {
+    pub(super) seeds: usize,
+    pub(super) effort: Effort,
+    pub(super) refined: usize,
+    pub(super) grown: u32,
+    /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
+    pub(super) best: f64,
+    pub(super) settled: f64,
+    /// Evidence that a grown pose had to exceed, nats.
+    pub(super) threshold: f64,
+    /// The same once it is settled, nats.
+    pub(super) settled_threshold: f64,
+}
+
+impl Log {
+    pub(super) fn new(threshold: f64) -> Self {
+        let none = f64::NEG_INFINITY;
+        Self {
+            seeds: 0,
+            effort: Effort::default(),
+            refined: 0,
+            grown: 0,
+            best: none,
+            settled: none,
+            threshold,
+            settled_threshold: SETTLED * threshold,
+        }
+    }
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        prepared: &'a VerifiedMap,
+        query: &'a Landscape,
+        sizes: Option<Diameters>,
+        request: &Request,
+        config: &VerifiedConfig,
+    ) -> Self {
+        let map = &prepared.landscape;
+        // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
+        let common = SEED_SIGMA * map.spacing;
+        let sigma = request.noise_m.unwrap_or(common).max(common);
+        Self {
+            query,
+            map,
+            seeds: &prepared.seeds,
+            model: Model {
+                sigma: sigma.min(2.0 * common),
+                detection: DETECTION,
+                scale: prepared.scale,
+                vertical: request.up.map(Vertical::new),
+            },
+            config: *config,
+            noise_m: request.noise_m,
+            sizes,
+        }
+    }
+
+    /// Evidence that a grown pose must exceed, nats.
+    pub(super) fn threshold(&self) -> f64 {
+        let (poses, share) = self.offered();
+        self.config.threshold(poses, share)
+    }
+
+    /// Evidence from which on another pose counts as a rival, accepted or not, nats.
+    pub(super) fn pattern(&self) -> f64 {
+        let (poses, share) = self.offered();
+        pattern(poses, share)
+    }
+
+    /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
+    fn offered(&self) -> (f64, f64) {
+        let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
+        (poses(self.query.len(), self.map.len(), self.model.scale), share)
+    }
+
+    pub(super) fn admits(&self, pose: &Placement) -> bool {
+        self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
+    }
+
+    /// Whether a finding has enough evidence, as it grew and once it is settled.
+    ///
+    /// `kept` is the share of the evidence needed that must be left when every fruit is predicted without its own partner.
+    pub(super) fn holds(&self, finding: &mut Finding, kept: f64, log: &mut Log) -> bool {
+        if finding.overlap.log_odds <= log.threshold {
+            return false;
+        }
+        let evidence = self.settle(finding);
+        log.settled = log.settled.max(evidence);
+        log.settled_threshold = kept * log.threshold;
+        evidence > log.settled_threshold
+    }
+
+    /// Looks closely at a finding, over all that it reaches; returns its evidence.
+    pub(super) fn settle(&self, finding: &mut Finding) -> f64 {
+        let Finding { growth, settled, .. } = finding;
+        let settled = settled.get_or_insert_with(|| {
+            if !growth.whole {
+                growth.reach_all();
+            }
+            settle(growth, self.noise_m, self.sizes.as_ref())
+        });
+        settled.evidence
+    }
+}

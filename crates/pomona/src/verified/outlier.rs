@@ -1,0 +1,53 @@
+//! An answer that the threshold is too high for: a pose that stands out of all others that the search found.
+//!
+//! The threshold of [`super::acceptance`] is what chance reaches over clouds of this size anywhere. What it reaches in these
+//! very clouds the other optima of the search show, found and refined as the answer was.
+
+use super::acceptance::outlying;
+use super::case::{Finding, Log, Search};
+
+/// Other poses that say what chance reaches, at the least: of fewer the best two are not yet in the tail.
+const ENOUGH: usize = 6;
+
+/// Poses that are polished before they are compared: the best and what may come to be second.
+const COMPARED: usize = 3;
+
+/// Share of the evidence needed that must be left when every fruit is predicted without its own partner: what true poses
+/// keep. Poses on wires that have far more than all others keep 0.5 to 0.75.
+const KEPT: f64 = 0.9;
+
+impl<'a> Search<'a> {
+    /// Takes the best pose out of those that were not accepted, where it stands out of the others.
+    pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, log: &mut Log) -> Option<Finding<'a>> {
+        others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        let distinct = self.distinct(others);
+        if distinct.len() <= ENOUGH {
+            return None;
+        }
+        let rate = self.config.false_alarm_rate;
+        // Half of the distance that is asked for: most poses that do not stand out need no closer look.
+        if evidence(others, distinct[0]) <= outlying(rate.sqrt(), evidence(others, distinct[1])) {
+            return None;
+        }
+        distinct[..COMPARED].iter().for_each(|&at| self.polish(&mut others[at]));
+        let second = distinct[1..COMPARED].iter().map(|&at| evidence(others, at)).fold(f64::NEG_INFINITY, f64::max);
+        log.best = log.best.max(evidence(others, distinct[0]));
+        log.threshold = log.threshold.min(outlying(rate, second));
+        self.holds(&mut others[distinct[0]], KEPT, log).then(|| others.swap_remove(distinct[0]))
+    }
+
+    /// Those of `findings`, most evidence first, that lie apart from all before them.
+    fn distinct(&self, findings: &[Finding]) -> Vec<usize> {
+        let mut kept: Vec<usize> = Vec::new();
+        for (at, finding) in findings.iter().enumerate() {
+            if kept.iter().all(|&better| self.apart(&findings[better].overlap, &finding.overlap)) {
+                kept.push(at);
+            }
+        }
+        kept
+    }
+}
+
+fn evidence(findings: &[Finding], at: usize) -> f64 {
+    findings[at].overlap.log_odds
+}
