@@ -24,6 +24,7 @@ NAMES = (
     "tracking",
     "scan",
     "shipped",
+    "localize",
     "disturbed",
     "endurance",
     "speed",

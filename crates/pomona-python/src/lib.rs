@@ -6,6 +6,7 @@ mod camera;
 mod cloud;
 mod descriptor;
 mod lifting;
+mod localization;
 mod matching;
 mod odometry;
 mod pose;
@@ -21,6 +22,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_class::<localization::PyLocalization>()?;
+    module.add_class::<localization::PyLocalizer>()?;
     module.add_class::<odometry::PyLooking>()?;
     module.add_class::<odometry::PyOdometry>()?;
     module.add_class::<render::PyRowScene>()?;

@@ -16,6 +16,7 @@ from pomona.cli import (
     growth,
     import_,
     info,
+    localize,
     map,
     match,
     scan,
@@ -62,6 +63,7 @@ app.command()(train.train)
 app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
+app.command()(localize.localize)
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)
