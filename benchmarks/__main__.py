@@ -27,6 +27,7 @@ NAMES = (
     "tracking",
     "scan",
     "shipped",
+    "localize",
     "disturbed",
     "endurance",
     "page",

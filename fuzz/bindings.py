@@ -1,4 +1,4 @@
-"""Functions of `pomona._core` called with arrays of anything; `matching` and `tracking` are targets of their own."""
+"""Functions of `pomona._core` with arrays of anything; `localization`, `matching` and `tracking` have their own targets."""
 
 from __future__ import annotations
 

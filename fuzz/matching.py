@@ -22,7 +22,7 @@ def target(content: bytes) -> None:
         _search(Drawn(content))
 
 
-def _cloud(draw: Drawn) -> dict[str, Any]:
+def cloud(draw: Drawn) -> dict[str, Any]:
     n = draw.count()
     views = draw.choice(None, None, draw.count())
     return {
@@ -36,13 +36,13 @@ def _cloud(draw: Drawn) -> dict[str, Any]:
 
 def _search(draw: Drawn) -> None:
     index = _core.MapIndex(
-        _cloud(draw),
+        cloud(draw),
         method=draw.choice("verified", "paper", "x"),
         scale=draw.choice("metric", "free"),
         config=draw.config(),
         threads=draw.choice(None, 1, 2),
     )
-    query, noise_m = _cloud(draw), draw.choice(None, None, draw.positive())
+    query, noise_m = cloud(draw), draw.choice(None, None, draw.positive())
     if draw.choice(False, False, True):
         found = index.pairs_under(query, map_from_query=draw.pose(), noise_m=noise_m)
     else:

@@ -9,6 +9,7 @@ from pomona.errors import PomonaError, PomonaWarning
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
     from pomona.growth.season_growth import SeasonGrowth, grow_season
+    from pomona.localize import Localization, Localizer
     from pomona.matching import Index, Match, Verdict, default_config, match
     from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
     from pomona.plot import draw_match, save_picture
@@ -27,6 +28,8 @@ _MODULE_OF = {
     "FruitCloud": "pomona.cloud",
     "Index": "pomona.matching",
     "Lifted": "pomona.survey.depth",
+    "Localization": "pomona.localize",
+    "Localizer": "pomona.localize",
     "Match": "pomona.matching",
     "Motions": "pomona.survey.refinement",
     "Observations": "pomona.orchard",
@@ -63,6 +66,8 @@ __all__ = [
     "FruitCloud",
     "Index",
     "Lifted",
+    "Localization",
+    "Localizer",
     "Match",
     "Motions",
     "Observations",

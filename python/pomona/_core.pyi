@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "MOST_MISALIGNED",
+    "Localization",
+    "Localizer",
     "Looking",
     "MapIndex",
     "Match",
@@ -96,6 +98,36 @@ class MapIndex:
     def pairs_under(
         self, query: _Arrays, *, map_from_query: list[list[float]], noise_m: float | None = None
     ) -> Match: ...
+
+@final
+class Localization:
+    @property
+    def status(self) -> str: ...
+    @property
+    def map_from_camera(self) -> NDArray[np.float64] | None: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
+    def pairs(self) -> NDArray[np.int64]: ...
+    @property
+    def probabilities(self) -> NDArray[np.float64]: ...
+    @property
+    def log_odds(self) -> float: ...
+    @property
+    def tracked(self) -> bool: ...
+
+@final
+class Localizer:
+    def __new__(cls, map: _Arrays, *, config: str, threads: int | None = None) -> Localizer: ...
+    def locate(self, seen: _Arrays, *, up: tuple[list[float], list[float]] | None = None) -> Localization: ...
+    def update(
+        self,
+        seen: _Arrays,
+        *,
+        previous_from_camera: NDArray[np.float64] | None = None,
+        up: tuple[list[float], list[float]] | None = None,
+    ) -> Localization: ...
+    def reset(self) -> None: ...
 
 class _Fruits(Protocol):
     @property

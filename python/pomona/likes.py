@@ -30,6 +30,7 @@ __all__ = [
     "PAIRS",
     "PARQUET_MARK",
     "PICTURE",
+    "POSES",
     "RENDERED",
     "REPORT",
     "REPORT_MARK",
@@ -56,6 +57,9 @@ VIDEO_MARK = "boxes drawn by pomona"
 
 BOXES_DRAWN = ".boxes.png"
 """How the names of pictures end in which boxes were drawn, by which they are told from photographs."""
+
+POSES_MARK = "# time tx ty tz qx qy qz qw: map_from_camera"
+"""First line of the poses that are found in a map, by which they are told from those of a recording."""
 
 PLY_MARK = "comment fruits written by pomona, metres"
 """Line in the header of the PLY files that are written here."""
@@ -183,6 +187,10 @@ def _has_columns(*names: str) -> Callable[[Path], bool]:
 
 def _is_ply(path: Path) -> bool:
     return _head(path).startswith(b"ply\n") and PLY_MARK.encode() in _head(path)
+
+
+def _has_poses(path: Path) -> bool:
+    return _head(path).startswith(POSES_MARK.encode())
 
 
 def _is_geojson(path: Path) -> bool:
@@ -319,6 +327,7 @@ MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
 PICTURE = Like("a plot", _is_picture)
+POSES = Like("poses in a map", _has_poses)
 VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)

@@ -140,7 +140,7 @@ class Index:
         overrides = core_settings(config)
         try:
             self._core = _core.MapIndex(
-                _arrays(self._map), method=method, scale=scale, config=overrides, threads=threads
+                core_arrays(self._map), method=method, scale=scale, config=overrides, threads=threads
             )
         except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"map: {error}") from None
@@ -159,7 +159,7 @@ class Index:
     ) -> Match:
         """Find `query` in the map; arguments as in `pomona.match`."""
         return self._ask(
-            query, lambda core, arrays: core.search(arrays, noise_m=noise_m, up=_vertical(up), per_frame=per_frame)
+            query, lambda core, arrays: core.search(arrays, noise_m=noise_m, up=core_vertical(up), per_frame=per_frame)
         )
 
     def pairs_under(self, query: Cloud, map_from_query: ArrayLike, *, noise_m: float | None = None) -> Match:
@@ -190,7 +190,7 @@ class Index:
         start = time.perf_counter()
         cloud = as_cloud(query, self._unit)
         try:
-            found = question(self._core, _arrays(cloud))
+            found = question(self._core, core_arrays(cloud))
         except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"query: {error}") from None
         return Match(
@@ -264,7 +264,7 @@ def default_config() -> dict[str, Any]:
     return defaults
 
 
-def _arrays(cloud: FruitCloud) -> _core._Arrays:
+def core_arrays(cloud: FruitCloud) -> _core._Arrays:
     """Return the arrays the core reads, contiguous."""
     views = cloud.views
     return {
@@ -276,7 +276,8 @@ def _arrays(cloud: FruitCloud) -> _core._Arrays:
     }
 
 
-def _vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
+def core_vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
+    """Return the vertical in the query and in the map as the core reads it; one direction holds for both."""
     if up is None:
         return None
     vectors = np.asarray(up, np.float64)

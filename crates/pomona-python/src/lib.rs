@@ -7,6 +7,7 @@ mod cloud;
 mod descriptor;
 mod identity;
 mod lifting;
+mod localization;
 mod matching;
 mod odometry;
 mod pose;
@@ -22,6 +23,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_class::<localization::PyLocalization>()?;
+    module.add_class::<localization::PyLocalizer>()?;
     module.add_class::<odometry::PyLooking>()?;
     module.add_class::<odometry::PyOdometry>()?;
     module.add_class::<render::PyRowScene>()?;

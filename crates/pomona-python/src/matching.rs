@@ -24,6 +24,16 @@ fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
+/// A verdict by its name.
+pub fn status(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Found => "Found",
+        Verdict::TooFew => "TooFew",
+        Verdict::Ambiguous => "Ambiguous",
+        Verdict::NoMatch => "NoMatch",
+    }
+}
+
 /// The answer to one query.
 #[pyclass(name = "Match", module = "pomona._core", frozen)]
 pub struct PyMatch(Match);
@@ -36,12 +46,7 @@ fn rows(matrix: &Matrix4<f64>) -> Vec<Vec<f64>> {
 impl PyMatch {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.0.verdict {
-            Verdict::Found => "Found",
-            Verdict::TooFew => "TooFew",
-            Verdict::Ambiguous => "Ambiguous",
-            Verdict::NoMatch => "NoMatch",
-        }
+        status(self.0.verdict)
     }
 
     #[getter]
@@ -168,7 +173,7 @@ impl PyMapIndex {
 }
 
 /// Threads of their own, at most as many as the machine has cores: more would only wait for each other.
-fn pool_of(threads: usize) -> PyResult<rayon::ThreadPool> {
+pub fn pool_of(threads: usize) -> PyResult<rayon::ThreadPool> {
     if threads == 0 {
         return Err(wrong("threads: found 0, expected at least 1"));
     }

@@ -4,6 +4,7 @@
 //! distance between nearest fruits over [`CLUSTER_SPACING_M`].
 
 use crate::error::{Error, Result};
+use crate::localization::LocalizationConfig;
 use crate::meanings::settings;
 use crate::odometry::{OdometryConfig, PicturesConfig};
 use crate::paper::constellation::MAX_NEIGHBOURS;
@@ -30,6 +31,8 @@ pub struct Config {
     pub tracking: TrackingConfig,
     /// Where the camera went, from the pictures.
     pub odometry: OdometryConfig,
+    /// Where the camera is in a map.
+    pub localization: LocalizationConfig,
 }
 }
 
@@ -107,6 +110,7 @@ impl Config {
             ("tracking.", TrackingConfig::MEANINGS),
             ("odometry.", OdometryConfig::MEANINGS),
             ("odometry.pictures.", PicturesConfig::MEANINGS),
+            ("localization.", LocalizationConfig::MEANINGS),
         ];
         tables
             .into_iter()
@@ -132,7 +136,8 @@ impl Config {
         within("paper.ransac.max_samples", paper.ransac.max_samples as f64, 1.0, f64::MAX)?;
         self.verified.validate()?;
         self.tracking.validate()?;
-        self.odometry.validate()
+        self.odometry.validate()?;
+        self.localization.validate()
     }
 }
 

@@ -45,6 +45,7 @@
 //! | sightings of one fruit | [`lifting::fusion`] | its place and diameter |
 //! | two [`FruitCloud`]s | [`match_clouds`] | a [`Match`]: [`Verdict`], [`Registration`], [`Pair`]s |
 //! | a map and many queries | [`MapIndex`] | the same, the map prepared once |
+//! | a map and the fruits of a frame | [`Localizer`] | a [`Localization`]: where the camera is |
 //!
 //! # What holds everywhere
 //!
@@ -73,6 +74,7 @@ pub mod error;
 pub mod geometry;
 pub mod identity;
 pub mod lifting;
+pub mod localization;
 pub mod look;
 pub mod matching;
 mod meanings;
@@ -92,6 +94,7 @@ pub use cloud::{FruitCloud, Views};
 pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
+pub use localization::{Localization, Localizer};
 pub use matching::{MapIndex, Method, Request, match_clouds};
 pub use pose::Pose;
 pub use verified::VerifiedConfig;

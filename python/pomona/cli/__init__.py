@@ -17,6 +17,7 @@ from pomona.cli import (
     growth,
     import_,
     info,
+    localize,
     map,
     match,
     report,
@@ -65,6 +66,7 @@ app.command()(train.train)
 app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
+app.command()(localize.localize)
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)

@@ -72,13 +72,14 @@ def call_flags(
         "method": method and method.value,
         "scale": scale and scale.value,
         "noise_m": noise_m,
-        "up": _parse_up(up) if up else None,
+        "up": parsed_up(up) if up else None,
         "per_frame": per_frame,
         "threads": threads,
     }
 
 
-def _parse_up(texts: list[str]) -> list[list[float]]:
+def parsed_up(texts: list[str]) -> list[list[float]]:
+    """Return the vertical in the query and in the map, from the texts of `--up`."""
     if len(texts) > 2:
         raise PomonaError(f"--up: found {len(texts)} directions, expected one for both clouds or query then map")
     directions = [direction(text) for text in texts]

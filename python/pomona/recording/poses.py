@@ -13,6 +13,9 @@ from pomona.trajectory import Trajectory
 
 __all__ = ["is_kitti", "read_kitti", "read_tum", "transforms", "write_tum"]
 
+TUM_COLUMNS = "# time tx ty tz qx qy qz qw"
+"""First line of the TUM files that are written here, before what their poses are."""
+
 UNIT_TOLERANCE = 1e-2
 """Quaternions are written with few digits; one that is 1 % off unit length is something else."""
 
@@ -56,14 +59,15 @@ def read_kitti(path: Path) -> NDArray[np.float64]:
     return matrices
 
 
-def write_tum(path: Path, trajectory: Trajectory) -> None:
-    """Write poses as `read_tum` reads them."""
+def write_tum(path: Path, trajectory: Trajectory, transform: str = "session_from_camera") -> None:
+    """Write poses as `read_tum` reads them; `transform` is what the first line calls them."""
     from scipy.spatial.transform import Rotation
 
     poses = trajectory.session_from_camera
-    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True)
-    lines = ["# time tx ty tz qx qy qz qw: session_from_camera"]
-    for time_s, pose, quaternion in zip(trajectory.times_s, poses, quaternions, strict=True):
+    # Of no rotations SciPy makes no quaternions.
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True) if len(poses) else np.empty((0, 4))
+    lines = [f"{TUM_COLUMNS}: {transform}"]
+    for time_s, pose, quaternion in zip(trajectory.times_s, poses, turns, strict=True):
         lines.append(f"{time_s:.6f} " + " ".join(f"{number:.9f}" for number in (*pose[:3, 3], *quaternion)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -75,6 +75,8 @@ class Seeing:
     depth : str
         ``auto``: depth pictures, else from left and right at the fruits. Or from left and right even where there are
         depth pictures: ``stereo``, ``dense`` or a file, as in `pomona.stereo.open_stereo`.
+    colour : bool
+        Whether to look at colours too, where there are some.
 
     Raises
     ------
@@ -82,10 +84,10 @@ class Seeing:
         When the recording has neither depth nor a stereo pair.
     """
 
-    def __init__(self, recording: Recording, detector: Detector, *, depth: str = "auto") -> None:
+    def __init__(self, recording: Recording, detector: Detector, *, depth: str = "auto", colour: bool = True) -> None:
         self._detector = detector
         self._depth = _depth_of(recording, depth)
-        self._colour = "left" in recording.description()["pictures"]
+        self._colour = colour and "left" in recording.description()["pictures"]
 
     @property
     def needs(self) -> tuple[Kind, ...]:

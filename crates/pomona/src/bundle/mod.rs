@@ -18,7 +18,7 @@ mod locate;
 mod normal;
 mod ordering;
 mod problem;
-mod steps;
+pub(crate) mod steps;
 
 use crate::error::{Error, Result};
 use envelope::Envelope;

@@ -8,13 +8,13 @@ use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
 /// The matrix of the cross product: `skew(a) * b` is a x b.
 #[inline]
-pub(super) fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }
 
 /// The pose after the step xi.
 #[inline]
-pub(super) fn moved(pose: &Pose, xi: &Vector6<f64>) -> Pose {
+pub(crate) fn moved(pose: &Pose, xi: &Vector6<f64>) -> Pose {
     let (rho, omega) = (xi.fixed_rows::<3>(0).into_owned(), xi.fixed_rows::<3>(3).into_owned());
     let mut rotation = pose.rotation * Rotation3::new(omega);
     // Rounding adds up over thousands of steps; one Newton step of the polar decomposition takes it out again.
@@ -25,7 +25,7 @@ pub(super) fn moved(pose: &Pose, xi: &Vector6<f64>) -> Pose {
 
 /// Residual (t, log R) of a measured relative pose, `error` = measured^-1 predicted.
 #[inline]
-pub(super) fn logarithm(error: &Pose) -> Vector6<f64> {
+pub(crate) fn logarithm(error: &Pose) -> Vector6<f64> {
     let (t, r) = (error.translation, error.rotation.scaled_axis());
     Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
 }
@@ -33,7 +33,7 @@ pub(super) fn logarithm(error: &Pose) -> Vector6<f64> {
 /// How a step of the first camera shows as a step of the second one, seen from the first: for the predicted pose P of
 /// the second camera in the first, exp(-xi) P = P exp(-A xi).
 #[inline]
-pub(super) fn carried(second_in_first: &Pose) -> Matrix6<f64> {
+pub(crate) fn carried(second_in_first: &Pose) -> Matrix6<f64> {
     let turned = second_in_first.rotation.matrix().transpose();
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);

@@ -1,0 +1,114 @@
+//! Where the camera is in a map.
+
+use crate::bundle::{array, wrong};
+use crate::cloud::Arrays;
+use crate::matching::{pool_of, status};
+use crate::pose::{pose, pose_array};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use pomona::nalgebra::Vector3;
+use pomona::{Config, Localization, Localizer, Pose};
+use pyo3::prelude::*;
+
+/// Where the camera is, or why nobody can say.
+#[pyclass(name = "Localization", module = "pomona._core", frozen)]
+pub struct PyLocalization(Localization);
+
+#[pymethods]
+impl PyLocalization {
+    #[getter]
+    fn status(&self) -> &'static str {
+        status(self.0.verdict)
+    }
+
+    #[getter]
+    fn map_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.0.pose.as_ref().map(|pose| pose_array(py, pose)).transpose()
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array(py, self.0.covariance.as_slice().to_vec(), [6, 6])
+    }
+
+    #[getter]
+    fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let flat = self.0.pairs.iter().flat_map(|pair| [pair.seen as i64, pair.map as i64]).collect();
+        array(py, flat, [self.0.pairs.len(), 2])
+    }
+
+    #[getter]
+    fn probabilities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.probability))
+    }
+
+    #[getter]
+    fn log_odds(&self) -> f64 {
+        self.0.log_odds
+    }
+
+    #[getter]
+    fn tracked(&self) -> bool {
+        self.0.tracked
+    }
+}
+
+type Up = Option<([f64; 3], [f64; 3])>;
+
+fn vertical(up: Up) -> Option<[Vector3<f64>; 2]> {
+    up.map(|(seen, map)| [Vector3::from(seen), Vector3::from(map)])
+}
+
+/// A map in which a camera finds itself.
+#[pyclass(name = "Localizer", module = "pomona._core")]
+pub struct PyLocalizer {
+    localizer: Localizer,
+    pool: Option<rayon::ThreadPool>,
+}
+
+#[pymethods]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+impl PyLocalizer {
+    #[new]
+    #[pyo3(signature = (map, *, config, threads=None))]
+    fn new(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
+        let pool = threads.map(pool_of).transpose()?;
+        let cloud = map.to_cloud()?;
+        let localizer = py.detach(|| Localizer::new(&cloud, config)).map_err(wrong)?;
+        Ok(Self { localizer, pool })
+    }
+
+    #[pyo3(signature = (seen, *, up=None))]
+    fn locate(&self, py: Python<'_>, seen: Arrays<'_>, up: Up) -> PyResult<PyLocalization> {
+        let (cloud, up) = (seen.to_cloud()?, vertical(up));
+        let locate = || self.localizer.locate(&cloud, up);
+        let found = py.detach(|| match &self.pool {
+            Some(pool) => pool.install(locate),
+            None => locate(),
+        });
+        found.map(PyLocalization).map_err(wrong)
+    }
+
+    #[pyo3(signature = (seen, *, previous_from_camera=None, up=None))]
+    fn update(
+        &mut self,
+        py: Python<'_>,
+        seen: Arrays<'_>,
+        previous_from_camera: Option<PyReadonlyArray2<'_, f64>>,
+        up: Up,
+    ) -> PyResult<PyLocalization> {
+        let moved = previous_from_camera.map(|moved| pose("moved", &moved, Pose::from_matrix)).transpose()?;
+        let (cloud, up) = (seen.to_cloud()?, vertical(up));
+        let Self { localizer, pool } = self;
+        let mut update = || localizer.update(&cloud, moved.as_ref(), up);
+        let found = py.detach(|| match pool {
+            Some(pool) => pool.install(update),
+            None => update(),
+        });
+        found.map(PyLocalization).map_err(wrong)
+    }
+
+    fn reset(&mut self) {
+        self.localizer.reset();
+    }
+}

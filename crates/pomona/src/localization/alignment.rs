@@ -1,0 +1,206 @@
+//! The pose that lays sightings on the map's fruits, nobody said to be who.
+//!
+//! A sighting p shows the fruit m of the map with a density N(m - T p; S), S the covariances of both and of the pose as it
+//! is known so far, or a stranger, of which there are rho in a cubic metre. With a share s of sightings in the map, the
+//! weights of expectation and maximisation are
+//!
+//! w = s N / ((1 - s) rho + s sum N), and the evidence is the sum of ln(1 - s + s sum N / rho).
+//!
+//! Each turn takes a step of Gauss and Newton under these weights. The pose's own covariance widens S at first and
+//! shrinks from turn to turn, so that the first turns see past the nearest fruit.
+
+use super::known::KnownFruits;
+use super::sightings::Sighting;
+use crate::bundle::steps::{moved, skew};
+use crate::pose::Pose;
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
+
+/// Turns at the most; a good start settles in five.
+const TURNS: usize = 20;
+
+/// By how much the doubt of the pose shrinks in a turn: a quarter of its variance is left.
+const SHRINKING: f64 = 0.25;
+
+/// Turns before which nothing is settled: the doubt is still wider than a fruit.
+const WIDE_TURNS: usize = 4;
+
+/// A step below this, metres and radians, changes nothing.
+const SETTLED: f64 = 1e-5;
+
+/// Shares of the sightings that are in the map, of which the evidence takes the best.
+const SHARES: [f64; 4] = [0.25, 0.5, 0.7, 0.9];
+
+/// The share that the weights begin with.
+const FIRST_SHARE: f64 = 0.5;
+
+/// Information of what nothing measures: a step of 100 m or rad.
+const LEAST_INFORMATION: f64 = 1e-4;
+
+/// A sighting and a fruit that it may show.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Link {
+    pub sighting: usize,
+    pub map: usize,
+    pub probability: f64,
+}
+
+/// What one sighting says under a pose.
+pub(super) struct Say {
+    /// Where it lies in the map.
+    pub place: Vector3<f64>,
+    /// Sum of its weights.
+    pub weight: f64,
+    /// Weighted mean of where its fruits are from there.
+    pub residual: Vector3<f64>,
+    /// Sum of weighted inverse covariances.
+    pub information: Matrix3<f64>,
+    /// Slopes of its place by the step of the pose.
+    pub by_pose: Matrix3x6<f64>,
+    /// The fruit with the largest weight.
+    pub best: Option<usize>,
+    /// Its pull: the sum of weighted inverse covariances times residuals.
+    pull: Vector3<f64>,
+    /// Sum of the weighted squared Mahalanobis distances.
+    squared: f64,
+    /// The sum of N over rho.
+    ratio: f64,
+}
+
+/// A pose, and what the sightings say of it.
+pub(super) struct Aligned {
+    pub pose: Pose,
+    /// Inverse covariance of its step if all sightings erred independently.
+    pub information: Matrix6<f64>,
+    pub says: Vec<Say>,
+    pub links: Vec<Link>,
+    /// Evidence against chance, nats.
+    pub log_odds: f64,
+    /// Mean squared Mahalanobis distance of a link, over 3.
+    pub spread: f64,
+}
+
+/// Settles a pose that starts at `start`, whose step has the covariance `doubt`.
+pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, start: &Pose, doubt: &Matrix6<f64>) -> Aligned {
+    let (mut pose, mut doubt, mut share) = (*start, *doubt, FIRST_SHARE);
+    for turn in 0..TURNS {
+        let says: Vec<Say> = sightings.iter().map(|seen| say(seen, map, &pose, &doubt, share, None)).collect();
+        let (information, pull) = normal(&says);
+        let step = solved(&information, &pull);
+        pose = moved(&pose, &step);
+        share = best_share(&says).0;
+        doubt *= SHRINKING;
+        if turn >= WIDE_TURNS && step.norm() < SETTLED {
+            break;
+        }
+    }
+    ended(sightings, map, pose, share)
+}
+
+/// What the sightings say of a pose once it stays.
+fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, share: f64) -> Aligned {
+    let mut links = Vec::new();
+    let sure = Matrix6::zeros();
+    let says: Vec<Say> = sightings
+        .iter()
+        .enumerate()
+        .map(|(row, seen)| say(seen, map, &pose, &sure, share, Some((row, &mut links))))
+        .collect();
+    let (information, _) = normal(&says);
+    let (squared, weight) = says.iter().fold((0.0, 0.0), |sum, say| (sum.0 + say.squared, sum.1 + say.weight));
+    let log_odds = best_share(&says).1;
+    Aligned { pose, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
+}
+
+fn say(
+    seen: &Sighting,
+    map: &KnownFruits,
+    pose: &Pose,
+    doubt: &Matrix6<f64>,
+    share: f64,
+    links: Option<(usize, &mut Vec<Link>)>,
+) -> Say {
+    let place = pose.to_session(&seen.place);
+    let rotation = *pose.rotation.matrix();
+    let mut by_pose = Matrix3x6::zeros();
+    by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&seen.place)));
+    let own = pose.covariance_to_session(&seen.covariance) + by_pose * doubt * by_pose.transpose();
+    let near: Vec<Candidate> = map.near(&place).filter_map(|row| candidate(map, row, &place, &own)).collect();
+    let density = KnownFruits::density(near.len());
+    let total: f64 = near.iter().map(|one| one.height).sum();
+    let whole = (1.0 - share) * density + share * total;
+    let mut says = Say {
+        place,
+        weight: 0.0,
+        residual: Vector3::zeros(),
+        information: Matrix3::zeros(),
+        by_pose,
+        best: None,
+        pull: Vector3::zeros(),
+        squared: 0.0,
+        ratio: total / density,
+    };
+    let mut most = 0.0;
+    for one in &near {
+        let weight = share * one.height / whole;
+        says.weight += weight;
+        says.residual += one.error * weight;
+        says.information += one.inverse * weight;
+        says.pull += one.inverse * one.error * weight;
+        says.squared += weight * one.squared;
+        if one.height > most {
+            (most, says.best) = (one.height, Some(one.row));
+        }
+    }
+    if says.weight > 0.0 {
+        says.residual /= says.weight;
+    }
+    if let Some((sighting, links)) = links {
+        let link = |one: &Candidate| Link { sighting, map: one.row, probability: share * one.height / whole };
+        links.extend(near.iter().map(link));
+    }
+    says
+}
+
+/// A fruit of the map that a sighting may show, and how well it explains it.
+struct Candidate {
+    row: usize,
+    /// From where the sighting lies to the fruit.
+    error: Vector3<f64>,
+    inverse: Matrix3<f64>,
+    /// Density N of the error.
+    height: f64,
+    /// Squared Mahalanobis distance.
+    squared: f64,
+}
+
+fn candidate(map: &KnownFruits, row: usize, place: &Vector3<f64>, own: &Matrix3<f64>) -> Option<Candidate> {
+    let covariance = own + map.covariances[row];
+    let inverse = covariance.try_inverse()?;
+    let error = map.places[row] - place;
+    let squared = error.dot(&(inverse * error));
+    let peak = (2.0 * std::f64::consts::PI).powi(3) * covariance.determinant();
+    Some(Candidate { row, error, inverse, height: (-0.5 * squared).exp() / peak.sqrt(), squared })
+}
+
+fn normal(says: &[Say]) -> (Matrix6<f64>, Vector6<f64>) {
+    let mut matrix = Matrix6::identity() * LEAST_INFORMATION;
+    let mut right = Vector6::zeros();
+    for say in says {
+        let turned = say.by_pose.transpose();
+        matrix += turned * say.information * say.by_pose;
+        right += turned * say.pull;
+    }
+    (matrix, right)
+}
+
+fn solved(matrix: &Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
+    matrix.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(right))
+}
+
+/// The share of sightings in the map that explains them best, and the evidence under it, nats.
+fn best_share(says: &[Say]) -> (f64, f64) {
+    let evidence = |share: f64| says.iter().map(|say| (1.0 - share + share * say.ratio).ln()).sum::<f64>();
+    let all = SHARES.map(|share| (share, evidence(share)));
+    all.into_iter().fold((FIRST_SHARE, f64::NEG_INFINITY), |best, one| if one.1 > best.1 { one } else { best })
+}

@@ -1,0 +1,53 @@
+//! What localisation gives.
+
+use crate::answer::Verdict;
+use crate::pose::Pose;
+use nalgebra::Matrix6;
+
+/// A sighting and the map's fruit that it most probably shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapPair {
+    /// Row in the frame.
+    pub seen: usize,
+    /// Row in the map.
+    pub map: usize,
+    /// Probability that the two are one fruit.
+    pub probability: f64,
+}
+
+/// Where the camera is, or why nobody can say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Localization {
+    /// `Found`: there is a pose. `TooFew`: too few fruits to say. `Ambiguous`: several poses are as good. `NoMatch`: the
+    /// fruits are not those of the map.
+    pub verdict: Verdict,
+    /// `map_from_camera`; `None` unless found.
+    pub pose: Option<Pose>,
+    /// Covariance of the pose's step (x, y, z, then turns about x, y, z), metres and radians, in the camera's own frame;
+    /// zeros unless found.
+    pub covariance: Matrix6<f64>,
+    /// Fruits of this frame found again, sorted by row, one to one.
+    pub pairs: Vec<MapPair>,
+    /// Evidence of the fruits for the pose against chance, nats; NaN where no pose was looked at.
+    pub log_odds: f64,
+    /// Whether the pose follows from the one before; else it was found from nothing.
+    pub tracked: bool,
+}
+
+impl Localization {
+    pub(super) fn without_pose(verdict: Verdict) -> Self {
+        Self {
+            verdict,
+            pose: None,
+            covariance: Matrix6::zeros(),
+            pairs: Vec::new(),
+            log_odds: f64::NAN,
+            tracked: false,
+        }
+    }
+
+    /// The same without its pose, unless it is found.
+    pub(super) fn checked(self) -> Self {
+        if self.verdict == Verdict::Found { self } else { Self::without_pose(self.verdict) }
+    }
+}

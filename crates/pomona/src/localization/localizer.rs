@@ -1,0 +1,209 @@
+//! The story of one frame after the other.
+
+use super::alignment::{Aligned, Link, align};
+use super::answer::{Localization, MapPair};
+use super::belief::{Belief, Motion};
+use super::config::LocalizationConfig;
+use super::known::KnownFruits;
+use super::shared::covariance;
+use super::sightings::{Sighting, cloud_of};
+use super::window::Window;
+use crate::answer::Verdict;
+use crate::assignment::assign;
+use crate::cloud::FruitCloud;
+use crate::config::Config;
+use crate::error::Result;
+use crate::geometry::Scale;
+use crate::matching::{MapIndex, Method};
+use crate::pose::Pose;
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+/// Sightings in the map below which a pose has no redundancy: three fix it.
+const MIN_PAIRED: f64 = 4.0;
+
+/// Standard deviations of a pose that the matcher found: metres, radians.
+const MATCHED: (f64, f64) = (0.02, 0.02);
+
+/// A pose that is known no better than this is none, metres: false are those beyond 0.3.
+const LOST_M: f64 = 0.1;
+
+/// Least probability of a reported pair; a wrong pair costs a third of what a right one is worth.
+const MIN_PROBABILITY: f64 = 0.25;
+
+/// Evidence that six fitted numbers gain by chance, nats: half of the 99.9 % quantile of chi^2 with 6 degrees.
+const FITTED_NATS: f64 = 11.2;
+
+/// A map in which a camera finds itself, and where it was last.
+#[derive(Debug)]
+pub struct Localizer {
+    index: MapIndex,
+    map: KnownFruits,
+    config: LocalizationConfig,
+    belief: Option<Belief>,
+    window: Window,
+}
+
+impl Localizer {
+    /// Prepares `map`.
+    ///
+    /// # Errors
+    /// A cloud or a setting that is wrong.
+    pub fn new(map: &FruitCloud, config: Config) -> Result<Self> {
+        let index = MapIndex::new(map, Method::Verified, Scale::Metric, config)?;
+        let config = config.localization;
+        Ok(Self { index, map: KnownFruits::new(map, config.own_m), config, belief: None, window: Window::default() })
+    }
+
+    /// Where the camera is, from one frame and nothing else; what [`Self::update`] knows stays as it is.
+    ///
+    /// `seen` are fruits in the camera's frame; `up` is the vertical in the camera's and in the map's frame.
+    ///
+    /// # Errors
+    /// A cloud or a direction that is wrong. That the camera is not found is no error.
+    pub fn locate(&self, seen: &FruitCloud, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        seen.validate()?;
+        self.search(&Sighting::of(seen), seen, up)
+    }
+
+    /// Where the camera is now, `previous_from_camera` being how it moved since the last call where that is known.
+    ///
+    /// # Errors
+    /// As [`Self::locate`].
+    pub fn update(
+        &mut self,
+        seen: &FruitCloud,
+        previous_from_camera: Option<&Pose>,
+        up: Option<[Vector3<f64>; 2]>,
+    ) -> Result<Localization> {
+        seen.validate()?;
+        let predicted = self.predicted(previous_from_camera);
+        match previous_from_camera.copied().or_else(|| self.belief.and_then(|belief| belief.motion)) {
+            Some(step) => self.window.step(&step),
+            None => self.window.forget(),
+        }
+        self.window.push(Sighting::of(seen), self.config.window_frames);
+        let found = predicted.and_then(|predicted| self.followed(&predicted));
+        let found = match found {
+            Some(found) => found,
+            None => self.found_again(predicted.as_ref(), up)?,
+        };
+        if let (None, Some(predicted), Some(pose)) = (previous_from_camera, predicted, found.pose) {
+            self.window.correct(&pose.seen_from(&predicted.pose));
+        }
+        self.learn(&found, previous_from_camera);
+        Ok(found)
+    }
+
+    /// Forgets where the camera was: the next update starts from nothing.
+    pub fn reset(&mut self) {
+        self.belief = None;
+        self.window.forget();
+    }
+
+    fn predicted(&self, previous_from_camera: Option<&Pose>) -> Option<Belief> {
+        let belief = self.belief.as_ref()?;
+        let repeated = || Motion::repeated(belief.motion);
+        Some(belief.after(&previous_from_camera.map_or_else(repeated, |step| Motion::measured(*step))))
+    }
+
+    /// The pose near the predicted one, if the fruits agree with it.
+    fn followed(&self, predicted: &Belief) -> Option<Localization> {
+        let sightings = self.window.sightings(self.config.enough_fruits);
+        let aligned = align(&sightings, &self.map, &predicted.pose, &predicted.covariance);
+        let found = self.believed(&aligned)?;
+        // What few fruits leave open, the motion tells.
+        let both = Belief { pose: aligned.pose, covariance: found, motion: predicted.motion }.joined(predicted);
+        Some(self.answer(&aligned, &sightings, &both, true))
+    }
+
+    /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
+    fn found_again(&self, predicted: Option<&Belief>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        let fruits = self.window.fruits();
+        let found = self.search(&fruits, &cloud_of(&fruits), up)?;
+        let poor = self.window.newest() < self.config.enough_fruits && found.verdict != Verdict::Found;
+        let carried = predicted.filter(|belief| poor && belief.sigma_m() < LOST_M);
+        Ok(carried.map_or(found, |belief| Localization {
+            verdict: Verdict::Found,
+            pose: Some(belief.pose),
+            covariance: belief.covariance,
+            tracked: true,
+            ..Localization::without_pose(Verdict::TooFew)
+        }))
+    }
+
+    fn search(&self, sightings: &[Sighting], seen: &FruitCloud, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        let found = self.index.search(seen, None, up)?;
+        let Some(registration) = found.registration.filter(|_| found.verdict == Verdict::Found) else {
+            return Ok(Localization::without_pose(found.verdict));
+        };
+        let start = Pose {
+            rotation: registration.map_from_query.rotation,
+            translation: registration.map_from_query.translation,
+        };
+        let (place, turn) = MATCHED;
+        let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
+        let aligned = align(sightings, &self.map, &start, &doubt);
+        let Some(covariance) = self.believed(&aligned) else {
+            return Ok(Localization::without_pose(Verdict::NoMatch));
+        };
+        let belief = Belief { pose: aligned.pose, covariance, motion: None };
+        Ok(self.answer(&aligned, sightings, &belief, false))
+    }
+
+    /// Covariance of a pose, if there is enough for it.
+    fn believed(&self, aligned: &Aligned) -> Option<Matrix6<f64>> {
+        let paired: f64 = aligned.says.iter().map(|say| say.weight).sum();
+        let needed = FITTED_NATS - self.config.false_alarm_rate.ln();
+        let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
+        enough.then(|| covariance(aligned, &self.map, self.config.shared_m, self.config.reach_m)).flatten()
+    }
+
+    fn answer(&self, aligned: &Aligned, sightings: &[Sighting], belief: &Belief, tracked: bool) -> Localization {
+        Localization {
+            verdict: if belief.sigma_m() < LOST_M { Verdict::Found } else { Verdict::TooFew },
+            pose: Some(belief.pose),
+            covariance: belief.covariance,
+            pairs: pairs(&aligned.links, sightings),
+            log_odds: aligned.log_odds,
+            tracked,
+        }
+        .checked()
+    }
+
+    fn learn(&mut self, found: &Localization, previous_from_camera: Option<&Pose>) {
+        let Some(pose) = found.pose else {
+            self.belief = None;
+            return;
+        };
+        let before = self.belief.map(|belief| belief.pose);
+        let motion = previous_from_camera.copied().or_else(|| before.map(|before| pose.seen_from(&before)));
+        self.belief = Some(Belief { pose, covariance: found.covariance, motion });
+    }
+}
+
+/// One to one, of the newest frame.
+fn pairs(links: &[Link], sightings: &[Sighting]) -> Vec<MapPair> {
+    let own: Vec<&Link> = links
+        .iter()
+        .filter(|link| sightings[link.sighting].row.is_some() && link.probability >= MIN_PROBABILITY)
+        .collect();
+    let rows = sightings.iter().filter_map(|one| one.row).max().map_or(0, |row| row + 1);
+    let mut columns: Vec<usize> = own.iter().map(|link| link.map).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    let edges: Vec<_> = own
+        .iter()
+        .filter_map(|link| {
+            let column = columns.binary_search(&link.map).ok()?;
+            Some((sightings[link.sighting].row?, column, link.probability))
+        })
+        .collect();
+    let gain =
+        |row: usize, column: usize| edges.iter().find(|edge| (edge.0, edge.1) == (row, column)).map(|edge| edge.2);
+    let chosen = assign(rows, columns.len(), &edges);
+    let pair = |(seen, column): (usize, Option<usize>)| {
+        let column = column?;
+        Some(MapPair { seen, map: columns[column], probability: gain(seen, column)? })
+    };
+    chosen.into_iter().enumerate().filter_map(pair).collect()
+}

@@ -1,0 +1,79 @@
+//! The last frames, seen from where the camera is now.
+
+use super::sightings::Sighting;
+use crate::pose::Pose;
+use std::collections::VecDeque;
+
+/// How surely the way between two frames is known, metres: it adds up over the frames.
+const WAY_SIGMA_M: f64 = 0.004;
+
+/// Sightings from which on more say little more to the search: a frame of 40 fruits is found as a rule, and half are hidden.
+const ENOUGH_TO_SEARCH: usize = 60;
+
+/// Distance within which two sightings are thought to be of one fruit, metres: about a fruit.
+const ONE_FRUIT_M: f64 = 0.05;
+
+#[derive(Debug, Default)]
+pub(super) struct Window {
+    /// Newest first, each from its own camera, with `now_from_then`.
+    frames: VecDeque<(Pose, Vec<Sighting>)>,
+}
+
+impl Window {
+    /// The camera has moved: what was seen lies elsewhere from it.
+    pub fn step(&mut self, previous_from_camera: &Pose) {
+        let now_from_previous = previous_from_camera.inverse();
+        for (now_from_then, _) in &mut self.frames {
+            *now_from_then = now_from_previous.after(now_from_then);
+        }
+    }
+
+    /// The camera is not where it was thought to be: what was seen before lies elsewhere from it.
+    pub fn correct(&mut self, thought_from_camera: &Pose) {
+        let camera_from_thought = thought_from_camera.inverse();
+        for (now_from_then, _) in self.frames.iter_mut().skip(1) {
+            *now_from_then = camera_from_thought.after(now_from_then);
+        }
+    }
+
+    /// Takes a frame up, and forgets the oldest beyond `most`.
+    pub fn push(&mut self, sightings: Vec<Sighting>, most: usize) {
+        self.frames.push_front((Pose::IDENTITY, sightings));
+        self.frames.truncate(most);
+    }
+
+    pub fn forget(&mut self) {
+        self.frames.clear();
+    }
+
+    /// Sightings of the newest frame.
+    pub fn newest(&self) -> usize {
+        self.frames.front().map_or(0, |(_, seen)| seen.len())
+    }
+
+    /// Sightings of the newest frame, and of those before until there are enough.
+    pub fn sightings(&self, enough: usize) -> Vec<Sighting> {
+        let mut all = Vec::new();
+        for (age, (now_from_then, seen)) in self.frames.iter().enumerate() {
+            if age == 0 {
+                all.extend_from_slice(seen);
+            } else if all.len() < enough {
+                let spread_m = WAY_SIGMA_M * age as f64;
+                all.extend(seen.iter().map(|one| one.carried(now_from_then, spread_m)));
+            }
+        }
+        all
+    }
+
+    /// Each fruit once, as far as places tell, in sightings enough to be found from nothing: a cloud to be matched.
+    pub fn fruits(&self) -> Vec<Sighting> {
+        let mut fruits: Vec<Sighting> = Vec::new();
+        for one in self.sightings(ENOUGH_TO_SEARCH) {
+            let known = |other: &Sighting| (other.place - one.place).norm() < ONE_FRUIT_M;
+            if one.row.is_some() || !fruits.iter().any(known) {
+                fruits.push(one);
+            }
+        }
+        fruits
+    }
+}

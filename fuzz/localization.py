@@ -1,0 +1,31 @@
+"""A map in which cameras find themselves, for clouds and motions of anything."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from fuzz.drawn import REFUSALS, Drawn, look_at
+from fuzz.matching import cloud
+from pomona import _core
+
+
+def seeds() -> list[bytes]:
+    """Bytes to draw from."""
+    return [bytes([draw]) for draw in range(32)]
+
+
+def target(content: bytes) -> None:
+    """Make a map and drive through it."""
+    with contextlib.suppress(*REFUSALS), np.errstate(all="ignore"):
+        _drive(Drawn(content))
+
+
+def _drive(draw: Drawn) -> None:
+    localizer = _core.Localizer(cloud(draw), config=draw.config(), threads=draw.choice(None, 1, 2))
+    up = draw.choice(None, ([0.0, 0.0, 1.0], draw.numbers(3).tolist()))
+    look_at(localizer.locate(cloud(draw), up=up))
+    for _ in range(draw.choice(1, 4, 12)):
+        look_at(localizer.update(cloud(draw), previous_from_camera=draw.choice(None, np.array(draw.pose())), up=up))
+    localizer.reset()

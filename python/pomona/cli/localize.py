@@ -1,0 +1,83 @@
+"""`pomona localize ORCHARD RECORDING -o poses.tum`: where the camera is in the map, frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
+from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Writes
+from pomona.likes import POSES
+
+
+def localize(
+    orchard: Path = typer.Argument(metavar="ORCHARD", help="Fruits of the map: an orchard map, a session, or a cloud."),
+    recording: Path = typer.Argument(
+        metavar="RECORDING", help="Stereo or depth recording, whatever `pomona info` reads."
+    ),
+    output: Annotated[Path, Writes(POSES)] = typer.Option(
+        ..., "-o", "--output", help="Poses to write, map_from_camera as TUM text; - is the standard output."
+    ),
+    single: bool = typer.Option(False, "--single", help="Find each frame from nothing, not from the one before."),
+    detections: Path | None = typer.Option(
+        None, metavar="FILE", help="Boxes, as for `pomona scan`; else detections.csv or ids/ there, else --model."
+    ),
+    model: Path | None = typer.Option(None, metavar="ONNX", help="Detector instead of boxes: a file, or shipped."),
+    min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least confidence of the model's boxes."),
+    up: list[str] | None = up_option,
+    calibration: Path | None = typer.Option(
+        None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
+    ),
+    topics: str | None = typer.Option(
+        None, metavar="ROLE=TOPIC,...", help="Topics of a bag: left, right, depth, left_info, right_info, poses."
+    ),
+    depth: str = typer.Option(
+        "auto", metavar="auto|stereo|dense|ONNX", help="Depth pictures, else stereo at the fruits; or stereo all over."
+    ),
+    odometry: bool = typer.Option(
+        False, "--odometry", help="Motion from the pictures, even where poses were recorded."
+    ),
+    config: Path | None = config_option,
+    every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
+    first: int | None = typer.Option(None, "--from", metavar="FRAME", help="First frame to take, by its number."),
+    last: int | None = typer.Option(None, "--to", metavar="FRAME", help="Last frame to take."),
+    threads: int | None = threads_option,
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Find where the camera of RECORDING is in ORCHARD, frame by frame.
+
+    Exit code 0: some frame was found. 1: none was, a result too. 2: wrong input.
+    """
+    from pomona.cli import localize_output
+    from pomona.detect.opening import open_detector
+    from pomona.localize import Localizer
+    from pomona.localize.files import write_way
+    from pomona.localize.story import localize as localized
+    from pomona.outputs import refuse_inputs
+    from pomona.recording import open_recording, selected
+    from pomona.recording.bags.topics import parsed_topics
+    from pomona.settings import Settings
+
+    overrides = Settings.load(config, {}).overrides
+    vertical = parsed_up(up) if up else None
+    chosen = None if topics is None else parsed_topics(topics)
+    whole = open_recording(recording, calibration=calibration, topics=chosen, own_poses=not odometry)
+    detector = open_detector(detections, model, whole, min_score=min_score)
+    refuse_inputs([output], [*whole.inputs(), *detector.inputs])
+    taken = selected(whole, every=every, first=first, last=last)
+    localizer = Localizer(orchard, config=overrides, threads=threads)
+    with localize_output.localizing(taken) as progress:
+        way = localized(
+            taken, detector, localizer, single=single, depth=depth, odometry=odometry, up=vertical, progress=progress
+        )
+    write_way(output, way)
+    found = localize_output.summary(output, taken, localizer, way)
+    if json:
+        say_json({**found, "frames": localize_output.as_rows(way)})
+    else:
+        say(*localize_output.as_lines(found))
+    if not way.found:
+        raise typer.Exit(1)

@@ -1,0 +1,186 @@
+"""Where the camera is in a map, frame by frame: the face of the core's `localization`, which does the work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pomona import _core
+from pomona.cards import as_card
+from pomona.cloud import Cloud, as_cloud
+from pomona.core_settings import core_settings
+from pomona.errors import PomonaError
+from pomona.localize.map_fruits import hanging_rows
+from pomona.matching import Up, Verdict, core_arrays, core_vertical
+from pomona.threads import capped_threads
+
+__all__ = ["Localization", "Localizer"]
+
+RIGID = 1e-3
+"""By how much a rotation that was written with few digits may stretch."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Localization:
+    """Where the camera is, or why nobody can say; true where it was found.
+
+    Attributes
+    ----------
+    status : Verdict
+        ``Found``; ``TooFew`` fruits to say; ``Ambiguous``, several poses are as good; ``NoMatch``, the fruits are not
+        the map's.
+    map_from_camera : (4, 4) float64 or None
+        Takes points of the camera (x right, y down, z forward) into the map; None unless found.
+    covariance : (6, 6) float64
+        Of a step of the pose in the camera's own frame: x, y, z in metres, then turns about x, y, z in radians, so that
+        the true pose is ``map_from_camera @ exp(step)``. Zeros unless found.
+    pairs : (M, 2) int64
+        Row in the frame and row in the map of each fruit that was found again, one to one.
+    probabilities : (M,) float64
+        Probability that the two are one fruit.
+    log_odds : float
+        Evidence of the fruits for the pose against chance, nats; NaN where no fruit speaks for it.
+    tracked : bool
+        Whether the pose follows from the one before; else it was found from nothing.
+    """
+
+    status: Verdict
+    map_from_camera: NDArray[np.float64] | None
+    covariance: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    probabilities: NDArray[np.float64]
+    log_odds: float
+    tracked: bool
+
+    def __bool__(self) -> bool:
+        return self.status is Verdict.FOUND
+
+    def __repr__(self) -> str:
+        if not self:
+            return f"Localization({self.status})"
+        place = ", ".join(f"{value:.3f}" for value in self.position_m)
+        return f"Localization({self.status} at {place} m, {len(self.pairs)} fruits, +- {1000 * self.sigma_m:.0f} mm)"
+
+    @property
+    def position_m(self) -> NDArray[np.float64]:
+        """Place of the camera in the map, (3,); NaN unless found."""
+        pose = self.map_from_camera
+        return np.full(3, np.nan) if pose is None else np.asarray(pose[:3, 3])
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the place, metres, all three axes together."""
+        return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+
+class Localizer:
+    """A map in which a camera finds itself, and where it was last.
+
+    Parameters
+    ----------
+    map : FruitCloud, OrchardMap, Session, array_like, str or Path
+        The fruits, metres; of an orchard map each where it was last seen, without those that are gone.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`; `localization` and `verified` are used.
+    threads : int, optional
+        Threads of the search from nothing, at most one a core. The answer does not depend on it.
+
+    Raises
+    ------
+    PomonaError
+        The map or a setting is wrong.
+    """
+
+    def __init__(self, map: Cloud, *, config: Mapping[str, Any] | None = None, threads: int | None = None) -> None:
+        cloud = as_cloud(map)
+        self._rows = hanging_rows(cloud)
+        settings, threads = core_settings(config), capped_threads(threads)
+        try:
+            self._core = _core.Localizer(core_arrays(cloud.select(self._rows)), config=settings, threads=threads)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise PomonaError(f"map: {error}") from None
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __repr__(self) -> str:
+        return f"Localizer({len(self)} fruits)"
+
+    def _repr_html_(self) -> str:
+        return as_card("Localizer", {"fruits": len(self)})
+
+    def locate(self, cloud: Cloud, *, up: Up | None = None) -> Localization:
+        """Find the camera from one frame and nothing else; what `update` knows stays as it is.
+
+        Parameters
+        ----------
+        cloud : FruitCloud, array_like, str or Path
+            Fruits in the camera's frame, metres; with covariances where they are known, as `pomona.lift` gives them.
+        up : optional
+            The vertical in the camera's and in the map's frame, where it is known to some 5 degrees.
+
+        Raises
+        ------
+        PomonaError
+            An array is wrong. That the camera is not found is no error: see `Localization.status`.
+        """
+        arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
+        try:
+            return self._answer(self._core.locate(arrays, up=vertical))
+        except (ValueError, TypeError, OverflowError) as error:
+            raise PomonaError(f"frame: {error}") from None
+
+    def update(self, cloud: Cloud, moved: ArrayLike | None = None, *, up: Up | None = None) -> Localization:
+        """Find the camera with what is known from the frames before.
+
+        Parameters
+        ----------
+        cloud : FruitCloud, array_like, str or Path
+            As in `locate`; it may be empty.
+        moved : (4, 4) array_like, optional
+            The camera's pose now in the frame of the camera at the last call, where odometry tells it; else it is
+            thought to move on as it did.
+        up : optional
+            As in `locate`; used where the camera has to be found from nothing.
+
+        Raises
+        ------
+        PomonaError
+            As in `locate`.
+        """
+        arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
+        step = None if moved is None else _rigid(moved)
+        try:
+            return self._answer(self._core.update(arrays, previous_from_camera=step, up=vertical))
+        except (ValueError, TypeError, OverflowError) as error:
+            raise PomonaError(f"frame: {error}") from None
+
+    def reset(self) -> None:
+        """Forget where the camera was: the next update starts from nothing."""
+        self._core.reset()
+
+    def _answer(self, found: _core.Localization) -> Localization:
+        pairs = found.pairs
+        return Localization(
+            status=Verdict(found.status),
+            map_from_camera=found.map_from_camera,
+            covariance=found.covariance,
+            pairs=np.stack((pairs[:, 0], self._rows[pairs[:, 1]]), axis=1),
+            probabilities=found.probabilities,
+            log_odds=found.log_odds,
+            tracked=found.tracked,
+        )
+
+
+def _rigid(moved: ArrayLike) -> NDArray[np.float64]:
+    step = np.ascontiguousarray(moved, np.float64)
+    if step.shape != (4, 4):
+        raise PomonaError(f"moved: found an array of shape {step.shape}, expected (4, 4)")
+    stray = np.abs(step[:3, :3] @ step[:3, :3].T - np.eye(3)).max()
+    if not (stray < RIGID and np.linalg.det(step[:3, :3]) > 0 and np.isfinite(step).all()):
+        raise PomonaError("moved: found a matrix that does not turn and move, expected a rigid one")
+    return step

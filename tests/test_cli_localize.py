@@ -1,0 +1,110 @@
+"""`pomona localize` as a user meets it: processes, poses, exit codes."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pomona.recording.poses import read_tum
+from recording_maker import make_recording
+from row_drive import step_to
+
+ROW = Path(__file__).parents[1] / "examples" / "row"
+MAP, DRIVE = ROW / "2024-08-09" / "fruits.csv", ROW / "2024-08-28"
+FRAMES = ("--from", 4, "--to", 16, "--every", 4)
+
+
+def localize(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pomona", "localize", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+
+
+def true_poses() -> np.ndarray:
+    return read_tum(DRIVE / "poses_tum.txt")[1]
+
+
+@pytest.fixture
+def drive() -> tuple[object, ...]:
+    return (DRIVE / "row.mp4", "--detections", DRIVE / "boxes.csv", *FRAMES)
+
+
+@pytest.mark.parametrize("mode", [(), ("--single",)])
+def test_every_frame_of_another_date_is_found(tmp_path, drive, mode):
+    poses = tmp_path / "poses.tum"
+    done = localize(MAP, *drive, *mode, "-o", poses, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["statuses"] == {"Found": 4}
+    assert told["n_tracked"] == (0 if mode else 3)
+    times_s, found = read_tum(poses)
+    assert times_s == pytest.approx([0.4, 0.8, 1.2, 1.6])
+    assert poses.read_text().splitlines()[0].endswith("map_from_camera")
+    for frame, pose, row in zip((4, 8, 12, 16), found, told["frames"], strict=True):
+        step = step_to(pose, true_poses()[frame])
+        assert np.linalg.norm(step[:3]) < 0.05
+        assert np.degrees(np.linalg.norm(step[3:])) < 2.0
+        assert row["frame"] == frame
+        assert row["map_from_camera"] == pytest.approx(pose, abs=1e-6)
+        assert np.linalg.eigvalsh(row["covariance"]).min() > 0
+
+
+def test_poses_go_to_the_standard_output_and_the_summary_does_not(drive):
+    done = localize(MAP, *drive, "--single", "-o", "-")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 1 + 4
+    assert "4 of 4 frames found among 436 fruits" in done.stderr
+
+
+def test_no_frame_found_is_a_result(tmp_path, drive):
+    rng = np.random.default_rng(1)
+    elsewhere, poses = tmp_path / "elsewhere.csv", tmp_path / "poses.tum"
+    rows = "\n".join(",".join(f"{value:.4f}" for value in place) for place in rng.uniform(0, (6, 1, 2), (300, 3)))
+    elsewhere.write_text(f"x,y,z\n{rows}\n")
+    done = localize(elsewhere, *drive, "-o", poses)
+    assert done.returncode == 1
+    assert "0 of 4 frames found" in done.stdout
+    assert len(poses.read_text().splitlines()) == 1
+
+
+def test_frames_of_few_fruits_are_numbered_where_nothing_is_timed(tmp_path):
+    """Three fruits are too few; the exit code says that nothing was found."""
+    folder = make_recording(tmp_path / "few", (0.0, 0.1), poses=False)
+    done = localize(MAP, folder, "--single", "-o", tmp_path / "poses.tum", "--json")
+    assert done.returncode == 1
+    told = json.loads(done.stdout)
+    assert told["statuses"] == {"TooFew": 2}
+    assert [frame["time_s"] for frame in told["frames"]] == [0.0, 1.0]
+
+
+def test_a_recording_without_calibration_is_one_line(tmp_path):
+    shutil.copy(DRIVE / "row.mp4", tmp_path / "row.mp4")
+    done = localize(MAP, tmp_path / "row.mp4", "-o", tmp_path / "poses.tum")
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "calibration" in done.stderr
+    assert not (tmp_path / "poses.tum").exists()
+
+
+def test_time_that_goes_back_is_one_line(tmp_path):
+    folder = make_recording(tmp_path / "back", (0.0, 0.1, 0.2))
+    (folder / "poses_tum.txt").write_text("0 0 0 0 0 0 0 1\n0.2 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 1\n")
+    done = localize(MAP, folder, "-o", tmp_path / "poses.tum")
+    assert done.returncode == 2
+    assert "does not come after" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("precious", ["orchard", "own_poses"])
+def test_nothing_is_destroyed(tmp_path, precious):
+    folder = make_recording(tmp_path / "few", (0.0, 0.1))
+    own = tmp_path / "map.csv"
+    own.write_text("x,y,z\n1,0,0\n0,1,0\n0,0,1\n")
+    target = own if precious == "orchard" else folder / "poses_tum.txt"
+    before = target.read_bytes()
+    done = localize(own, folder, "-o", target)
+    assert done.returncode == 2
+    assert target.read_bytes() == before

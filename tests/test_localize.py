@@ -1,0 +1,218 @@
+"""Where the camera is in a map: poses, covariances that are honest, tracking, and what cannot be found."""
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pomona import FruitCloud, Localizer, PomonaError, Verdict
+from row_drive import Row, drawn_row, pose_at, seen_from, step_to
+
+EMPTY = FruitCloud(positions=np.empty((0, 3)))
+
+
+@pytest.fixture(scope="module")
+def row() -> Row:
+    return drawn_row(0)
+
+
+@pytest.fixture(scope="module")
+def localizer(row: Row) -> Localizer:
+    return Localizer(row.map, threads=1)
+
+
+@pytest.fixture
+def fresh(localizer: Localizer) -> Localizer:
+    localizer.reset()
+    return localizer
+
+
+def assert_near(found, true, within_m=0.05, within_deg=2.0):
+    assert found.status is Verdict.FOUND
+    step = step_to(found.map_from_camera, true)
+    assert np.linalg.norm(step[:3]) < within_m
+    assert np.degrees(np.linalg.norm(step[3:])) < within_deg
+
+
+@pytest.mark.parametrize("x_m", [1.5, 4.0, 6.5])
+def test_a_frame_is_found_from_nothing(row, localizer, x_m):
+    true = pose_at(x_m, turn_deg=7.0)
+    found = localizer.locate(seen_from(row, true, 1))
+    assert_near(found, true)
+    assert not found.tracked
+    assert found.log_odds > 50
+    assert np.linalg.eigvalsh(found.covariance).min() > 0
+    assert len(found.pairs) > 20
+    assert (found.probabilities > 0.25).all()
+    assert all(len(set(rows)) == len(rows) for rows in found.pairs.T.tolist())
+
+
+def test_pairs_are_the_fruits_that_were_seen(row, localizer):
+    true = pose_at(4.0)
+    seen = seen_from(row, true, 2, share=1.0)
+    found = localizer.locate(seen)
+    seen_in_map = seen.positions @ true[:3, :3].T + true[:3, 3]
+    distances_m = np.linalg.norm(seen_in_map[found.pairs[:, 0]] - row.today[found.pairs[:, 1]], axis=1)
+    assert (distances_m < 0.06).mean() > 0.97
+
+
+def test_covariances_are_those_of_the_errors():
+    """Squared errors under the own covariances are as chi^2 with 6 degrees: 6 on average, 5 % over 12.6."""
+    squared = []
+    for seed in range(12):
+        row = drawn_row(seed)
+        localizer = Localizer(row.map, threads=1)
+        for number, x_m in enumerate((1.5, 4.0, 6.5)):
+            true = pose_at(x_m, turn_deg=3.0)
+            found = localizer.locate(seen_from(row, true, 100 * seed + number))
+            assert found
+            step = step_to(found.map_from_camera, true)
+            squared.append(step @ np.linalg.solve(found.covariance, step))
+    # The mean of 36 has a standard deviation of sqrt(12 / 36) = 0.58.
+    assert 4.0 < np.mean(squared) < 8.0
+    assert np.mean(np.array(squared) > 12.6) < 0.2
+
+
+def test_shared_errors_do_not_average_out(row):
+    true = pose_at(4.0)
+    seen = seen_from(row, true, 3)
+    sigmas_m = []
+    for shared_m in (0.002, 0.02):
+        config = {"localization": {"shared_m": shared_m}}
+        sigmas_m.append(Localizer(row.map, config=config, threads=1).locate(seen).sigma_m)
+    assert sigmas_m[1] > 0.015 > sigmas_m[0]
+
+
+@pytest.mark.parametrize("moved_is_known", [True, False])
+def test_frames_are_tracked(row, fresh, moved_is_known):
+    before = None
+    for number, x_m in enumerate(np.arange(1.5, 6.5, 0.15)):
+        true = pose_at(x_m)
+        moved = np.linalg.solve(before, true) if moved_is_known and before is not None else None
+        found = fresh.update(seen_from(row, true, 200 + number), moved)
+        assert_near(found, true)
+        assert found.tracked == (number > 0)
+        before = true
+
+
+def test_the_motion_carries_the_pose_past_frames_without_fruits(row, fresh):
+    fresh.update(seen_from(row, pose_at(4.0), 1))
+    sigmas_m = []
+    for x_m in (4.1, 4.2, 4.3):
+        found = fresh.update(EMPTY, np.linalg.solve(pose_at(x_m - 0.1), pose_at(x_m)))
+        assert_near(found, pose_at(x_m))
+        assert np.isnan(found.log_odds)
+        sigmas_m.append(found.sigma_m)
+    assert sigmas_m == sorted(sigmas_m)
+
+
+def test_a_pose_that_nothing_carries_is_lost_and_found_again(row, fresh):
+    fresh.update(seen_from(row, pose_at(2.0), 1))
+    statuses = [fresh.update(EMPTY).status for _ in range(3)]
+    assert statuses[-1] is Verdict.TOO_FEW
+    again = fresh.update(seen_from(row, pose_at(6.0), 2))
+    assert_near(again, pose_at(6.0))
+    assert not again.tracked
+
+
+def test_a_camera_that_was_carried_away_is_noticed(row, fresh):
+    fresh.update(seen_from(row, pose_at(2.0), 1))
+    fresh.update(seen_from(row, pose_at(2.1), 2))
+    found = fresh.update(seen_from(row, pose_at(6.0), 3), np.linalg.solve(pose_at(2.1), pose_at(2.2)))
+    assert_near(found, pose_at(6.0))
+    assert not found.tracked
+
+
+def test_frames_with_few_fruits_are_joined(row, fresh):
+    """Six fruits are no place; those of several frames are one."""
+    before, alone, joined = None, [], []
+    for number, x_m in enumerate(np.arange(3.0, 4.6, 0.2)):
+        true = pose_at(x_m)
+        seen = seen_from(row, true, 300 + number, most=6)
+        moved = None if before is None else np.linalg.solve(before, true)
+        alone.append(bool(fresh.locate(seen)))
+        found = fresh.update(seen, moved)
+        joined.append(bool(found))
+        if found:
+            assert_near(found, true, within_m=0.08, within_deg=4.0)
+        before = true
+    assert not any(alone)
+    assert all(joined[5:])
+
+
+@pytest.mark.parametrize("n", range(5))
+def test_a_frame_with_next_to_no_fruits_is_too_few(row, localizer, n):
+    seen = seen_from(row, pose_at(4.0), 1).select(np.arange(n))
+    assert localizer.locate(seen).status is Verdict.TOO_FEW
+
+
+def test_strangers_are_no_match(localizer):
+    elsewhere = drawn_row(99)
+    found = localizer.locate(seen_from(elsewhere, pose_at(4.0), 1))
+    assert found.status is Verdict.NO_MATCH
+    assert found.map_from_camera is None
+    assert np.isnan(found.position_m).all()
+    assert len(found.pairs) == 0
+
+
+def test_fruits_that_are_gone_are_not_looked_for(row):
+    there = row.map
+    ghost = FruitCloud(
+        positions=np.concatenate((row.on_map[:10] + np.array([0.03, 0.0, 0.0]), row.on_map)),
+        covariances=np.concatenate((there.covariances[:10], there.covariances)),
+        extras={"state": ("gone",) * 10 + ("seen",) * len(row.on_map)},
+    )
+    localizer = Localizer(ghost)
+    assert len(localizer) == len(row.on_map)
+    found = localizer.locate(seen_from(row, pose_at(4.0), 2))
+    assert_near(found, pose_at(4.0))
+    assert found.pairs[:, 1].min() >= 10
+
+
+@pytest.mark.parametrize("n", [0, 4])
+def test_a_map_without_fruits_to_speak_of_gives_no_pose(row, n):
+    localizer = Localizer(row.map.select(np.arange(n)))
+    assert localizer.locate(seen_from(row, pose_at(4.0), 1)).status is Verdict.TOO_FEW
+    assert localizer.update(seen_from(row, pose_at(4.0), 1)).status is Verdict.TOO_FEW
+
+
+def test_one_tree_is_a_map(row):
+    tree = row.map.select(np.flatnonzero(np.abs(row.on_map[:, 0] - 4.0) < 0.6))
+    assert_near(Localizer(tree).locate(seen_from(row, pose_at(4.0), 1)), pose_at(4.0), 0.05, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("give", "expected"),
+    [
+        (lambda here: here.update(EMPTY, np.eye(3)), "moved"),
+        (lambda here: here.update(EMPTY, 2.0 * np.eye(4)), "moved"),
+        (lambda here: here.locate(np.full((6, 3), np.nan)), "positions"),
+        (lambda here: here.locate(EMPTY, up=[1.0, 2.0]), "up"),
+    ],
+)
+def test_wrong_input_is_refused_in_one_line(fresh, give, expected):
+    with pytest.raises(PomonaError, match=expected) as refused:
+        give(fresh)
+    assert "\n" not in str(refused.value)
+
+
+def test_settings_are_the_cores(row):
+    with pytest.raises(PomonaError, match=r"localization\.own_m"):
+        Localizer(row.map, config={"localization": {"own_m": -1.0}})
+
+
+def test_memory_does_not_grow(row, fresh):
+    frames = [(seen_from(row, pose_at(x_m), n), pose_at(x_m)) for n, x_m in enumerate((3.9, 4.0, 4.1, 4.0))]
+
+    def drive(n: int) -> int:
+        for number in range(n):
+            seen, pose = frames[number % 4]
+            fresh.update(seen, np.linalg.solve(frames[number % 4 - 1][1], pose) if number else None)
+        gc.collect()
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("needs Linux's /proc")
+    settled = drive(500)
+    assert drive(4000) - settled < 4 << 20
