@@ -16,6 +16,7 @@ from pomona.likes import BY_DATE, EXPORTS, Like
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
+    from pomona.export import ExportFormat
 
 
 class Format(StrEnum):
@@ -27,6 +28,16 @@ class Format(StrEnum):
     shp = "shp"
     parquet = "parquet"
     parquet_by_date = "parquet-by-date"
+
+
+_SINGLE: dict[Format, ExportFormat] = {
+    Format.csv: "csv",
+    Format.ply: "ply",
+    Format.geojson: "geojson",
+    Format.shp: "shp",
+    Format.parquet: "parquet",
+}
+"""Formats of one file."""
 
 
 def _like(given: Mapping[str, Any]) -> Like:
@@ -80,12 +91,14 @@ def export(
     if to is Format.parquet_by_date:
         _export_by_date(source, output, plain=not (growth or harvest))
         return
+    told: ExportFormat | None = None if to is None else _SINGLE[to]
+    wanted = format_of(output, told)
     if growth or harvest is not None:
         cloud = _grown(source, harvest, plain=not growth or observations)
     else:
         cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
     anchor = None if local or source.suffix.lower() != ".gpkg" else OrchardMap(source).anchor()
-    export_cloud(cloud, output, format_of(output, None if to is None else to.value), anchor)
+    export_cloud(cloud, output, wanted, anchor)
     say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
 
 

@@ -129,7 +129,7 @@ def _flags() -> Mapping[str, Mapping[str, Flag]]:
     """Say which flags of the verbs a plan may set, by what the verbs themselves take."""
     from pomona.cli.export import export
     from pomona.cli.growth import growth
-    from pomona.cli.map import map_add
+    from pomona.cli.map_add import map_add
     from pomona.cli.report import report
     from pomona.cli.scan import scan
 

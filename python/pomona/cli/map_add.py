@@ -1,0 +1,139 @@
+"""`pomona map add`: the fruits of a session are recognised, and it joins the map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from pomona.amounts import amount
+from pomona.cli.map_words import change_as_text, waiting
+from pomona.cli.match_options import (
+    Method,
+    Scale,
+    Unit,
+    call_flags,
+    config_option,
+    method_option,
+    noise_option,
+    per_frame_option,
+    scale_option,
+    threads_option,
+    up_option,
+)
+from pomona.cli.terminal import say, say_json
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from pomona.orchard import Added, Session
+
+
+def map_add(
+    orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg); made when it is not there."),
+    sessions: list[Path] = typer.Argument(
+        metavar="SESSION...", help="Sessions (.gpkg), or a cloud (.csv, .ply) with --date."
+    ),
+    date: str | None = typer.Option(
+        None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; a session has its own."
+    ),
+    method: Method | None = method_option,
+    scale: Scale | None = scale_option,
+    noise_m: float | None = noise_option,
+    up: list[str] | None = up_option,
+    config: Path | None = config_option,
+    per_frame: bool | None = per_frame_option,
+    threads: int | None = threads_option,
+    unit: Unit | None = typer.Option(
+        None, help="Unit of the coordinates of a .csv or .ply; m also says that odd distances or diameters are right."
+    ),
+    new_part: bool = typer.Option(
+        False, "--new-part", help="Let a session that is not found start a part of its own: another row, for example."
+    ),
+    name: str | None = typer.Option(None, help="Name of the session in the map; else its own, of a cloud its file's."),
+    replace: bool = typer.Option(
+        False,
+        "--replace",
+        help="Take the place of a session of the same name that saw something else; the same one is left as it is.",
+    ),
+    json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Recognise the fruits of SESSION in ORCHARD and add it.
+
+    Who is who follows from all sessions at once, in whatever order they came. Fruits keep their ids where they can;
+    what becomes another fruit is told. The first session starts the map; of several, one that is not found is tried
+    again after the others. Exit code 0: added. 1: one was not found in the map. 2: wrong input.
+    """
+    import dataclasses
+
+    from pomona.cli.progress import working
+    from pomona.errors import PomonaError
+    from pomona.orchard import add_sessions, load_session
+    from pomona.settings import Settings
+
+    if unit is Unit.free and not orchard.exists():
+        raise PomonaError(
+            f"{orchard}: is not there, and a map starts in metres: found --unit free, expected m, cm or mm"
+        )
+    if date is not None and len(sessions) > 1:
+        found = amount(len(sessions), "session")
+        raise PomonaError(f"--date: found it with {found}, expected one; each has a day of its own")
+    if name is not None and len(sessions) > 1:
+        raise PomonaError(f"--name: found it with {len(sessions)} sessions, expected one; each has a name of its own")
+    visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
+    visits = [visit if name is None else dataclasses.replace(visit, name=name) for visit in visits]
+    flags = call_flags(method, scale, noise_m, up, per_frame, threads)
+    settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
+    with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
+        answers = add_sessions(
+            orchard, visits, settings=settings, new_part=new_part, replacing=replace, waiting=waiting(orchard)
+        )
+    told = list(zip(visits, answers, strict=True))
+    if json:
+        objects = [_added_as_json(visit, added) for visit, added in told]
+        say_json(objects[0] if len(objects) == 1 else objects)
+    else:
+        say(*(line for visit, added in told for line in _added_as_lines(visit, added)))
+    if not all(added.is_added for added in answers):
+        raise typer.Exit(1)
+
+
+def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    match = added.match
+    return {
+        "session": visit.name,
+        "added": added.is_added,
+        "status": None if match is None else match.status.value,
+        "n_fruits": len(visit.cloud),
+        "n_matched": added.n_matched,
+        "n_new": added.n_new,
+        "n_missed": added.n_missed,
+        "changes": [asdict(change) for change in added.changes],
+        "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
+        "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
+        if added.is_added
+        else {},
+    }
+
+
+def _added_as_lines(visit: Session, added: Added) -> list[str]:
+    return [_added_as_text(visit, added), *map(change_as_text, added.changes)]
+
+
+def _added_as_text(visit: Session, added: Added) -> str:
+    match = added.match
+    if added.was_there:
+        return f"{visit.name}: is in the map already, the very same"
+    if match is None:
+        return f"{visit.name}: starts the map with {amount(added.n_new, 'fruit')}"
+    if not added.is_added:
+        return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
+    if match.status.value != "Found":
+        return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
+    return (
+        f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
+        f"{added.n_missed} in view and not seen"
+    )
