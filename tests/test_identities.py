@@ -15,7 +15,7 @@ from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import all_sights
 from pomona.orchard.fruit_ids import Change, changes_between, ids_of_clusters
 
-SURE, DOUBTED = 0.9999, 0.7
+SURE, DOUBTED = 0.9999, 0.9
 
 
 def visit(number: int, positions: np.ndarray, **about: object) -> SeenVisit:
@@ -45,8 +45,14 @@ def test_two_of_one_visit_never_join() -> None:
     pairs = [pair(0, 1, [(0, 0)]), pair(1, 2, [(0, 0)]), pair(0, 2, [(1, 0)], DOUBTED)]
     labels = clusters([2, 1, 1], pairs)
     assert labels[0] != labels[1]
-    # The sight of the last visit goes with the surer two.
-    assert labels[0] == labels[2] == labels[3]
+    assert labels[0] == labels[2]
+    # Visits 0 and 2 left the first of the one and that of the other apart.
+    assert labels[1] == labels[3]
+
+
+def test_a_pair_that_is_hardly_likelier_than_a_neighbour_is_none() -> None:
+    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.75)]) == [0, 1]
+    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.8)]) == [0, 0]
 
 
 def test_what_matched_visits_leave_unpaired_speaks_against() -> None:

@@ -229,7 +229,7 @@ def test_nothing_is_left_of_a_map_that_could_not_be_started(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pomona.orchard.adding.update_layers", interrupted)
+    monkeypatch.setattr("pomona.orchard.joining.update_layers", interrupted)
     with pytest.raises(KeyboardInterrupt):
         add_session(tmp_path / "orchard.gpkg", visit(scenes[0], "2024-08-01"))
     assert not list(tmp_path.iterdir())

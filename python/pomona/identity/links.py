@@ -14,21 +14,19 @@ from pomona.identity.visits import Sights, VisitPair
 __all__ = ["Links", "links_of"]
 
 SUREST = 8.0
-"""Nats of a pair at most: more than the 7 that a missing pair speaks against, so that one does not part what sure ones
-join."""
-
+"""Nats of a pair at most. Less `UNCOVERED`, a little less than what a match left out speaks against: two sights that
+their own visits left apart are not one because another visit has something between them."""
 
 UNCOVERED = 1.25
 """Nats against a pair beforehand: where a fruit went, its neighbour in the cluster may be seen for the first time, and
 a match of two visits takes it for the same. With 1.25 identities of thinned fruits live on in a neighbour in half as
 many cases, for one pair in fifty that is lost."""
 
-UNSURE = 0.5
-"""Probability of a pair up to which the match has no evidence of its own for it: the paper's method completes pairs by
-their place alone."""
+GOES_IN_DAYS = 1.0
+"""Between visits that are nearer in time no fruit goes."""
 
 LEAST_SURE = 0.5
-"""Nats of such a pair: a match that pairs two fruits says that they are one."""
+"""Nats of a pair at least, before that: what a match pairs is doubted no more than so much; sizes may outweigh it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +54,16 @@ def links_of(sights: Sights, pairs: Sequence[VisitPair]) -> Links:
     for pair in pairs:
         linked = pair.rows + sights.starts[[pair.first, pair.second]]
         found.append(linked)
-        log_odds.append(_by_place(pair.probabilities) + _by_size(sights, pair, linked))
+        goes = abs(sights.days[pair.second] - sights.days[pair.first]) >= GOES_IN_DAYS
+        by_place = _by_place(pair.probabilities) - (UNCOVERED if goes else 0.0)
+        log_odds.append(by_place + _by_size(sights, pair, linked))
     matched = np.array([(pair.first, pair.second) for pair in pairs], np.int64).reshape(-1, 2)
     return Links(np.concatenate(found), np.concatenate(log_odds), matched)
 
 
 def _by_place(probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
     with np.errstate(divide="ignore"):
-        nats = np.clip(np.log(probabilities) - np.log1p(-probabilities), LEAST_SURE, SUREST) - UNCOVERED
-    return np.where(probabilities > UNSURE, nats, LEAST_SURE)
+        return np.asarray(np.clip(np.log(probabilities) - np.log1p(-probabilities), LEAST_SURE, SUREST))
 
 
 def _by_size(sights: Sights, pair: VisitPair, linked: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -83,11 +83,14 @@ class Sights:
         First sight of each visit.
     log_sizes : (S,) float64
         Logarithm of the diameter, NaN where unknown.
+    days : (V,) float64
+        Of each visit.
     """
 
     visits: NDArray[np.int64]
     starts: NDArray[np.int64]
     log_sizes: NDArray[np.float64]
+    days: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.visits)
@@ -101,4 +104,5 @@ def all_sights(visits: Sequence[SeenVisit]) -> Sights:
         visits=np.repeat(np.arange(len(visits)), counts),
         starts=np.cumsum(counts) - counts,
         log_sizes=np.log(diameters_m),
+        days=np.array([visit.day for visit in visits], np.float64),
     )
