@@ -105,7 +105,7 @@ const PER_POSE: f64 = 2.5;
 /// How much slower than exp(-t) the tail of refined wrong poses falls.
 const STRETCH: f64 = 1.77;
 
-/// Mean distance, in nats, from the best wrong pose of a search to the second best: of 550 pairs of unrelated clouds, from
+/// Mean distance, in nats, from the best wrong pose of a search to the second best: of 460 pairs of unrelated clouds, from
 /// frames of 16 fruits to rows, a tenth lie more than 4.7 apart, one in a hundred 7.6.
 const SPACING: f64 = 2.1;
 
