@@ -51,7 +51,7 @@ def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
     share $h_v$ of fruits that go before visit $v$: it went before $t$ with weight
     $h_t \prod_{v=l+1}^{t-1} (1 - h_v)\, m_v$, or hangs with $\prod_{v>l} (1 - h_v)\, m_v$. A fruit that one visit saw
     alone may be none: false points are as many as the share $f$ of the visit's fruits, real ones that only this visit
-    would see as many as there are fruits times the chance of that. $h$ and $f$ are those that explain all fruits best.
+    would see as many as there are fruits, those that no visit saw among them, times the chance of that. $h$ and $f$ are those that explain all fruits best.
 
     Parameters
     ----------
@@ -68,13 +68,15 @@ def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
     hidden[:, 1:] = np.cumsum(np.where(order > last[:, None], logs, 0.0), axis=1)
     only_here = np.where(order < first[:, None], logs, 0.0).sum(axis=1) + np.log1p(-missing[np.arange(n_fruits), first])
     is_single = seen.sum(axis=1) == 1
+    # For each fruit that some visit saw there are those that all of them missed.
+    seen_at_all = -np.expm1(logs.sum(axis=1))
     n_seen = seen.sum(axis=0)
     leaving = np.full(n_visits, SHARE_GONE)
     share_false = SHARE_FALSE
     false = np.where(is_single, SHARE_FALSE, 0.0)
     for _ in range(ROUNDS):
         ends, log_evidence = _ends(leaving, first, last, hidden)
-        n_real = np.sum(1.0 - false)
+        n_real = np.sum((1.0 - false) / seen_at_all)
         n_false_here = share_false * n_seen[first]
         n_real_here = n_real * np.exp(only_here + log_evidence)
         false = np.where(is_single, n_false_here / (n_false_here + n_real_here), 0.0)
