@@ -355,3 +355,13 @@ def test_temperatures_that_are_none_are_one_line(tmp_path: Path, text: str, said
         read_temperatures(path, [date(2024, 6, 1), date(2024, 6, 3)])
     assert said in str(refused.value)
     assert str(refused.value).startswith(str(path))
+
+
+def test_sizes_that_were_copied_from_one_visit_to_the_next_can_be_told(tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (50,), n_trees=1).path
+    fruits = OrchardMap(path).fruits()
+    again = FruitCloud(fruits.positions, diameters_m=fruits.diameters_m)
+    assert add_session(path, Session("again", "2024-07-01", "drawn", again)).is_added
+    grown = grow_season(path)
+    assert np.isfinite(grown.foretold.sizes_mm).all()
+    assert (np.abs(grown.foretold.rates_mm_per_day) < 0.2).all()

@@ -25,6 +25,9 @@ __all__ = ["Effects", "Hierarchy", "Shape"]
 
 Numbers = NDArray[np.float64]
 
+_FINEST_MM = 0.01
+"""Nothing measures a fruit to less; sizes that agree to the last digit were copied, and say no more than that."""
+
 _SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.3
 """A fruit's usual diameter at the onset, give or take a third: of apples and their like, whatever the family."""
 
@@ -91,7 +94,7 @@ class Hierarchy:
         self._curve = self.log_size(table.times)
         self._slopes = -shape.rate_per_day * family.slope(self._x(table.times))
         seen = table.seen
-        weights = seen * (table.typical_mm / shape.noise_mm) ** 2
+        weights = seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
         self._weights = weights
         self._residuals = np.where(seen, table.logs - self._curve, 0.0)
         self._of_fruits()
