@@ -19,8 +19,8 @@ their own visits left apart are not one because another visit has something betw
 
 UNCOVERED = 1.25
 """Nats against a pair beforehand: where a fruit went, its neighbour in the cluster may be seen for the first time, and
-a match of two visits takes it for the same. With 1.25 identities of thinned fruits live on in a neighbour in half as
-many cases, for one pair in fifty that is lost."""
+a match of two visits takes it for the same. With 1.25 identities of thinned fruits live on in a neighbour in two fifths
+fewer cases, for one pair in fifty that is lost."""
 
 GOES_IN_DAYS = 1.0
 """Between visits that are nearer in time no fruit goes."""
