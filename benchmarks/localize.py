@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 from benchmarks.localize_picture import write_picture
 from benchmarks.results import markdown, shared_data, write_rows, write_text
 from pomona import FruitCloud, Localization, Localizer
-from pomona.detect.opening import open_detector
-from pomona.localize.story import Moving, cloud_of
+from pomona.detect.opening import FoundBoxes, open_detector
+from pomona.localize.following import Moving, cloud_of
 from pomona.recording import Recording, open_recording
 from pomona.recording.poses import read_tum, write_tum
 from pomona.survey import scan
@@ -85,17 +85,27 @@ def main(arguments: list[str]) -> None:
         outcome
         for boxes in options.boxes.split(",")
         for row in _rows()
-        for query, map in permutations([drive(row.name, visit, boxes) for visit in visits(row)], 2)
+        for map, query in permutations([drive(row.name, visit, boxes) for visit in visits(row)], 2)
         for outcome in outcomes_of(map, query)
     ]
-    rows = [as_row(outcome) for outcome in outcomes]
-    text = markdown(tuple(rows[0]), [tuple(map(str, row.values())) for row in rows])
+    text = report(outcomes)
     sys.stdout.write(text)
     if options.boxes == parser.get_default("boxes"):
-        write_rows("localize.csv", rows)
-        write_text("localize.md", text)
-        shown = [one for one in outcomes if (one.map.date, one.query.date) == SHOWN and one.query.boxes == "shipped"]
-        write_picture("localize.png", shown[-1], {mode: nees_of(outcomes, mode) for mode in ("single", "tracked")})
+        record(outcomes, text)
+
+
+def report(outcomes: list[Outcome]) -> str:
+    """Give the table of all drives."""
+    rows = [as_row(outcome) for outcome in outcomes]
+    return markdown(tuple(rows[0]), [tuple(map(str, row.values())) for row in rows])
+
+
+def record(outcomes: list[Outcome], text: str) -> None:
+    """Write tables and picture."""
+    write_rows("localize.csv", [as_row(outcome) for outcome in outcomes])
+    write_text("localize.md", text)
+    shown = [one for one in outcomes if (one.map.date, one.query.date) == SHOWN and one.query.boxes == "shipped"]
+    write_picture("localize.png", shown[-2], {mode: nees_of(outcomes, mode) for mode in ("single", "tracked")})
 
 
 def _rows() -> Iterator[Path]:
@@ -112,8 +122,9 @@ def drive(row: str, visit: Path, boxes: str) -> Drive:
     """Scan a date for its map, and look at each of its frames alone."""
     with tempfile.TemporaryDirectory() as folder:
         posed, bare = _recordings(visit, Path(folder) / "poses.txt")
-        map = scan(posed, _detector(visit, boxes, posed)).cloud
-        seeing, camera = Seeing(bare, _detector(visit, boxes, bare), colour=False), Moving(pose_source_of(bare))
+        map = scan(posed, _detector(visit, boxes, posed), depth="stereo").cloud
+        seeing = Seeing(bare, _detector(visit, boxes, bare), depth="stereo", colour=False)
+        camera = Moving(pose_source_of(bare))
         both = [(cloud_of(seeing(frame).lifted), camera(frame)) for frame in bare.frames()]
         assert posed.trajectory is not None
         poses = posed.trajectory.session_from_camera
@@ -133,7 +144,7 @@ def _recordings(visit: Path, at_frames: Path) -> tuple[Recording, Recording]:
     return open_recording(visit / "row.mp4", poses=at_frames), bare
 
 
-def _detector(visit: Path, boxes: str, recording: Recording) -> object:
+def _detector(visit: Path, boxes: str, recording: Recording) -> FoundBoxes:
     if boxes == "shipped":
         return open_detector(None, Path("shipped"), recording)
     return open_detector(visit / "ids" if (visit / "ids").is_dir() else visit / "boxes.csv", None, recording)

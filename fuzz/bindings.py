@@ -1,4 +1,4 @@
-"""Functions of `pomona._core` with arrays of anything; localization, matching, tracking have their own targets."""
+"""Functions of `pomona._core` with arrays of anything; what has a state has a target of its own, as `matching`."""
 
 from __future__ import annotations
 

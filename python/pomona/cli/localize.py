@@ -55,7 +55,7 @@ def localize(
     from pomona.detect.opening import open_detector
     from pomona.localize import Localizer
     from pomona.localize.files import write_way
-    from pomona.localize.story import localize as localized
+    from pomona.localize.following import localize as localized
     from pomona.outputs import refuse_inputs
     from pomona.recording import open_recording, selected
     from pomona.recording.bags.topics import parsed_topics

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from pomona.localize import Localizer, Step, Way
-    from pomona.localize.story import Progress
+    from pomona.localize.following import Progress
     from pomona.recording import Recording
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pomona.atomic import whole_file
-from pomona.localize.way import Way
+from pomona.localize.course import Way
 from pomona.recording.poses import write_tum
 
 __all__ = ["write_way"]

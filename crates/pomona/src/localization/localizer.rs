@@ -33,6 +33,14 @@ const MIN_PROBABILITY: f64 = 0.25;
 /// Evidence that six fitted numbers gain by chance, nats: half of the 99.9 % quantile of chi^2 with 6 degrees.
 const FITTED_NATS: f64 = 11.2;
 
+/// False-alarm rate at which the matcher is asked, at the least: each of its answers is looked at once more, with the
+/// covariances that it does not use, and has to have [`SEARCHED_NATS`].
+const SEARCH_RATE: f64 = 0.02;
+
+/// Evidence that the best of a search has by chance, nats: of e^12 = 160,000 poses. Strangers had at most 27 of the 32 that
+/// this and the rest make.
+const SEARCHED_NATS: f64 = 12.0;
+
 /// A map in which a camera finds itself, and where it was last.
 #[derive(Debug)]
 pub struct Localizer {
@@ -49,7 +57,10 @@ impl Localizer {
     /// # Errors
     /// A cloud or a setting that is wrong.
     pub fn new(map: &FruitCloud, config: Config) -> Result<Self> {
-        let index = MapIndex::new(map, Method::Verified, Scale::Metric, config)?;
+        config.validate()?;
+        let mut of_search = config;
+        of_search.verified.false_alarm_rate = config.verified.false_alarm_rate.max(SEARCH_RATE);
+        let index = MapIndex::new(map, Method::Verified, Scale::Metric, of_search)?;
         let config = config.localization;
         Ok(Self { index, map: KnownFruits::new(map, config.own_m), config, belief: None, window: Window::default() })
     }
@@ -110,7 +121,7 @@ impl Localizer {
     fn followed(&self, predicted: &Belief) -> Option<Localization> {
         let sightings = self.window.sightings(self.config.enough_fruits);
         let aligned = align(&sightings, &self.map, &predicted.pose, &predicted.covariance);
-        let found = self.believed(&aligned)?;
+        let found = self.believed(&aligned, 0.0)?;
         // What few fruits leave open, the motion tells.
         let both = Belief { pose: aligned.pose, covariance: found, motion: predicted.motion }.joined(predicted);
         Some(self.answer(&aligned, &sightings, &both, true))
@@ -118,7 +129,7 @@ impl Localizer {
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
     fn found_again(&self, predicted: Option<&Belief>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
-        let fruits = self.window.fruits();
+        let fruits = self.window.fruits(self.config.enough_fruits);
         let found = self.search(&fruits, &cloud_of(&fruits), up)?;
         let poor = self.window.newest() < self.config.enough_fruits && found.verdict != Verdict::Found;
         let carried = predicted.filter(|belief| poor && belief.sigma_m() < LOST_M);
@@ -143,17 +154,17 @@ impl Localizer {
         let (place, turn) = MATCHED;
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let aligned = align(sightings, &self.map, &start, &doubt);
-        let Some(covariance) = self.believed(&aligned) else {
+        let Some(covariance) = self.believed(&aligned, SEARCHED_NATS) else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
         let belief = Belief { pose: aligned.pose, covariance, motion: None };
         Ok(self.answer(&aligned, sightings, &belief, false))
     }
 
-    /// Covariance of a pose, if there is enough for it.
-    fn believed(&self, aligned: &Aligned) -> Option<Matrix6<f64>> {
+    /// Covariance of a pose, if there is enough for it; `chosen_nats` is what the choice among many gains by chance.
+    fn believed(&self, aligned: &Aligned, chosen_nats: f64) -> Option<Matrix6<f64>> {
         let paired: f64 = aligned.says.iter().map(|say| say.weight).sum();
-        let needed = FITTED_NATS - self.config.false_alarm_rate.ln();
+        let needed = FITTED_NATS + chosen_nats - self.config.false_alarm_rate.ln();
         let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
         enough.then(|| covariance(aligned, &self.map, self.config.shared_m, self.config.reach_m)).flatten()
     }

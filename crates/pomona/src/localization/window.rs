@@ -65,10 +65,12 @@ impl Window {
         all
     }
 
-    /// Each fruit once, as far as places tell, in sightings enough to be found from nothing: a cloud to be matched.
-    pub fn fruits(&self) -> Vec<Sighting> {
+    /// Each fruit once, as far as places tell: a cloud to be matched. A frame that stands alone is not mixed with those
+    /// before: the way from them may be what is wrong.
+    pub fn fruits(&self, enough: usize) -> Vec<Sighting> {
+        let wanted = if self.newest() < enough { ENOUGH_TO_SEARCH } else { enough };
         let mut fruits: Vec<Sighting> = Vec::new();
-        for one in self.sightings(ENOUGH_TO_SEARCH) {
+        for one in self.sightings(wanted) {
             let known = |other: &Sighting| (other.place - one.place).norm() < ONE_FRUIT_M;
             if one.row.is_some() || !fruits.iter().any(known) {
                 fruits.push(one);

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.detect import Detector
 from pomona.errors import PomonaError
+from pomona.localize.course import Step, Way
 from pomona.localize.localizer import Localizer
-from pomona.localize.way import Step, Way
 from pomona.matching import Up
 from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
