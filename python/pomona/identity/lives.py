@@ -49,10 +49,10 @@ def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
 
     Of a fruit last seen by visit $l$ the others after it say, with the chance $m_v$ that visit $v$ misses it and the
     share $h_v$ of fruits that go before visit $v$: it went before $t$ with weight
-    $h_t \prod_{v=l+1}^{t-1} (1 - h_v)\, m_v$, or hangs with $\prod_{v>l} (1 - h_v)\, m_v$. A fruit that one visit saw alone may be none: false
-    points are as many as the share $f$ of the visit's fruits, real ones that only this visit would see as many as
-    there are fruits, those that no visit saw among them, times the chance of that. $h$ and $f$ are those that
-    explain all fruits best.
+    $h_t \prod_{v=l+1}^{t-1} (1 - h_v)\, m_v$, or hangs with $\prod_{v>l} (1 - h_v)\, m_v$.
+    A fruit that one visit saw alone may be none: false points are as many as the share $f$ of the visit's fruits,
+    real ones that only this visit would see as many as there are fruits, those that no visit saw among them, times
+    the chance of that. $h$ and $f$ are those that explain all fruits best.
 
     Parameters
     ----------
