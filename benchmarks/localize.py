@@ -139,7 +139,7 @@ def _recordings(visit: Path, at_frames: Path) -> tuple[Recording, Recording]:
         return open_recording(visit), open_recording(visit, own_poses=False)
     bare = open_recording(visit / "row.mp4")
     _, poses = read_tum(visit / "poses_tum.txt")
-    times_s = np.arange(len(poses)) if bare.times_s is None else bare.times_s
+    times_s = np.arange(len(poses), dtype=np.float64) if bare.times_s is None else bare.times_s
     write_tum(at_frames, Trajectory(np.arange(len(poses)), times_s, poses))
     return open_recording(visit / "row.mp4", poses=at_frames), bare
 
