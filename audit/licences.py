@@ -36,6 +36,7 @@ ALLOWED = frozenset(
             "CC0-1.0",
             "ISC",
             "MIT",
+            "MIT-0",
         ),
         *("MIT-CMU", "PSF-2.0", "Unicode-3.0", "Unlicense", "Zlib"),
     }

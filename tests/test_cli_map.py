@@ -13,7 +13,7 @@ import pytest
 
 from pomona import FruitCloud
 from pomona.cli import main
-from pomona.orchard import write_session
+from pomona.orchard import FORMAT_VERSION, write_session
 from pomona.orchard.session import GUESSED
 from pomona.synth.clouds import scene_pair
 
@@ -54,13 +54,13 @@ def orchard(visits: Path) -> Path:
 
 def test_info_tells_people_and_programs(orchard: Path) -> None:
     info = json.loads(run("info", orchard, "--json").stdout)
-    assert (info["kind"], info["format_version"]) == ("map", 2)
+    assert (info["kind"], info["format_version"]) == ("map", FORMAT_VERSION)
     assert [visit["name"] for visit in info["sessions"]] == ["august", "september"]
     assert info["n_observations"] == sum(visit["n_fruits"] for visit in info["sessions"])
     assert info["n_fruits"] == sum(visit["n_new"] for visit in info["sessions"]) == sum(info["states"].values())
     assert np.shape(info["extent_m"]) == (2, 3)
     text = run("info", orchard).stdout
-    assert text.startswith(f"{orchard}: map, format 2\n{info['n_fruits']} fruits (")
+    assert text.startswith(f"{orchard}: map, format {FORMAT_VERSION}\n{info['n_fruits']} fruits (")
     assert text.splitlines()[-1].split()[0] == "september"
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.orchard import OrchardMap, Session, add_session, load_session, problems, write_session
+from pomona.orchard import FORMAT_VERSION, OrchardMap, Session, add_session, load_session, problems, write_session
 from pomona.settings import Settings
 from pomona.synth.clouds import scene_pair
 
@@ -205,7 +205,10 @@ def test_a_map_and_a_session_are_not_each_other(tmp_path: Path, grown: Path, sce
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ("UPDATE pomona_format SET format_version = 3", "has format 3, this program reads up to 2: update pomona"),
+        (
+            "UPDATE pomona_format SET format_version = 99",
+            f"has format 99, this program reads up to {FORMAT_VERSION}: update pomona",
+        ),
         ("DROP TABLE pomona_format", "is a GeoPackage but not one of pomona: it has no table pomona_format"),
         ("PRAGMA application_id = 0", "is not a GeoPackage: application id 0x0, expected 'GPKG'"),
     ],

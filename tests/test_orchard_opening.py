@@ -164,7 +164,7 @@ def test_there_a_reader_is_told_that_the_map_is_being_made(
             OrchardMap(path)
         said.append(str(caught.value))
 
-    monkeypatch.setattr("pomona.orchard.adding.update_layers", looked_at)
+    monkeypatch.setattr("pomona.orchard.joining.update_layers", looked_at)
     assert add_session(path, load_session(visits[0])).is_added
     # The first call was for the map beside, which could not be given its name.
     assert said[1:] == [

@@ -20,7 +20,7 @@ from pomona.synth.seasons.season_files import write_season
 from pomona.team import pull_map, push_map
 from pomona.team.database_url import parsed_url
 
-pg = pytest.importorskip("pg8000.native", reason="pg8000 is not installed: pip install 'pomona[team]'")
+pg = pytest.importorskip("pg8000.native", reason="pg8000 is not installed: pip install pg8000")
 pytestmark = pytest.mark.skipif(
     postgres_server.programs() is None,
     reason="no PostgreSQL with PostGIS: apt-get install postgresql postgresql-15-postgis-3",

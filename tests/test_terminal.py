@@ -113,7 +113,7 @@ def test_a_terminal_that_knows_ascii_only_gets_ascii(tmp_path: Path) -> None:
 def test_no_verb_prints_but_by_the_one_way() -> None:
     ways = {"terminal.py": {"stdout", "stderr"}}
     # Rich's consoles are for progress alone: bars, and text that went through `shown`.
-    ways |= {name: {"Console"} for name in ("progress.py", "scan_output.py", "synth.py")}
+    ways |= {name: {"Console"} for name in ("localize_output.py", "progress.py", "scan_output.py", "synth.py")}
     found = {}
     for file in Path(pomona.cli.__file__).parent.glob("*.py"):
         nodes = list(ast.walk(ast.parse(file.read_text())))

@@ -31,6 +31,7 @@ __all__ = [
     "PARQUET_MARK",
     "PICTURE",
     "POSES",
+    "PULLED",
     "RENDERED",
     "REPORT",
     "REPORT_MARK",
@@ -325,6 +326,7 @@ PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "di
 BOXES = Like("a table of boxes", _has_columns("image", "xmin", "ymin", "xmax", "ymax", "score"))
 MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
+PULLED = Like("a pulled map, which takes a name of its own", lambda _: False)
 MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
 PICTURE = Like("a plot", _is_picture)
 POSES = Like("poses in a map", _has_poses)

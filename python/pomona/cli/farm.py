@@ -17,7 +17,7 @@ from pomona.likes import FARM_PLAN
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pomona.farm import FarmPlan, FarmRun, Fate, Step
+    from pomona.farm import FarmPlan, FarmRun, FarmStep, Fate
     from pomona.farm.executor import Executor
     from pomona.farm.farm_plan import Flag, Takes
     from pomona.farm.ledger import Ledger, Line
@@ -175,7 +175,7 @@ def _executor(plan: FarmPlan, ledger: Ledger, workers: int | None, ray: str | No
 def _teller(run: FarmRun, *, json: bool) -> Any:
     """Tell of each step that begins or ends: lines of JSON on the standard output, else lines on the standard error."""
 
-    def tell_of(step: Step, fate: Fate) -> None:
+    def tell_of(step: FarmStep, fate: Fate) -> None:
         reason = run.reasons.get(step.name, "")
         seconds = run.seconds.get(step.name)
         if json:

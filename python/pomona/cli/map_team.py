@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from pomona.cli.terminal import say, say_json
+from pomona.cli.verbs import Writes
+from pomona.likes import PULLED
 
 URL_HELP = "postgresql://USER@HOST:PORT/DATABASE; the password comes from PGPASSWORD, or stands in it."
 
@@ -49,7 +52,9 @@ def map_push(
 def map_pull(
     url: str = typer.Argument(metavar="URL", help=URL_HELP),
     name: str = typer.Argument(metavar="MAP", help="Name of the map there."),
-    output: Path = typer.Option(..., "-o", "--output", help="The map to write (.gpkg), where none is yet."),
+    output: Annotated[Path, Writes(PULLED)] = typer.Option(
+        ..., "-o", "--output", help="The map to write (.gpkg), where none is yet."
+    ),
 ) -> None:
     """Write a map of the team's PostGIS as a file."""
     from pomona.cli.progress import working

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pomona.farm.ledger import Line
 from pomona.farm.step_keys import Keys
-from pomona.farm.steps import Step
+from pomona.farm.steps import FarmStep
 
 __all__ = ["GOOD", "FarmRun", "Fate"]
 
@@ -39,12 +39,12 @@ class FarmRun:
 
     Parameters
     ----------
-    steps : iterable of Step
+    steps : iterable of FarmStep
         All, each behind those that it needs.
 
     Attributes
     ----------
-    steps : dict of str to Step
+    steps : dict of str to FarmStep
         By name, in their order.
     fates : dict of str to Fate
         By name.
@@ -56,7 +56,7 @@ class FarmRun:
         By name, what the steps of this run took.
     """
 
-    def __init__(self, steps: Iterable[Step]) -> None:
+    def __init__(self, steps: Iterable[FarmStep]) -> None:
         self.steps = {step.name: step for step in steps}
         self.fates = dict.fromkeys(self.steps, Fate.waiting)
         self.counts = Counter(self.fates.values())
@@ -73,7 +73,7 @@ class FarmRun:
             self._offer(name)
 
     @classmethod
-    def begin(cls, steps: Iterable[Step], keys: Keys, lines: Mapping[str, Line], folder: Path) -> FarmRun:
+    def begin(cls, steps: Iterable[FarmStep], keys: Keys, lines: Mapping[str, Line], folder: Path) -> FarmRun:
         """Look at what is done, and still there; `folder` is the plan's."""
         run = cls(steps)
         for name, step in run.steps.items():
@@ -106,7 +106,7 @@ class FarmRun:
         elif fate is Fate.waiting:
             self._offer(name)
 
-    def next_ready(self) -> Step | None:
+    def next_ready(self) -> FarmStep | None:
         """Look at the step that can begin next; those behind others come first, so that rows are finished."""
         while self._ready:
             name = self._ready[0][2]

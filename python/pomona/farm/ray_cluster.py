@@ -123,7 +123,7 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError:
-        raise PomonaError("--ray: Ray is not installed: pip install 'pomona[ray]'") from None
+        raise PomonaError("--ray: Ray is not installed: pip install ray") from None
     return ray
 
 

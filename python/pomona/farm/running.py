@@ -15,7 +15,7 @@ from pomona.farm.farm_run import FarmRun, Fate
 from pomona.farm.file_hashes import stamps
 from pomona.farm.ledger import Ledger, Line
 from pomona.farm.step_keys import Keys
-from pomona.farm.steps import Step
+from pomona.farm.steps import FarmStep
 
 __all__ = ["run_farm"]
 
@@ -39,7 +39,7 @@ def run_farm(
     keys: Keys,
     ledger: Ledger,
     executor: Executor,
-    changed: Callable[[Step, Fate], None] = lambda _step, _fate: None,
+    changed: Callable[[FarmStep, Fate], None] = lambda _step, _fate: None,
 ) -> None:
     """Do all that waits in `run`, as much at once as the executor carries.
 
@@ -65,7 +65,7 @@ class _Driver:
         keys: Keys,
         ledger: Ledger,
         executor: Executor,
-        changed: Callable[[Step, Fate], None],
+        changed: Callable[[FarmStep, Fate], None],
     ) -> None:
         self.plan, self.run, self.keys, self.ledger = plan, run, keys, ledger
         self.executor, self.changed = executor, changed
@@ -96,12 +96,12 @@ class _Driver:
             self.executor.start(job)
             self._tell(step, Fate.running)
 
-    def _job(self, step: Step) -> Job:
+    def _job(self, step: FarmStep) -> Job:
         made = {name: self.lines[name].outputs for name in step.needs}
         expected = self.peaks_bytes.get(step.kind) or EXPECTED_BYTES.get(step.kind, OTHER_EXPECTED_BYTES)
         return Job(step.name, step.arguments(made), self.plan.folder, expected)
 
-    def _begin(self, step: Step) -> None:
+    def _begin(self, step: FarmStep) -> None:
         """Note that the step is not done, before anything that it wrote is written anew."""
         before = self.lines.get(step.name)
         settings = self.keys.settings[step.name]
@@ -112,7 +112,7 @@ class _Driver:
         outputs = () if before is None else before.outputs
         self._write(Line(step.name, step.kind, "", settings, outputs))
 
-    def _end(self, step: Step, outcome: Outcome) -> None:
+    def _end(self, step: FarmStep, outcome: Outcome) -> None:
         self.run.seconds[step.name] = outcome.seconds
         if outcome.exit_code is None and self.tries.setdefault(step.name, 1) < TRIES:
             self.tries[step.name] += 1
@@ -142,7 +142,7 @@ class _Driver:
         self._note_peak(step.kind, outcome.peak_bytes)
         self._tell(step, Fate.incomplete if is_incomplete else Fate.done, "; ".join(told))
 
-    def _outputs(self, step: Step, outcome: Outcome) -> tuple[str, ...]:
+    def _outputs(self, step: FarmStep, outcome: Outcome) -> tuple[str, ...]:
         """Name what a step has written, from the plan's folder.
 
         Raises
@@ -164,7 +164,7 @@ class _Driver:
             return tuple(json.loads(outcome.out.splitlines()[-1])["output"])
         return tuple(os.path.relpath(output, self.plan.folder) for output in step.outputs)
 
-    def _remove_others(self, step: Step, outputs: tuple[str, ...]) -> None:
+    def _remove_others(self, step: FarmStep, outputs: tuple[str, ...]) -> None:
         """Remove the parts that an earlier scan of the recording had and this one has not."""
         sessions = (self.plan.results / "sessions").resolve()
         for name in set(self.lines[step.name].outputs) - set(outputs):
@@ -172,7 +172,7 @@ class _Driver:
             if step.kind == "scan" and path.resolve().is_relative_to(sessions):
                 path.unlink(missing_ok=True)
 
-    def _fail(self, step: Step, why: str) -> None:
+    def _fail(self, step: FarmStep, why: str) -> None:
         line = self.lines.get(step.name) or Line(step.name, step.kind, "", self.keys.settings[step.name])
         self._write(replace(line, key="", failure=why))
         self._tell(step, Fate.failed, why)
@@ -184,7 +184,7 @@ class _Driver:
     def _note_peak(self, kind: str, peak_bytes: int) -> None:
         self.peaks_bytes[kind] = max(self.peaks_bytes.get(kind, 0), peak_bytes)
 
-    def _tell(self, step: Step, fate: Fate, reason: str = "") -> None:
+    def _tell(self, step: FarmStep, fate: Fate, reason: str = "") -> None:
         self.run.tell(step.name, fate, reason)
         self.changed(step, fate)
 
@@ -194,7 +194,7 @@ def _last_line(outcome: Outcome) -> str:
     return lines[-1].removeprefix("pomona: ") if lines else f"ended with exit code {outcome.exit_code}"
 
 
-def _told(step: Step, outcome: Outcome) -> tuple[str, ...]:
+def _told(step: FarmStep, outcome: Outcome) -> tuple[str, ...]:
     """Give what a person should know: the verdicts of a map, and warnings."""
     verdicts = [line for line in outcome.out.splitlines() if "not found in the map" in line]
     warned = [line.removeprefix("pomona: ") for line in outcome.err.splitlines() if line.startswith("pomona: warning")]

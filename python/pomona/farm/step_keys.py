@@ -13,7 +13,7 @@ from pomona import __version__
 from pomona.errors import PomonaError
 from pomona.farm.file_hashes import FileHashes, stamps
 from pomona.farm.ledger import Stamp
-from pomona.farm.steps import MadeBy, Step
+from pomona.farm.steps import FarmStep, MadeBy
 
 __all__ = ["Keys", "keys_of"]
 
@@ -41,13 +41,13 @@ class Keys:
 
 
 def keys_of(
-    steps: Iterable[Step], folder: Path, hashes: FileHashes, reading: Callable[[int], None] = lambda _number: None
+    steps: Iterable[FarmStep], folder: Path, hashes: FileHashes, reading: Callable[[int], None] = lambda _number: None
 ) -> Keys:
     """Read the inputs of all steps, which come behind those that they need, and give their keys.
 
     Parameters
     ----------
-    steps : iterable of Step
+    steps : iterable of FarmStep
         As `steps_of` gives them.
     folder : Path
         Of the plan: inputs are named from there, so that a farm may be moved as a whole.

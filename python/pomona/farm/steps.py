@@ -12,7 +12,7 @@ from typing import Literal
 from pomona.farm.farm_plan import FarmPlan
 from pomona.farm.recorded_visits import RecordedVisit
 
-__all__ = ["Kind", "MadeBy", "Step", "steps_of"]
+__all__ = ["FarmStep", "Kind", "MadeBy", "steps_of"]
 
 Kind = Literal["scan", "map", "growth", "report", "export"]
 
@@ -25,7 +25,7 @@ class MadeBy:
 
 
 @dataclass(frozen=True)
-class Step:
+class FarmStep:
     """One thing to do, once.
 
     Attributes
@@ -65,16 +65,16 @@ class Step:
         ]
 
 
-def steps_of(plan: FarmPlan) -> list[Step]:
+def steps_of(plan: FarmPlan) -> list[FarmStep]:
     """Give all steps of a plan, each behind those that it needs, row after row."""
     beside = _Beside(plan.visits)
-    steps: list[Step] = []
+    steps: list[FarmStep] = []
     for row, group in groupby(plan.visits, key=lambda visit: visit.row):
         steps += _of_row(plan, row, list(group), beside)
     return steps
 
 
-def _of_row(plan: FarmPlan, row: str, visits: list[RecordedVisit], beside: _Beside) -> Iterator[Step]:
+def _of_row(plan: FarmPlan, row: str, visits: list[RecordedVisit], beside: _Beside) -> Iterator[FarmStep]:
     scans = {visit: _scan(plan, visit, beside) for visit in visits if visit.needs_scan}
     yield from scans.values()
     mapping = _map(plan, row, visits, scans)
@@ -88,11 +88,11 @@ def _of_row(plan: FarmPlan, row: str, visits: list[RecordedVisit], beside: _Besi
         yield _export(plan, row, orchard, mapping.name, to)
 
 
-def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> Step:
+def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> FarmStep:
     output = plan.results / "sessions" / visit.row / f"{visit.date.replace(':', '')}.gpkg"
     settings = tuple(_filled(flag, plan, visit) for flag in plan.flags["scan"])
     named = ("--name", f"{visit.row} {visit.date}", "--date", visit.date, "--json")
-    return Step(
+    return FarmStep(
         name=f"scan {visit.title}",
         kind="scan",
         row=visit.row,
@@ -112,7 +112,7 @@ def _filled(flag: str, plan: FarmPlan, visit: RecordedVisit) -> str:
     return flag
 
 
-def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[RecordedVisit, Step]) -> Step:
+def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[RecordedVisit, FarmStep]) -> FarmStep:
     orchard = plan.results / "maps" / f"{row}.gpkg"
     add = ("map", "add", _shown(plan, orchard))
     settings = plan.flags["map"]
@@ -124,7 +124,7 @@ def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[R
         if visit not in scans:
             named = ("--name", f"{row} {visit.date}", "--date", visit.date, "--replace")
             commands.append((*add, _shown(plan, visit.path), *named, *settings))
-    return Step(
+    return FarmStep(
         name=f"map {row}",
         kind="map",
         row=row,
@@ -136,7 +136,7 @@ def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[R
     )
 
 
-def _export(plan: FarmPlan, row: str, orchard: str, after: str, to: str) -> Step:
+def _export(plan: FarmPlan, row: str, orchard: str, after: str, to: str) -> FarmStep:
     if to != "parquet-by-date":
         return _from_map(plan, "export", row, orchard, after, plan.results / "export" / f"{row}.{to}", f" {to}")
     # All rows lie in one folder, as analysts open it.
@@ -145,10 +145,10 @@ def _export(plan: FarmPlan, row: str, orchard: str, after: str, to: str) -> Step
     return replace(step, commands=((*words, f"--to={to}"),))
 
 
-def _from_map(plan: FarmPlan, kind: str, row: str, orchard: str, after: str, output: Path, title: str = "") -> Step:
+def _from_map(plan: FarmPlan, kind: str, row: str, orchard: str, after: str, output: Path, title: str = "") -> FarmStep:
     settings = plan.flags[kind]
     verb: Kind = kind  # type: ignore[assignment] # one of them, by the callers above
-    return Step(
+    return FarmStep(
         name=f"{kind} {row}{title}",
         kind=verb,
         row=row,

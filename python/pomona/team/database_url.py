@@ -91,7 +91,7 @@ def connected(database: Database) -> Iterator[Any]:
     try:
         import pg8000.native as pg
     except ImportError:
-        raise PomonaError("the team's store needs pg8000: pip install 'pomona[team]'") from None
+        raise PomonaError("the team's store needs pg8000: pip install pg8000") from None
     socket = database.host if database.host.startswith("/") else None
     try:
         connection = pg.Connection(

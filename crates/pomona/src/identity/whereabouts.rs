@@ -176,7 +176,7 @@ impl<'a> Search<'a> {
     fn grown(&self, guess: &Guess) -> Option<Whereabouts> {
         let middle = single(&self.map[guess.anchor as usize].coords);
         let extent = 2.0 * self.visit.points.iter().fold(0.0f64, |far, point| far.max(point.norm()));
-        let (mut pose, mut reach, mut n_met) = (guess.map_from_visit.clone(), REACH * self.visit.spacing, 0);
+        let (mut pose, mut reach, mut n_met) = (guess.map_from_visit, REACH * self.visit.spacing, 0);
         loop {
             let visit_from_map = pose.inverse();
             let (mut source, mut target) = (Vec::new(), Vec::new());

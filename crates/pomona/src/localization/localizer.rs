@@ -124,7 +124,7 @@ impl Localizer {
         let found = self.believed(&aligned, 0.0)?;
         // What few fruits leave open, the motion tells.
         let both = Belief { pose: aligned.pose, covariance: found, motion: predicted.motion }.joined(predicted);
-        Some(self.answer(&aligned, &sightings, &both, true))
+        Some(Self::answer(&aligned, &sightings, &both, true))
     }
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
@@ -158,7 +158,7 @@ impl Localizer {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
         let belief = Belief { pose: aligned.pose, covariance, motion: None };
-        Ok(self.answer(&aligned, sightings, &belief, false))
+        Ok(Self::answer(&aligned, sightings, &belief, false))
     }
 
     /// Covariance of a pose, if there is enough for it; `chosen_nats` is what the choice among many gains by chance.
@@ -169,7 +169,7 @@ impl Localizer {
         enough.then(|| covariance(aligned, &self.map, self.config.shared_m, self.config.reach_m)).flatten()
     }
 
-    fn answer(&self, aligned: &Aligned, sightings: &[Sighting], belief: &Belief, tracked: bool) -> Localization {
+    fn answer(aligned: &Aligned, sightings: &[Sighting], belief: &Belief, tracked: bool) -> Localization {
         Localization {
             verdict: if belief.sigma_m() < LOST_M { Verdict::Found } else { Verdict::TooFew },
             pose: Some(belief.pose),
