@@ -103,7 +103,7 @@ def take_out(connection: sqlite3.Connection, name: str) -> bool:
     if len(ids) > 1:
         _remove(connection, name, ids[names.index(name)], dry=False)
         return True
-    for part in (*PARTS, "DELETE FROM sessions WHERE id = :session", "DELETE FROM fruits"):
+    for part in (*PARTS, "DELETE FROM fruits", "DELETE FROM sessions"):
         connection.execute(part, {"session": ids[0]})
     return False
 
