@@ -63,6 +63,8 @@ def test_recordings_are_found_by_their_names(tmp_path, names, pattern, expected)
     [
         (["row1/2024-08-09.mp4", "row2/2024-08-09.mp4"], "{row}/{date}.mp4"),
         (["2024-08-09/row1.mp4", "2024-08-28/row1.mp4", "2024-08-28/calibration.json"], "{date}/{row}.mp4"),
+        (["2024-08-09/row1.mp4", "2024-08-09/boxes.csv", "2024-08-09/fruits.csv"], "{date}/{row}.mp4"),
+        (["row1/2024-08-09.csv", "row2/2024-08-09.csv"], "{row}/{date}.csv"),
         (["row1_2024-08-09.svo2", "row1_2024-08-28.svo2"], "{row}_{date}.svo2"),
         (["2024-08-09 north.mp4"], "{date} {row}.mp4"),
         (["row1/2024-08-09/left/0000.png", "row1/2024-08-28/left/0000.png"], "{row}/{date}"),

@@ -18,6 +18,7 @@ __all__ = [
     "__version__",
     "adjust",
     "believed",
+    "contracted",
     "default_config",
     "describe",
     "exposure_gains",
@@ -31,6 +32,7 @@ __all__ = [
     "row_alignment",
     "row_reach_px",
     "setting_meanings",
+    "whereabouts",
 ]
 
 MOST_MISALIGNED: tuple[float, float]

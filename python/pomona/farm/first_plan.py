@@ -12,8 +12,8 @@ __all__ = ["first_plan", "guessed_pattern"]
 
 DATE = re.compile(r"\d{4}-?\d{2}-?\d{2}(?:[T_]\d{2}[:-]?\d{2}(?:[:-]?\d{2})?)?")
 
-SUFFIXES = (".mp4", ".mkv", ".avi", ".mov", ".svo2", ".mcap", ".bag", ".gpkg", ".csv", ".ply")
-"""Of recordings that are one file, the likeliest first."""
+KINDS = ((".mp4", ".mkv", ".avi", ".mov", ".svo2", ".mcap", ".bag"), ("",), (".gpkg",), (".csv", ".ply"))
+"""Suffixes of what may be a recording, the likeliest first; a folder has none. Tables often lie beside recordings."""
 
 DEPTHS = (2, 1, 3)
 """Folders and file that row and date may be the names of."""
@@ -78,12 +78,13 @@ def guessed_pattern(folder: Path) -> str:
     for depth in DEPTHS:
         for path in folder.glob("/".join(["*"] * depth)):
             parts = path.relative_to(folder).parts
-            is_recording = path.suffix.lower() in SUFFIXES or path.is_dir()
+            suffix = path.suffix if path.is_file() else ""
+            is_recording = path.is_dir() or any(suffix and suffix.lower() in kind for kind in KINDS)
             if is_recording and not any(part.startswith(".") for part in parts):
-                for pattern in _patterns(parts, path.suffix if path.is_file() else ""):
+                for pattern in _patterns(parts, suffix):
                     counts[pattern] = counts.get(pattern, 0) + 1
     working = []
-    for pattern in sorted(counts, key=lambda one: (-_is_file(one), -counts[one], len(one))):
+    for pattern in sorted(counts, key=lambda one: (_rank(one), -counts[one], len(one))):
         try:
             visits_by_pattern("", folder, pattern)
         except PomonaError:
@@ -96,8 +97,10 @@ def guessed_pattern(folder: Path) -> str:
     return working[0]
 
 
-def _is_file(pattern: str) -> bool:
-    return pattern.lower().endswith(SUFFIXES)
+def _rank(pattern: str) -> int:
+    """Place of a pattern's kind of recording among the kinds."""
+    last = pattern.rpartition("}")[2].lower()
+    return next((rank for rank, kind in enumerate(KINDS) if last and last.endswith(kind) and "" not in kind), 1)
 
 
 def _patterns(parts: tuple[str, ...], suffix: str) -> list[str]:
