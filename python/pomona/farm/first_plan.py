@@ -41,6 +41,7 @@ skip = []                   # recordings to leave out, as "row 3/2024-08-09"
 # harvest = "2024-09-25"
 
 [report]
+# harvest = "2024-09-25"
 
 [export]
 to = ["csv"]
