@@ -226,6 +226,7 @@ def test_a_password_is_shown_nowhere(server, row):
         assert refused.returncode == 2
         assert refused.stderr.count("\n") == 1
         assert "hunter2" not in refused.stderr + refused.stdout
+    assert "127.0.0.1:1/orchards: nothing answers there" in push(row, wrong[1]).stderr
     fine = subprocess.run(
         [
             sys.executable,

@@ -151,4 +151,6 @@ def _line(error: Exception, database: Database) -> str:
     said = error.args[0] if error.args else error
     text = str(said.get("M", said)) if isinstance(said, dict) else str(said)
     text = " ".join(text.split()) or type(error).__name__
+    if text.startswith("Can't create a connection"):
+        text = "nothing answers there"
     return text.replace(database.password, "***") if database.password else text
