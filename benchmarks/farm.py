@@ -1,6 +1,7 @@
 """What a farm's run costs: real rows on one and two workers, and the run itself over rows that are only simulated.
 
-`python -m benchmarks farm` writes results/farm.md. `--rows 60 --visits 4` are cloud sessions drawn for the purpose;
+`python -m benchmarks farm` writes results/farm.md. `--rows 60 --visits 4` are sessions drawn for the purpose, none
+with `--rows 0`;
 `--scale 100,1000,10000` are rows of a season of eight visits whose steps take the time, and give the bytes, that were
 measured, on an executor that lets time pass without work. The scheduler, the plan and the ledger are the real ones.
 """
@@ -83,10 +84,12 @@ def main(options: list[str]) -> None:
     parser.add_argument("--visits", type=int, default=4)
     parser.add_argument("--scale", default="100,1000,10000")
     chosen = parser.parse_args(options)
-    with tempfile.TemporaryDirectory() as folder:
-        real = _real(Path(folder), chosen.rows, chosen.visits)
+    real_table = ""
+    if chosen.rows:
+        with tempfile.TemporaryDirectory() as folder:
+            real_table = _real_table(_real(Path(folder), chosen.rows, chosen.visits), chosen.rows, chosen.visits) + "\n"
     scale = [_simulated(int(rows)) for rows in chosen.scale.split(",")]
-    write_text("farm.md", f"# Farms\n\n{_real_table(real, chosen.rows, chosen.visits)}\n{_scale_table(scale)}")
+    write_text("farm.md", f"# Farms\n\n{real_table}{_scale_table(scale)}")
 
 
 def _real(folder: Path, rows: int, visits: int) -> dict[int, float]:

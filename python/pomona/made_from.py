@@ -48,4 +48,5 @@ def _require_same(note: Path, ours: str) -> None:
     odd = next((name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name)), None)
     if odd is not None:
         there, wanted = shown(found.get(odd)), shown(expected.get(odd))
-        raise PomonaError(f"{note}: {odd}: found {there}, expected {wanted}: remove the folder or take another")
+        name = odd if odd in expected else shown(odd)  # theirs may be of any length
+        raise PomonaError(f"{note}: {name}: found {there}, expected {wanted}: remove the folder or take another")
