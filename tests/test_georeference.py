@@ -243,7 +243,8 @@ def test_gdal_reads_exports_on_earth(anchored_orchard: Path, suffix: str) -> Non
 def test_duckdb_reads_geoparquet_on_earth(anchored_orchard: Path) -> None:
     path = anchored_orchard.with_name("fruits.parquet")
     assert run("export", anchored_orchard, "-o", path).returncode == 0
-    (geo,) = duckdb.sql(f"SELECT value FROM parquet_kv_metadata('{path}') WHERE key = 'geo'").fetchall()[0]
+    with duckdb.connect() as connection:
+        ((geo,),) = connection.sql(f"SELECT value FROM parquet_kv_metadata('{path}') WHERE key = 'geo'").fetchall()
     column = json.loads(bytes(geo))["columns"]["geometry"]
     # Without a name the system is OGC:CRS84, longitude and latitude.
     assert "crs" not in column

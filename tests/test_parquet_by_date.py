@@ -34,7 +34,8 @@ def export(orchard: Path, folder: Path, *flags: str) -> subprocess.CompletedProc
 def read(folder: Path) -> list[tuple[object, ...]]:
     query = f"""SELECT row, CAST(date AS VARCHAR), fruit, geometry, diameter_m, probability
     FROM read_parquet('{folder}/**/*.parquet', hive_partitioning = true) ORDER BY date, fruit"""
-    return duckdb.sql(query).fetchall()
+    with duckdb.connect() as connection:
+        return connection.sql(query).fetchall()
 
 
 def test_duckdb_reads_what_the_map_holds(orchard, tmp_path):
