@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import numpy as np
@@ -22,12 +21,9 @@ from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.depth import Lifted
 from pomona.survey.pose_source import PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
-from pomona.survey.seeing import Look, Seeing
+from pomona.survey.seeing import Seeing, looked_ahead
 
 __all__ = ["Moving", "cloud_of", "localize"]
-
-LOOKS_AHEAD = 2
-"""Frames that are looked at before the camera is followed to them: neither waits for an uneven other."""
 
 Progress = Callable[[int, int], None]
 """Called after each frame with frames done and frames found."""
@@ -80,7 +76,7 @@ def localize(
     skipped: dict[int, str] = {}
     frames = prefetched(recording.frames(), seeing.needs if camera is None else (*seeing.needs, *camera.needs))
     with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
-        for frame, coming in _looked_at(frames, seeing, looker):
+        for frame, coming in looked_ahead(frames, seeing, looker):
             moved = None if camera is None else camera(frame)
             look = coming.result()
             if look.unusable is not None:
@@ -103,18 +99,6 @@ def cloud_of(lifted: Lifted) -> FruitCloud:
     return FruitCloud(
         positions=lifted.centres_in_camera, covariances=lifted.covariances, diameters_m=lifted.diameters_m
     )
-
-
-def _looked_at(
-    frames: Iterable[Frame], look_at: Callable[[Frame], Look], looker: Executor
-) -> Iterator[tuple[Frame, Future[Look]]]:
-    """Give each frame and its look, which another thread takes; those of the next frames are begun already."""
-    begun: deque[tuple[Frame, Future[Look]]] = deque()
-    for frame in frames:
-        begun.append((frame, looker.submit(look_at, frame)))
-        if len(begun) > LOOKS_AHEAD:
-            yield begun.popleft()
-    yield from begun
 
 
 class Moving:

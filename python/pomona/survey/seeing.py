@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -18,7 +21,10 @@ from pomona.stereo import open_stereo
 from pomona.survey.depth import Lifted, lift
 from pomona.survey.prefetch import Kind
 
-__all__ = ["Look", "Seeing"]
+__all__ = ["Look", "Seeing", "looked_ahead"]
+
+LOOKS_AHEAD = 2
+"""Frames that are looked at before the camera is followed to them: neither waits for an uneven other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,3 +165,15 @@ class _FromStereo:
             raise PomonaError(f"frame {frame.number}: found one picture, expected left and right")
         found = self._measure(frame.read_left(), frame.read_right(), boxes_px)
         return lift(found, boxes_px, self._calibration)
+
+
+def looked_ahead(
+    frames: Iterable[Frame], look_at: Callable[[Frame], Look], looker: Executor
+) -> Iterator[tuple[Frame, Future[Look]]]:
+    """Give each frame and its look, which another thread takes; those of the next frames are begun already."""
+    begun: deque[tuple[Frame, Future[Look]]] = deque()
+    for frame in frames:
+        begun.append((frame, looker.submit(look_at, frame)))
+        if len(begun) > LOOKS_AHEAD:
+            yield begun.popleft()
+    yield from begun

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -32,7 +32,7 @@ from pomona.survey.pose_check import check_poses
 from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
-from pomona.survey.seeing import Look, Seeing
+from pomona.survey.seeing import Look, Seeing, looked_ahead
 from pomona.survey.tally import BoxFate, Tally, tell_little
 from pomona.survey.tracking import Tracker
 from pomona.trajectory import Trajectory
@@ -41,9 +41,6 @@ __all__ = ["Progress", "Survey", "scan"]
 
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
-
-LOOKS_AHEAD = 2
-"""Frames that are looked at before the camera is followed to them: neither waits for an uneven other."""
 
 SMALLEST_MEDIAN_M = 0.01
 """Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm. Single fruits may be smaller."""
@@ -167,7 +164,7 @@ def scan(
     look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
     with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
-        for done, (frame, look) in enumerate(_looked_at(frames, look_at, looker), start=1):
+        for done, (frame, look) in enumerate(looked_ahead(frames, look_at, looker), start=1):
             findings.add(frame, _placed(camera, frame), look)
             if progress is not None:
                 progress(done, len(recording), findings.n_fruits)
@@ -184,18 +181,6 @@ def scan(
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
     return survey
-
-
-def _looked_at(
-    frames: Iterable[Frame], look_at: Callable[[Frame], Look], looker: Executor
-) -> Iterator[tuple[Frame, Future[Look]]]:
-    """Give each frame and its look, which another thread takes; those of the next frames are begun already."""
-    begun: deque[tuple[Frame, Future[Look]]] = deque()
-    for frame in frames:
-        begun.append((frame, looker.submit(look_at, frame)))
-        if len(begun) > LOOKS_AHEAD:
-            yield begun.popleft()
-    yield from begun
 
 
 def _placed(camera: PoseSource, frame: Frame) -> Place:
