@@ -20,6 +20,7 @@ import pytest
 from pomona.store.schema import LAYERS
 from pomona.synth.seasons import SEASONS, draw_season
 from pomona.synth.seasons.season_files import write_season
+from test_orchard_safety import on_a_small_disk
 
 PLAN = """results = "results"
 [recordings]
@@ -234,6 +235,61 @@ def test_two_runs_at_once_are_told_apart(farm):
     assert "another run is working on this farm" in second.stderr
     assert json.loads(status.stdout)["running"] is True
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize("kibibytes", [60, 600])
+def test_a_full_disk_stops_what_needs_it_and_room_lets_it_go_on(farm, tmp_path_factory, kibibytes):
+    undisturbed = tmp_path_factory.mktemp("undisturbed") / "farm"
+    shutil.copytree(farm, undisturbed)
+    run(undisturbed)
+    disk = farm / "results"
+    disk.mkdir()
+    go = shlex.join(command("run", "farm.toml"))
+    on_a_small_disk(
+        disk,
+        kibibytes * 1024,
+        f"cd '{farm}'",
+        f"{{ {go} >full.out 2>full.err; echo $? >full.code; }}",
+        f"mount -o remount,size=20m '{disk}'",
+        f"{go} >room.out 2>room.err",
+        f"cp -r '{disk}' '{farm}/rescued'",
+    )
+    said = (farm / "full.out").read_text() + (farm / "full.err").read_text()
+    assert (farm / "full.code").read_text().strip() in ("1", "2")
+    assert "disk is full" in said
+    assert "Traceback" not in said
+    disk.rmdir()
+    (farm / "rescued").rename(disk)
+    assert content(farm) == content(undisturbed)
+
+
+@pytest.fixture
+def cluster():
+    """Two machines of a core each."""
+    pytest.importorskip("ray", reason="Ray is not installed: pip install ray")
+    from ray.cluster_utils import Cluster
+
+    machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    yield machines, machines.add_node(num_cpus=1)
+    machines.shutdown()
+
+
+def test_a_cluster_gives_what_one_machine_gives_though_a_node_dies(farm, tmp_path_factory, cluster):
+    machines, second = cluster
+    undisturbed = tmp_path_factory.mktemp("undisturbed") / "farm"
+    shutil.copytree(farm, undisturbed)
+    run(undisturbed, "--workers", "1")
+    with going(farm, "--ray", machines.address) as process:
+        lines = []
+        for line in process.stdout:
+            lines.append(json.loads(line))
+            if len(begun(lines)) == 2 and second is not None:
+                machines.remove_node(second, allow_graceful=False)
+                second = None
+    assert process.returncode == 0
+    assert begun(lines) == ALL
+    assert second is None
+    assert content(farm) == content(undisturbed)
 
 
 @pytest.mark.parametrize(

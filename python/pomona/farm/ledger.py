@@ -162,6 +162,8 @@ class Ledger:
         except OSError as error:
             raise PomonaError(f"{self.folder}: cannot be written: {error.strerror}") from None
         except sqlite3.Error as error:
+            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
+                raise PomonaError(f"{self.folder / 'ledger.sqlite'}: the disk is full") from None
             raise PomonaError(
                 f"{self.folder / 'ledger.sqlite'}: {error}; without the file all steps are done anew"
             ) from None

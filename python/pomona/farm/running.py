@@ -19,7 +19,7 @@ from pomona.farm.steps import FarmStep
 
 __all__ = ["run_farm"]
 
-TRIES = 3
+TRIES = 5
 """How often a step is begun whose process, or machine, is lost; one that says what is wrong is not tried again."""
 
 EXPECTED_BYTES = {"scan": 1500 << 20}
