@@ -114,6 +114,34 @@ def test_what_is_done_is_never_done_again_and_what_changes_redoes_what_follows_f
     assert begun(run(farm)) == {"export a csv"}
     (farm / "farm.toml").write_text(PLAN + "observations = true\n")
     assert begun(run(farm)) == {f"export {row} csv" for row in ROWS}
+    for row in ROWS:
+        (farm / "results" / "export" / f"{row}.csv").write_text("")  # an emptied output is none
+    assert begun(run(farm)) == {f"export {row} csv" for row in ROWS}
+    assert not list(farm.glob("results/maps/*.before-*"))
+
+
+def test_a_recording_that_is_no_longer_in_the_plan_stays_in_its_map(farm):
+    run(farm)
+    sessions = content(farm)["a.gpkg"]["sessions"]
+    visit_of(farm, "a", 0).unlink()
+    assert begun(run(farm)) == {"map a", "export a csv"}
+    assert content(farm)["a.gpkg"]["sessions"] == sessions
+    assert sorted(path.name for path in (farm / "results" / "maps").iterdir()) == ["a.gpkg", "b.gpkg"]
+
+
+def test_what_only_looks_writes_nothing(farm):
+    for words in (("run", "farm.toml", "--dry-run"), ("status", "farm.toml")):
+        subprocess.run(command(*words), cwd=farm, capture_output=True, check=True)
+        assert not (farm / "results").exists()
+    run(farm)
+    before = sorted((path, path.stat().st_mtime_ns) for path in farm.rglob("*"))
+    looked = [
+        subprocess.run(command(*words), cwd=farm, capture_output=True, text=True, check=True).stdout
+        for words in (("run", "farm.toml", "--dry-run"), ("status", "farm.toml"))
+    ]
+    assert "pomona" not in looked[0]
+    assert "4 kept" in looked[1]
+    assert sorted((path, path.stat().st_mtime_ns) for path in farm.rglob("*")) == before
 
 
 def test_a_farm_may_be_moved_and_made_by_hand(farm):

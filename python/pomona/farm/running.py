@@ -12,7 +12,7 @@ from pomona.errors import PomonaError
 from pomona.farm.executor import Executor, Job, Outcome
 from pomona.farm.farm_plan import FarmPlan
 from pomona.farm.farm_run import FarmRun, Fate
-from pomona.farm.file_hashes import stamps
+from pomona.farm.file_hashes import is_there, stamps
 from pomona.farm.ledger import Ledger, Line
 from pomona.farm.step_keys import Keys
 from pomona.farm.steps import FarmStep
@@ -158,7 +158,7 @@ class _Driver:
         if stamps(step.inputs) != self.keys.stamps[step.name]:
             raise PomonaError("its input changed while it was read, expected a recording that has ended")
         for output in step.outputs:
-            if not output.exists():
+            if not is_there(output):
                 raise PomonaError(f"{output}: was not written; {_last_line(outcome)}")
         if step.kind == "scan":
             return tuple(json.loads(outcome.out.splitlines()[-1])["output"])
