@@ -1,208 +1,123 @@
-"""What a farm's run costs: real rows on one and two workers, and the run itself over rows that are only simulated.
+"""What a farm's run costs, and that nothing is lost: on workers, on a cluster, with kills, and simulated at scale.
 
-`python -m benchmarks farm` writes results/farm.md. `--rows 60 --visits 4` are sessions drawn for the purpose, none
-with `--rows 0`;
-`--scale 100,1000,10000` are rows of a season of eight visits whose steps take the time, and give the bytes, that were
-measured, on an executor that lets time pass without work. The scheduler, the plan and the ledger are the real ones.
+`python -m benchmarks farm` writes results/farm.md; `--parts rows,recordings,killed,cluster,scale` only these parts of
+it, and the others stay. `rows` are drawn sessions, `--rows 60 --visits 4`; `recordings` the shipped ones as those of
+four rows; `killed` the drawn ones while 20 workers and 5 runs are killed; `cluster` the drawn ones on Ray, if it is
+installed; `scale` rows of a season of eight visits whose steps take the time, and give the bytes, that were measured,
+on an executor that lets time pass without work: the scheduler, the plan and the ledger are the real ones.
 """
 
 from __future__ import annotations
 
 import argparse
-import heapq
-import json
-import os
-import resource
-import shutil
-import subprocess
-import sys
 import tempfile
-import time
-from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.results import markdown, write_text
-from pomona.farm import FarmPlan, FarmRun, run_farm, steps_of
-from pomona.farm.executor import Job, Outcome
-from pomona.farm.ledger import Ledger
-from pomona.farm.recorded_visits import RecordedVisit
-from pomona.farm.step_keys import Keys
-from pomona.synth.seasons import SEASONS, draw_season
-from pomona.synth.seasons.season_files import write_season
+from benchmarks.farm_cluster import cluster_of
+from benchmarks.farm_runs import Run, copy_recordings, draw_rows, run_afresh, run_and_kill, run_with_killed_workers
+from benchmarks.farm_scale import scale_table, simulated_season
+from benchmarks.results import FOLDER, markdown, write_text
 
-PLAN = """results = "results"
-[recordings]
-folder = "rec"
-pattern = "{row}/{date}.csv"
-[map]
-[export]
-to = ["csv"]
-"""
-
-SECONDS = {"scan": 60.0, "map": 4.0, "growth": 6.0, "report": 3.0, "export": 1.0}
-"""Of a step, one core: a scan of 90 s of video, and what follows from eight visits to five trees."""
-
-MEGABYTES = {"scan": 2.0, "map": 6.0, "growth": 0.5, "report": 1.0, "export": 0.1}
-"""That a step writes."""
-
-VIDEO_MEGABYTES = 400.0
-"""That a scan reads: 90 s of stereo video at 1280x720, compressed."""
-
-DAYS = [f"2026-{month:02d}-{day:02d}" for month in (6, 7, 8, 9) for day in (1, 15)]
-
-
-class VirtualWorkers:
-    """An executor whose jobs take their time and nothing else."""
-
-    def __init__(self, workers: int, kinds: dict[str, str]) -> None:
-        self.workers, self.kinds, self.now_s = workers, kinds, 0.0
-        self.running: list[tuple[float, str]] = []
-
-    def has_room(self, job: Job) -> bool:
-        """Tell whether a worker is free."""
-        del job
-        return len(self.running) < self.workers
-
-    def start(self, job: Job) -> None:
-        """Begin a job."""
-        heapq.heappush(self.running, (self.now_s + SECONDS[self.kinds[job.step]], job.step))
-
-    def wait(self) -> list[Outcome]:
-        """Let time pass until the next job ends."""
-        self.now_s, step = heapq.heappop(self.running)
-        said = json.dumps({"output": []}) if self.kinds[step] == "scan" else ""
-        return [Outcome(step, 0, said, "", SECONDS[self.kinds[step]], 500 << 20)]
-
-    def stop(self) -> None:
-        """Forget the rest."""
-        self.running = []
+TITLES = {
+    "rows": "## Drawn rows",
+    "recordings": "## Recordings",
+    "killed": "## Kills",
+    "cluster": "## A cluster",
+    "scale": "## Ten thousand rows",
+}
+RECORDED_ROWS = 4
+KILLED_WORKERS, KILLED_RUNS = 20, 5
 
 
 def main(options: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks farm", description=__doc__)
+    parser.add_argument("--parts", default=",".join(TITLES))
     parser.add_argument("--rows", type=int, default=60)
     parser.add_argument("--visits", type=int, default=4)
     parser.add_argument("--scale", default="100,1000,10000")
     chosen = parser.parse_args(options)
-    real_table = ""
-    if chosen.rows:
-        with tempfile.TemporaryDirectory() as folder:
-            real_table = _real_table(_real(Path(folder), chosen.rows, chosen.visits), chosen.rows, chosen.visits) + "\n"
-    scale = [_simulated(int(rows)) for rows in chosen.scale.split(",")]
-    write_text("farm.md", f"# Farms\n\n{real_table}{_scale_table(scale)}")
-
-
-def _real(folder: Path, rows: int, visits: int) -> dict[int, float]:
-    """Run the same rows on one core and on two, and require the same results."""
-    easy = SEASONS["easy"]
-    plan = replace(easy, n_visits=visits, design=replace(easy.design, n_trees=3, fruits_per_tree=(40, 50)))
-    for row in range(rows):
-        write_season(draw_season(plan, row), folder / "drawn")
-        (folder / "rec" / f"{row:02d}").mkdir(parents=True)
-        for visit in (folder / "drawn").glob("2*.csv"):
-            shutil.copy(visit, folder / "rec" / f"{row:02d}")
-        shutil.rmtree(folder / "drawn")
-    (folder / "farm.toml").write_text(PLAN, encoding="utf-8")
-    seconds, made = {}, {}
-    for workers in (1, 2):
-        shutil.rmtree(folder / "results", ignore_errors=True)
-        command = [sys.executable, "-m", "pomona", "farm", "run", "farm.toml", "--workers", str(workers)]
-        begun = time.monotonic()
-        usable = sorted(os.sched_getaffinity(0))[:workers]
-        with subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            os.sched_setaffinity(process.pid, usable)
-        if process.returncode:
-            raise SystemExit(f"the run ended with exit code {process.returncode}")
-        seconds[workers] = time.monotonic() - begun
-        made[workers] = {path.name: path.read_bytes() for path in (folder / "results" / "export").iterdir()}
-    if made[1] != made[2]:
-        raise SystemExit("one worker and two made different results")
-    return seconds
-
-
-def _simulated(rows: int) -> dict[str, float]:
-    """Run a season of rows that are not there."""
+    parts = chosen.parts.split(",")
     with tempfile.TemporaryDirectory() as folder:
-        root = Path(folder)
-        (root / "rec").mkdir()
-        visits = tuple(
-            RecordedVisit(f"{row:05d}", day, root / "rec" / f"{row:05d}" / day) for row in range(rows) for day in DAYS
-        )
-        for row in range(rows):
-            (root / "rec" / f"{row:05d}").mkdir()
-        verbs = ("scan", "map", "growth", "report", "export")
-        plan = FarmPlan(
-            root / "farm.toml", root / "results", visits, dict.fromkeys(verbs, ()), dict.fromkeys(verbs, ()), ("csv",)
-        )
-        begun_s = _cpu_s()
-        steps = [replace(step, inputs=(), outputs=()) for step in steps_of(plan)]
-        keys = Keys({step.name: step.name for step in steps}, {step.name: "" for step in steps})
-        keys.stamps = {step.name: {} for step in steps}
-        ledger = Ledger(plan.results / ".farm")
-        run = FarmRun.begin(steps, keys, ledger.read(), root)
-        planned_s = _cpu_s() - begun_s
-        kinds = {step.name: step.kind for step in steps}
-        workers = max(1, rows // 10)
-        executor, begun_s, wall_s = VirtualWorkers(workers, kinds), _cpu_s(), time.monotonic()
-        run_farm(plan, run, keys, ledger, executor)
-        size = sum(path.stat().st_size for path in (plan.results / ".farm").iterdir() if path.is_file())
-        work_s = sum(SECONDS[kind] for kind in kinds.values())
-        megabytes = sum(MEGABYTES[kind] + VIDEO_MEGABYTES * (kind == "scan") for kind in kinds.values())
-        return {
-            "rows": rows,
-            "steps": len(steps),
-            "workers": workers,
-            "hours": executor.now_s / 3600,
-            "busy": work_s / (workers * executor.now_s),
-            "plan_s": planned_s,
-            "step_ms": 1000 * (_cpu_s() - begun_s) / len(steps),
-            "rate": len(steps) / (time.monotonic() - wall_s),
-            "ledger_mb": size / 1e6,
-            "network": megabytes / executor.now_s,
-        }
+        drawn = Path(folder) / "drawn"
+        if {"rows", "killed", "cluster"} & set(parts):
+            draw_rows(drawn, chosen.rows, chosen.visits)
+            alone = run_afresh(drawn, "--workers", "1", cores=1)
+        what = f"{chosen.rows} rows of {chosen.visits} visits: map and export of each, a process a step. "
+        if "rows" in parts:
+            _write("rows", what + _speeds({"1 worker": alone, "2 workers": _two(drawn)}))
+        if "killed" in parts:
+            _write("killed", what + _kills(drawn, alone))
+        if "cluster" in parts:
+            _write("cluster", what + _on_cluster(drawn, alone))
+        if "recordings" in parts:
+            _write("recordings", _recordings(Path(folder) / "recorded"))
+    if "scale" in parts:
+        _write("scale", scale_table([simulated_season(int(rows)) for rows in chosen.scale.split(",")]))
 
 
-def _cpu_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
+def _write(part: str, text: str) -> None:
+    """Put a part into the results, where the others stay as they are."""
+    told = _told_before() | {part: text}
+    sections = [f"{TITLES[name]}\n\n{told[name].strip()}\n" for name in TITLES if name in told]
+    write_text("farm.md", "\n".join(["# Farms\n", *sections]))
 
 
-def _real_table(seconds: dict[int, float], rows: int, visits: int) -> str:
-    told = f"{rows} rows of {visits} visits: map and export of each, a process a step, a core a worker. "
-    told += "Both runs made the same files, byte by byte.\n\n"
+def _told_before() -> dict[str, str]:
+    """Read what the last run told of each part."""
+    path = FOLDER / "farm.md"
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    told = {}
+    for part, title in TITLES.items():
+        _, found, rest = text.partition(f"{title}\n")
+        if found:
+            told[part] = rest.partition("\n## ")[0]
+    return told
+
+
+def _two(folder: Path) -> Run:
+    return run_afresh(folder, "--workers", "2", cores=2)
+
+
+def _recordings(folder: Path) -> str:
+    copy_recordings(folder, RECORDED_ROWS)
+    runs = {"1 worker": run_afresh(folder, "--workers", "1", cores=1), "2 workers": _two(folder)}
+    return f"The three shipped recordings as those of {RECORDED_ROWS} rows: scan, map and export. " + _speeds(runs)
+
+
+def _on_cluster(folder: Path, alone: Run) -> str:
+    runs = {"1 worker": alone}
+    for nodes, name in ((1, "Ray, 1 node"), (2, "Ray, 2 nodes")):
+        with cluster_of(nodes) as address:
+            runs[name] = run_afresh(folder, "--ray", address, cores=nodes)
+    return _speeds(runs)
+
+
+def _speeds(runs: dict[str, Run]) -> str:
+    """Compare runs that must have made the same with the first of them."""
+    first = next(iter(runs.values()))
+    for name, run in runs.items():
+        _require_same(name, first, run)
     lines = [
-        (str(workers), f"{took:.0f}", f"{3600 * rows / took:.0f}", f"{seconds[1] / took:.2f}")
-        for workers, took in seconds.items()
+        (name, f"{run.seconds:.0f}", f"{3600 * run.n_steps / run.seconds:.0f}", f"{first.seconds / run.seconds:.2f}")
+        for name, run in runs.items()
     ]
-    return told + markdown(("workers", "seconds", "rows an hour", "ratio"), lines)
+    same = "All made the same: exports byte by byte, maps row by row.\n\n"
+    return same + markdown(("on", "seconds", "steps an hour", "ratio"), lines)
 
 
-SCALE_HEADER = (
-    "rows", "steps", "workers", "hours", "workers busy", "planning, CPU s", "scheduling, CPU ms a step",
-    "steps a second", "ledger, MB", "network, MB/s",
-)  # fmt: skip
+def _kills(folder: Path, alone: Run) -> str:
+    by_worker = run_with_killed_workers(folder, 1, KILLED_WORKERS)
+    by_run = run_and_kill(folder, 2, KILLED_RUNS)
+    lines = []
+    for name, run in (("workers", by_worker), ("runs", by_run)):
+        _require_same(name, alone, run)
+        lines.append((name, str(KILLED_WORKERS if run is by_worker else KILLED_RUNS), str(run.begun - run.n_steps)))
+    told = "On two workers. All made the same as one worker whom nobody disturbed: exports byte by byte, maps row by "
+    told += "row. Nothing that was done was done again.\n\n"
+    return told + markdown(("killed", "times", "steps begun again"), lines)
 
 
-def _scale_table(scale: list[dict[str, float]]) -> str:
-    took = ", ".join(f"{kind} {seconds:g} s" for kind, seconds in SECONDS.items())
-    told = (
-        f"A season of {len(DAYS)} visits, simulated: plan, scheduler and ledger are real, steps only take their time "
-    )
-    told += f"({took}), on one worker for ten rows. Steps a second: what one run can schedule. Network: "
-    told += f"{VIDEO_MEGABYTES:g} MB of video a scan, and what is written.\n\n"
-    lines = [
-        (
-            f"{one['rows']:,.0f}",
-            f"{one['steps']:,.0f}",
-            f"{one['workers']:,.0f}",
-            f"{one['hours']:.1f}",
-            f"{one['busy']:.2f}",
-            f"{one['plan_s']:.1f}",
-            f"{one['step_ms']:.2f}",
-            f"{one['rate']:,.0f}",
-            f"{one['ledger_mb']:.0f}",
-            f"{one['network']:,.0f}",
-        )
-        for one in scale
-    ]
-    return told + markdown(SCALE_HEADER, lines)
+def _require_same(name: str, first: Run, run: Run) -> None:
+    if run.made != first.made:
+        different = sorted(key for key in first.made | run.made if first.made.get(key) != run.made.get(key))
+        raise SystemExit(f"{name}: made other results: {', '.join(different)}")

@@ -52,6 +52,15 @@ def test_every_frame_of_another_date_is_found(tmp_path, drive, mode):
         assert np.linalg.eigvalsh(row["covariance"]).min() > 0
 
 
+@pytest.mark.parametrize(("in_camera", "statuses"), [("0,-1,0", {"Found": 4}), ("0,1,0", {"NoMatch": 4})])
+def test_the_vertical_leaves_only_poses_that_have_it(tmp_path, drive, in_camera, statuses):
+    """Where it is right nothing is lost; told upside down it rules out the true pose, and there is no other."""
+    in_map = true_poses()[10][:3, :3] @ (0, -1, 0)
+    up = ("--up", in_camera, "--up", ",".join(f"{value:.4f}" for value in in_map))
+    done = localize(MAP, *drive, "--single", "-o", tmp_path / "poses.tum", "--json", *up)
+    assert json.loads(done.stdout)["statuses"] == statuses
+
+
 def test_poses_go_to_the_standard_output_and_the_summary_does_not(drive):
     done = localize(MAP, *drive, "--single", "-o", "-")
     assert done.returncode == 0

@@ -1,6 +1,7 @@
 """What a plan of a farm may say, and what recordings it finds."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -103,7 +104,7 @@ def test_names_that_no_season_can_have_are_refused(tmp_path, names, pattern, tol
         ("row,date,recording\n../a,2024-08-09,a.mp4\n", "line 2: row: found '../a'"),
         ("row,date,recording\na,yesterday,a.mp4\n", "line 2: date: found 'yesterday'"),
         ("row,date,recording\n", "has no line"),
-        ("row,date,recording\na,2024-08-09\n", "line 2: recording: '' is not there"),
+        ("row,date,recording\na,2024-08-09\n", "line 2: found 2 cells, expected 3"),
     ],
 )
 def test_a_wrong_table_is_told_by_its_line(tmp_path, lines, told):
@@ -178,3 +179,63 @@ def test_a_first_plan_is_written_for_what_is_there_and_is_a_plan(tmp_path):
     )
     assert refused.returncode == 2
     assert (tmp_path / "notes.toml").read_text() == "mine = 1\n"
+
+
+@pytest.mark.parametrize(
+    ("plan", "told"),
+    [
+        ('results = "rec"\n' + SIMPLE, "results: "),
+        ('results = "."\n' + SIMPLE, "lies in it, expected a folder without recordings"),
+        ('results = "a\\u0000b"\n' + SIMPLE, "results: found"),
+        (SIMPLE + f"[scan]\nevery = {'9' * 5000}\n", "not TOML"),
+        (SIMPLE + '[map]\nconfig = "nowhere.toml"\n', "nowhere.toml: is not there"),
+        ('[recordings]\nfolder = "rec"\npattern = "{row}/*****{date}.mp4"\n', "5 stars, expected 4 at the most"),
+        ('[recordings]\ntable = "twice.csv"\n', "found 2 columns row"),
+        ('[recordings]\ntable = "more.csv"\n', "found 4 cells, expected 3"),
+        ('[recordings]\ntable = "zero.csv"\n', "is no file and no folder"),
+    ],
+)
+def test_plans_that_would_go_wrong_later_are_refused_at_once(tmp_path, plan, told):
+    touch(tmp_path, "rec/a/2024-08-09.mp4")
+    (tmp_path / "twice.csv").write_text("row,row,date,recording\na,b,2024-08-09,rec/a/2024-08-09.mp4\n")
+    (tmp_path / "more.csv").write_text("row,date,recording\na,2024-08-09,rec/a/2024-08-09.mp4,x\n")
+    (tmp_path / "zero.csv").write_text("row,date,recording\na,2024-08-09,/dev/zero\n")
+    with pytest.raises(PomonaError, match=re.escape(told)) as refused:
+        read_plan(plan_of(tmp_path, plan), FLAGS)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_name_is_one_however_its_accents_were_written_and_stands_in_values_as_it_is(tmp_path):
+    touch(tmp_path, "rec/Re\u0301/2024-08-09.mp4", "rec/R\u00e9/2024-08-28.mp4", "rec/{date}/2024-08-09.mp4")
+    plan = read_plan(plan_of(tmp_path, SIMPLE + '[scan]\ndetections = "{beside}/{row}.csv"\n'), FLAGS)
+    assert {visit.row for visit in plan.visits} == {"R\u00e9", "{date}"}
+    (odd,) = [step for step in steps_of(plan) if step.name == "scan {date}/2024-08-09"]
+    assert "--detections=rec/{date}/{date}.csv" in odd.commands[0]
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ('method = "magic"', "--method"),
+        ('noise = "a"', "--noise"),
+        ("noise = -1", "--noise"),
+        ("noise = nan", "--noise"),
+    ],
+)
+def test_the_verbs_look_at_their_flags_before_anything_is_run(tmp_path, value, told):
+    touch(tmp_path, "rec/a/2024-08-09.mp4")
+    plan_of(tmp_path, f"{SIMPLE}[map]\n{value}\n")
+    command = [sys.executable, "-m", "pomona", "farm", "run", "farm.toml", "--dry-run"]
+    refused = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("pomona: farm.toml: [map]: ")
+    assert told in refused.stderr
+    assert refused.stderr.count("\n") == 1
+
+
+def test_flags_may_be_written_as_in_the_help_and_repeated(tmp_path):
+    touch(tmp_path, "rec/a/2024-08-09.mp4")
+    plan_of(tmp_path, f'{SIMPLE}[map]\nnew-part = true\nup = ["0,0,1", "0,1,0"]\n')
+    command = [sys.executable, "-m", "pomona", "farm", "run", "farm.toml", "--dry-run"]
+    printed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert "--new-part --up=0,0,1 --up=0,1,0" in printed

@@ -20,6 +20,7 @@ import pytest
 from pomona.store.schema import LAYERS
 from pomona.synth.seasons import SEASONS, draw_season
 from pomona.synth.seasons.season_files import write_season
+from test_orchard_safety import on_a_small_disk
 
 PLAN = """results = "results"
 [recordings]
@@ -113,6 +114,34 @@ def test_what_is_done_is_never_done_again_and_what_changes_redoes_what_follows_f
     assert begun(run(farm)) == {"export a csv"}
     (farm / "farm.toml").write_text(PLAN + "observations = true\n")
     assert begun(run(farm)) == {f"export {row} csv" for row in ROWS}
+    for row in ROWS:
+        (farm / "results" / "export" / f"{row}.csv").write_text("")  # an emptied output is none
+    assert begun(run(farm)) == {f"export {row} csv" for row in ROWS}
+    assert not list(farm.glob("results/maps/*.before-*"))
+
+
+def test_a_recording_that_is_no_longer_in_the_plan_stays_in_its_map(farm):
+    run(farm)
+    sessions = content(farm)["a.gpkg"]["sessions"]
+    visit_of(farm, "a", 0).unlink()
+    assert begun(run(farm)) == {"map a", "export a csv"}
+    assert content(farm)["a.gpkg"]["sessions"] == sessions
+    assert sorted(path.name for path in (farm / "results" / "maps").iterdir()) == ["a.gpkg", "b.gpkg"]
+
+
+def test_what_only_looks_writes_nothing(farm):
+    for words in (("run", "farm.toml", "--dry-run"), ("status", "farm.toml")):
+        subprocess.run(command(*words), cwd=farm, capture_output=True, check=True)
+        assert not (farm / "results").exists()
+    run(farm)
+    before = sorted((path, path.stat().st_mtime_ns) for path in farm.rglob("*"))
+    looked = [
+        subprocess.run(command(*words), cwd=farm, capture_output=True, text=True, check=True).stdout
+        for words in (("run", "farm.toml", "--dry-run"), ("status", "farm.toml"))
+    ]
+    assert "pomona" not in looked[0]
+    assert "4 kept" in looked[1]
+    assert sorted((path, path.stat().st_mtime_ns) for path in farm.rglob("*")) == before
 
 
 def test_a_farm_may_be_moved_and_made_by_hand(farm):
@@ -234,6 +263,61 @@ def test_two_runs_at_once_are_told_apart(farm):
     assert "another run is working on this farm" in second.stderr
     assert json.loads(status.stdout)["running"] is True
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize("kibibytes", [60, 600])
+def test_a_full_disk_stops_what_needs_it_and_room_lets_it_go_on(farm, tmp_path_factory, kibibytes):
+    undisturbed = tmp_path_factory.mktemp("undisturbed") / "farm"
+    shutil.copytree(farm, undisturbed)
+    run(undisturbed)
+    disk = farm / "results"
+    disk.mkdir()
+    go = shlex.join(command("run", "farm.toml"))
+    on_a_small_disk(
+        disk,
+        kibibytes * 1024,
+        f"cd '{farm}'",
+        f"{{ {go} >full.out 2>full.err; echo $? >full.code; }}",
+        f"mount -o remount,size=20m '{disk}'",
+        f"{go} >room.out 2>room.err",
+        f"cp -r '{disk}' '{farm}/rescued'",
+    )
+    said = (farm / "full.out").read_text() + (farm / "full.err").read_text()
+    assert (farm / "full.code").read_text().strip() in ("1", "2")
+    assert "disk is full" in said
+    assert "Traceback" not in said
+    disk.rmdir()
+    (farm / "rescued").rename(disk)
+    assert content(farm) == content(undisturbed)
+
+
+@pytest.fixture
+def cluster():
+    """Two machines of a core each."""
+    pytest.importorskip("ray", reason="Ray is not installed: pip install ray")
+    from ray.cluster_utils import Cluster
+
+    machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    yield machines, machines.add_node(num_cpus=1)
+    machines.shutdown()
+
+
+def test_a_cluster_gives_what_one_machine_gives_though_a_node_dies(farm, tmp_path_factory, cluster):
+    machines, second = cluster
+    undisturbed = tmp_path_factory.mktemp("undisturbed") / "farm"
+    shutil.copytree(farm, undisturbed)
+    run(undisturbed, "--workers", "1")
+    with going(farm, "--ray", machines.address) as process:
+        lines = []
+        for line in process.stdout:
+            lines.append(json.loads(line))
+            if len(begun(lines)) == 2 and second is not None:
+                machines.remove_node(second, allow_graceful=False)
+                second = None
+    assert process.returncode == 0
+    assert begun(lines) == ALL
+    assert second is None
+    assert content(farm) == content(undisturbed)
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,14 @@
 import contextlib
 import os
 import shutil
+import socket
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
+from urllib.parse import quote
 
 import pytest
 
@@ -262,3 +265,103 @@ def test_a_database_without_postgis_or_of_another_format_is_told(server, databas
     with pytest.raises(PomonaError, match="holds maps of format 99"):
         pull_map(parsed_url(database), "row", row.with_name("pulled.gpkg"))
     assert not row.with_name("pulled.gpkg").exists()
+
+
+def run_verb(*words, **environment):
+    command = [sys.executable, "-m", "pomona", *map(str, words)]
+    given = {name: value for name, value in os.environ.items() if name != "PGPASSWORD"} | environment
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=given, timeout=120)
+
+
+def test_the_team_has_roles_as_soon_as_someone_may_make_them(server, database, row):
+    """Whoever pushes first may not; then an administrator makes the roles, and a push without change helps."""
+    name = parsed_url(database).name
+    with connection(server, database) as admin:
+        # Roles are the whole server's: those of other tests have no rights in this database.
+        for role in ("pomona_reader", "pomona_writer"):
+            admin.run(f"DO $$ BEGIN CREATE ROLE {role}; EXCEPTION WHEN duplicate_object THEN NULL; END $$")
+            admin.run(f"ALTER ROLE {role} RENAME TO hidden_{role}")
+        try:
+            admin.run("CREATE EXTENSION postgis")
+            admin.run("CREATE ROLE first LOGIN PASSWORD 'plum'")
+            admin.run(f"GRANT CREATE ON DATABASE {name} TO first")
+            url = server.url_of("first", "plum", name)
+            pushed = run_verb("map", "push", row, url)
+            assert pushed.returncode == 0
+            assert "warning" in pushed.stderr
+            assert "CREATE ROLE pomona_reader" in pushed.stderr
+        finally:
+            for role in ("pomona_reader", "pomona_writer"):
+                admin.run(f"ALTER ROLE hidden_{role} RENAME TO {role}")
+        again = run_verb("map", "push", row, url)
+        assert (again.stdout, again.stderr) == (f"{row.stem}: is there as it is\n", "")
+        for user, role in (("berta", "pomona_reader"), ("carl", "pomona_writer")):
+            admin.run(f"CREATE ROLE {user} LOGIN PASSWORD 'pear' IN ROLE {role}")
+    with contextlib.closing(sqlite3.connect(row)) as opened:
+        (last,) = opened.execute("SELECT name FROM sessions ORDER BY id DESC").fetchone()
+    remove_session(row, last)
+    read = run_verb("map", "push", row, server.url_of("berta", "pear", name), "--drop-sessions")
+    assert read.returncode == 2
+    assert "permission denied" in read.stderr
+    written = run_verb("map", "push", row, server.url_of("carl", "pear", name), "--drop-sessions")
+    assert written.returncode == 0, written.stderr
+    pulled = row.with_name("pulled.gpkg")
+    pull_map(parsed_url(server.url_of("berta", "pear", name)), row.stem, pulled)
+    assert content(pulled) == content(row)
+
+
+@pytest.mark.parametrize(
+    ("query", "told"),
+    [
+        ("?sslmod=verify-full", "'sslmod'"),
+        ("?sslmode=disable&sslmode=verify-full", "'sslmode' twice"),
+        ("?password=secret", "'password'"),
+        ("#secret", "expected postgresql://"),
+    ],
+)
+def test_what_an_address_cannot_say_is_refused(query, told):
+    with pytest.raises(PomonaError, match=told) as refused:
+        parsed_url(f"postgresql://anna@127.0.0.1/orchards{query}")
+    assert "secret" not in str(refused.value)
+
+
+def test_an_address_without_slashes_is_not_repeated():
+    with pytest.raises(PomonaError, match="expected postgresql://") as refused:
+        parsed_url("postgresql:anna:secret@127.0.0.1:5432/orchards")
+    assert "secret" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("password", "told"), [(None, "PGPASSWORD"), ("\U0001f34e", ""), ("a\0b", "")])
+def test_a_password_that_is_missing_or_cannot_be_said_is_one_line(server, row, password, told):
+    url = f"postgresql://{postgres_server.USER}@127.0.0.1:{server.port}/postgres"
+    if password is not None:
+        url = server.url_of(postgres_server.USER, quote(password), "postgres")
+    refused = run_verb("map", "push", row, url)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert told in refused.stderr
+
+
+def test_a_store_that_says_no_format_is_told(server, database, row):
+    push_map(row, parsed_url(database))
+    with connection(server, database) as admin:
+        admin.run("DELETE FROM pomona.format")
+    with pytest.raises(PomonaError, match="holds maps of format none"):
+        push_map(row, parsed_url(database))
+
+
+def test_what_is_no_postgresql_is_told(row):
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+
+        def answer():
+            client, _ = listening.accept()
+            client.recv(64)
+            client.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+            client.close()
+
+        threading.Thread(target=answer, daemon=True).start()
+        refused = run_verb("map", "push", row, f"postgresql://anna:pear@127.0.0.1:{listening.getsockname()[1]}/o")
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1

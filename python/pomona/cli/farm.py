@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args, get_origin
 
 import typer
 from typer.models import OptionInfo
@@ -25,13 +25,16 @@ if TYPE_CHECKING:
 
 app = Verbs(help="Do all rows and dates of a farm, by a plan.", no_args_is_help=True)
 
-GIVEN_BY_THE_FARM = {"output", "json", "name", "date", "keep", "preview", "force", "replace", "to", "unit"}
+GIVEN_BY_THE_FARM = {"output", "json", "name", "date", "keep", "preview", "force", "replace", "to"}
 """Flags of the verbs that a plan has no say in."""
 
 plan_argument = typer.Argument(metavar="FARM.toml", help="The plan, as `pomona farm init` writes it.")
 
 VERBS = ("scan", "map", "growth", "report", "export")
 MARKS = {"done": "+", "kept": "+", "incomplete": "~", "failed": "x", "blocked": "-", "waiting": ".", "running": ">"}
+
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+"""What Typer raises for words that a verb does not take; it does not export it."""
 
 LEGEND = "+ done, ~ some not found in the map, x failed, - needs what failed, > runs, . to do"
 
@@ -80,7 +83,7 @@ def farm_run(
     """
     from pomona.farm import run_farm
 
-    season, ledger, keys, run = _looked_at(plan)
+    season, ledger, keys, run = _looked_at(plan, read_only=dry_run)
     if dry_run:
         _print_commands(season, run, json=json)
         return
@@ -98,7 +101,7 @@ def farm_run(
 @app.command("status")
 def farm_status(plan: Path = plan_argument, json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """Say what of the plan is done, what runs, what failed and what is left to do."""
-    season, ledger, _, run = _looked_at(plan)
+    season, ledger, _, run = _looked_at(plan, read_only=True)
     running = ledger.is_running()
     _overlay(run, ledger.read(), running=running)
     if json:
@@ -108,7 +111,7 @@ def farm_status(plan: Path = plan_argument, json: bool = typer.Option(False, "--
         say(*_table(season, run), *_reasons(run))
 
 
-def _looked_at(path: Path) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
+def _looked_at(path: Path, *, read_only: bool) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
     from pomona.cli.progress import counting
     from pomona.farm import FarmRun, read_plan, steps_of
     from pomona.farm.file_hashes import FileHashes
@@ -116,8 +119,9 @@ def _looked_at(path: Path) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
     from pomona.farm.step_keys import keys_of
 
     plan = read_plan(path, _flags())
-    ledger = Ledger(plan.results / ".farm")
     steps = steps_of(plan)
+    _require_flags(path, steps)
+    ledger = Ledger(plan.results / ".farm", read_only=read_only)
     hashes = FileHashes(ledger.hashes())
     with counting("reading recordings", len(steps)) as progress:
         keys = keys_of(steps, plan.folder, hashes, lambda number: progress(number, len(steps)))
@@ -125,16 +129,44 @@ def _looked_at(path: Path) -> tuple[FarmPlan, Ledger, Keys, FarmRun]:
     return plan, ledger, keys, FarmRun.begin(steps, keys, ledger.read(), plan.folder)
 
 
+def _require_flags(path: Path, steps: list[FarmStep]) -> None:
+    """Let each verb look at the flags of the plan before hours of other work are begun.
+
+    Raises
+    ------
+    PomonaError
+        One is none that the verb takes.
+    """
+    from pomona.errors import PomonaError
+
+    verbs = _verbs()
+    main = {step.name: [step.outputs[0].name] for step in steps}
+    first = {step.kind: step for step in reversed(steps)}
+    for kind, step in first.items():
+        for command in step.arguments(main):
+            alone = typer.Typer(add_completion=False)
+            alone.command()(verbs[kind])
+            words = command[2 if kind == "map" else 1 :]
+            try:
+                typer.main.get_command(alone).make_context(kind, words)
+            except UsageError as error:
+                said = cast("Any", error).format_message()
+                raise PomonaError(f"{path}: [{kind}]: {' '.join(said.split())}") from None
+
+
 def _flags() -> Mapping[str, Mapping[str, Flag]]:
     """Say which flags of the verbs a plan may set, by what the verbs themselves take."""
+    return {name: _flags_of(verb) for name, verb in _verbs().items()}
+
+
+def _verbs() -> dict[str, Any]:
     from pomona.cli.export import export
     from pomona.cli.growth import growth
     from pomona.cli.map_add import map_add
     from pomona.cli.report import report
     from pomona.cli.scan import scan
 
-    verbs = {"scan": scan, "map": map_add, "growth": growth, "report": report, "export": export}
-    return {name: _flags_of(verb) for name, verb in verbs.items()}
+    return {"scan": scan, "map": map_add, "growth": growth, "report": report, "export": export}
 
 
 def _flags_of(verb: Any) -> dict[str, Flag]:
@@ -149,8 +181,9 @@ def _flags_of(verb: Any) -> dict[str, Flag]:
             long = next((flag for flag in option.param_decls or () if flag.startswith("--")), f"--{name}")
             on, _, off = long.replace("_", "-").partition("/")
             kinds = get_args(kind) or (kind,)
+            is_repeated = any(get_origin(one) is list for one in kinds)
             takes: Takes = "switch" if bool in kinds else "path" if Path in kinds else "value"
-            found[on.removeprefix("--").replace("-", "_")] = Flag(takes, on, off or None)
+            found[on.removeprefix("--").replace("-", "_")] = Flag(takes, on, off or None, is_repeated)
     return found
 
 

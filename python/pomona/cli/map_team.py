@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import PULLED
 
@@ -45,6 +45,11 @@ def map_push(
             one = pushed[-1]
             changed = f"{one.n_written} rows written, {one.n_ended} ended"
             say(f"{one.name}: {changed if one.n_written or one.n_ended else 'is there as it is'}")
+    for role in pushed[-1].roles_without_rights:
+        tell(
+            f"pomona: warning: {database.shown}: {role} has no rights there: let an administrator CREATE ROLE {role}, "
+            "and the store's owner push again"
+        )
     if json:
         say_json([asdict(one) for one in pushed])
 

@@ -21,6 +21,9 @@ VERBS = ("scan", "map", "growth", "report", "export")
 """Tables of the plan: what is done, with the flags of the verb. The first two are done anyhow."""
 
 RECORDINGS = ("folder", "pattern", "table", "skip")
+NAMED = ("shipped",)
+"""What a flag may name besides files: the detector that is inside."""
+
 FORMATS = ("csv", "geojson", "parquet", "parquet-by-date", "ply", "shp")
 
 
@@ -34,11 +37,14 @@ class Flag:
         What stands behind it.
     on, off : str, str or None
         How it is written on the command line, and the flag that says the opposite of a switch.
+    is_repeated : bool
+        Whether it may be given several times, in the plan as a list.
     """
 
     takes: Takes
     on: str
     off: str | None = None
+    is_repeated: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,7 @@ def read_plan(path: str | Path, flags: Mapping[str, Mapping[str, Flag]]) -> Farm
     path = Path(path).absolute()
     tables = _tables(path)
     results = tables.pop("results", "results")
-    if not isinstance(results, str) or not results:
+    if not isinstance(results, str) or not results.isprintable() or not results:
         raise PomonaError(f"{path}: results: found {shown(results)}, expected the name of a folder")
     recordings = tables.pop("recordings", None)
     if recordings is None:
@@ -104,13 +110,16 @@ def read_plan(path: str | Path, flags: Mapping[str, Mapping[str, Flag]]) -> Farm
         given = {name: value for name, value in table.items() if (verb, name) != ("export", "to")}
         arguments[verb], files[verb] = _arguments(f"{path}: [{verb}]", path.parent, given, flags[verb])
     visits = tuple(_visits(path, recordings))
+    for visit in visits:
+        if visit.path.resolve().is_relative_to((path.parent / results).resolve()):
+            raise PomonaError(f"{path}: results: {visit.path} lies in it, expected a folder without recordings")
     return FarmPlan(path, path.parent / results, visits, arguments, files, formats)
 
 
 def _tables(path: Path) -> dict[str, Any]:
     try:
         tables = tomllib.loads(read_text(path, "a plan in TOML"))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # not TOML, or a number of thousands of digits
         raise PomonaError(f"{path}: not TOML: {error}") from None
     known = ("results", "recordings", *VERBS)
     for name, value in tables.items():
@@ -163,7 +172,7 @@ def _arguments(
     arguments: list[str] = []
     files: list[Path] = []
     for name, value in table.items():
-        flag = flags.get(name)
+        flag = flags.get(name.replace("-", "_"))
         if flag is None:
             raise PomonaError(f"{where}: found {shown(name)}, expected one of {', '.join(sorted(flags))}")
         if flag.takes == "switch":
@@ -171,10 +180,21 @@ def _arguments(
                 raise PomonaError(f"{where} {name}: found {shown(value)}, expected true or false")
             arguments += filter(None, [flag.on if value else flag.off])
             continue
-        if isinstance(value, bool | dict | list):
-            raise PomonaError(f"{where} {name}: found {shown(value)}, expected a text or a number")
-        # Joined by =, so that no value is taken for a flag.
-        arguments.append(f"{flag.on}={value}")
-        if flag.takes == "path" and (folder / str(value)).is_file():
-            files.append(folder / str(value))
+        for one in value if isinstance(value, list) and flag.is_repeated else [value]:
+            if isinstance(one, bool | dict | list):
+                raise PomonaError(f"{where} {name}: found {shown(one)}, expected a text or a number")
+            # Joined by =, so that no value is taken for a flag.
+            arguments.append(f"{flag.on}={one}")
+            if flag.takes == "path":
+                files += _file(f"{where} {name}", folder, str(one))
     return tuple(arguments), tuple(files)
+
+
+def _file(where: str, folder: Path, name: str) -> list[Path]:
+    """Give the file that a flag names, if it is one for all recordings and not the name of what is inside."""
+    path = folder / name
+    if path.is_file():
+        return [path]
+    if name not in NAMED and "{" not in name and not path.exists():
+        raise PomonaError(f"{where}: {path}: is not there")
+    return []

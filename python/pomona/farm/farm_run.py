@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from pathlib import Path
 
+from pomona.farm.file_hashes import is_there
 from pomona.farm.ledger import Line
 from pomona.farm.step_keys import Keys
 from pomona.farm.steps import FarmStep
@@ -131,4 +132,4 @@ class FarmRun:
 
 
 def _are_there(line: Line, folder: Path) -> bool:
-    return all((folder / output).exists() for output in line.outputs)
+    return all(is_there(folder / output) for output in line.outputs)

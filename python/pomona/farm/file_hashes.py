@@ -9,7 +9,7 @@ from pathlib import Path
 from pomona.errors import PomonaError
 from pomona.farm.ledger import Stamp
 
-__all__ = ["FileHashes", "stamps"]
+__all__ = ["FileHashes", "is_there", "stamps"]
 
 CHUNK_BYTES = 1 << 20
 
@@ -65,6 +65,11 @@ class FileHashes:
 def stamps(paths: Iterable[Path]) -> dict[Path, Stamp | None]:
     """Say how large and how old files are, with those in folders; None for one that is not there."""
     return {file: _stamp_or_none(file) for path in paths for file in (files_in(path) if path.is_dir() else [path])}
+
+
+def is_there(output: Path) -> bool:
+    """Tell whether a step's output is still there; none is empty."""
+    return output.is_dir() or (output.is_file() and output.stat().st_size > 0)
 
 
 def files_in(folder: Path) -> Iterator[Path]:

@@ -32,6 +32,14 @@ CREATE TABLE hashes (
 
 TIMEOUT_S = 30.0
 
+REASONS = {
+    sqlite3.SQLITE_FULL: "the disk is full",
+    sqlite3.SQLITE_CANTOPEN: "cannot be written: the file or its folder is read-only",
+    sqlite3.SQLITE_READONLY: "cannot be written: the file or its folder is read-only",
+    sqlite3.SQLITE_READONLY_DIRECTORY: "cannot be written: the file or its folder is read-only",
+}
+ANEW = "without the file all steps are done anew"
+
 
 @dataclass(frozen=True)
 class Line:
@@ -76,6 +84,8 @@ class Ledger:
     ----------
     folder : Path
         Where it is kept; made where it does not exist.
+    read_only : bool
+        Whether it is only looked at: then nothing is made or written, and one that does not exist is empty.
 
     Raises
     ------
@@ -83,24 +93,20 @@ class Ledger:
         It cannot be kept there.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, read_only: bool = False) -> None:
         self.folder = folder
+        self.read_only = read_only
         with self._told():
+            if read_only:
+                self.connection = _copy_in_memory(folder / "ledger.sqlite")
+                return
             (folder / "logs").mkdir(parents=True, exist_ok=True)
             self.connection = sqlite3.connect(folder / "ledger.sqlite", timeout=TIMEOUT_S, isolation_level=None)
             # A power cut may take the last lines with it, a killed run takes none; a step done twice is all it costs.
             self.connection.execute("PRAGMA journal_mode = WAL")
             self.connection.execute("PRAGMA synchronous = NORMAL")
             self.connection.execute("BEGIN IMMEDIATE")
-            (version,) = self.connection.execute("PRAGMA user_version").fetchone()
-            if version != VERSION:
-                for (name,) in self.connection.execute(
-                    "SELECT name FROM sqlite_master WHERE type = 'table'"
-                ).fetchall():
-                    self.connection.execute(f'DROP TABLE "{name}"')
-                for statement in TABLES.strip().split(";\n"):
-                    self.connection.execute(statement)
-                self.connection.execute(f"PRAGMA user_version = {VERSION}")
+            _lay_out(self.connection)
             self.connection.execute("COMMIT")
 
     def read(self) -> dict[str, Line]:
@@ -152,8 +158,11 @@ class Ledger:
 
     def is_running(self) -> bool:
         """Tell whether a run is working on the farm."""
-        with (self.folder / "lock").open("a+") as lock:
-            return not _is_locked_now(lock.fileno())
+        try:
+            with (self.folder / "lock").open() as lock:
+                return not _is_locked_now(lock.fileno())
+        except FileNotFoundError:
+            return False
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
@@ -162,9 +171,33 @@ class Ledger:
         except OSError as error:
             raise PomonaError(f"{self.folder}: cannot be written: {error.strerror}") from None
         except sqlite3.Error as error:
-            raise PomonaError(
-                f"{self.folder / 'ledger.sqlite'}: {error}; without the file all steps are done anew"
-            ) from None
+            reason = REASONS.get(getattr(error, "sqlite_errorcode", 0), f"{error}; {ANEW}")
+            raise PomonaError(f"{self.folder / 'ledger.sqlite'}: {reason}") from None
+
+
+def _lay_out(connection: sqlite3.Connection) -> None:
+    """Make the tables, unless they are those of this version."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version == VERSION:
+        return
+    for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall():
+        connection.execute(f'DROP TABLE "{name}"')
+    for statement in TABLES.strip().split(";\n"):
+        connection.execute(statement)
+    connection.execute(f"PRAGMA user_version = {VERSION}")
+
+
+def _copy_in_memory(path: Path) -> sqlite3.Connection:
+    """Give what a ledger holds, also on a disk that takes nothing; none is empty."""
+    copy = sqlite3.connect(":memory:", isolation_level=None)
+    if path.exists():
+        # A log beside the file is that of a run, which keeps what a reader needs there; without one nobody writes.
+        has_log = path.with_name(f"{path.name}-wal").exists()
+        source = sqlite3.connect(f"{path.absolute().as_uri()}?{'mode=ro' if has_log else 'immutable=1'}", uri=True)
+        with contextlib.closing(source):
+            source.backup(copy)
+    _lay_out(copy)
+    return copy
 
 
 def _line(row: tuple[object, ...]) -> Line:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,7 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from pomona.errors import PomonaError
-from pomona.reading import read_text, shown
+from pomona.reading import shown
+from pomona.table_lines import table_lines
 
 __all__ = ["RecordedVisit", "visits_by_pattern", "visits_by_table"]
 
@@ -20,6 +20,9 @@ FIELDS = ("row", "date")
 COLUMNS = ("row", "date", "recording")
 MOST_NAME = 100
 """Characters of a row's name: it becomes the name of files."""
+
+MOST_STARS = 4
+"""In a pattern: with many, names of strangers take for ever to compare."""
 
 ROW = r"(?P<row>[^/]+?)"
 DATE = r"(?P<date>\d{4}-?\d{2}-?\d{2}(?:[T_ ]\d{2}[:-]?\d{2}(?:[:-]?\d{2})?)?)"
@@ -68,6 +71,8 @@ def visits_by_pattern(where: str, folder: Path, pattern: str) -> list[RecordedVi
             raise PomonaError(
                 f"{where}: found {pattern!r}, expected {{{field}}} in it, once, as in {{row}}/{{date}}.mp4"
             )
+    if pattern.count("*") > MOST_STARS:
+        raise PomonaError(f"{where}: found {pattern.count('*')} stars, expected {MOST_STARS} at the most")
     if not folder.is_dir():
         raise PomonaError(f"{where}: {folder}: is not there, expected the folder of the recordings")
     called, depth = _expression(pattern), pattern.count("/") + 1
@@ -75,7 +80,8 @@ def visits_by_pattern(where: str, folder: Path, pattern: str) -> list[RecordedVi
     for path in _below(folder, depth):
         match = called.fullmatch(path.relative_to(folder).as_posix())
         if match is not None:
-            found.append(RecordedVisit(_row(where, match["row"]), _date(where, match["date"]), path))
+            named = f"{where}: {path}"
+            found.append(RecordedVisit(_row(named, match["row"]), _date(named, match["date"]), path))
     if not found:
         raise PomonaError(f"{where}: nothing below {folder} is called {pattern}")
     return _once(where, found)
@@ -89,25 +95,23 @@ def visits_by_table(table: Path) -> list[RecordedVisit]:
     PomonaError
         The table cannot be read, lacks a column, names what is not there, or names two of one row and date.
     """
-    text = read_text(table, "a table with the columns row,date,recording")
-    lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
-    found = []
-    try:
-        missing = [name for name in COLUMNS if name not in (lines.fieldnames or ())]
-        if missing:
-            raise PomonaError(f"{table}: line 1: has no column {missing[0]}, expected row,date,recording")
-        for cells in lines:
-            where = f"{table}: line {lines.line_num}"
-            row, date, name = ((cells[column] or "").strip() for column in COLUMNS)
-            path = table.parent / name
-            if not name or not path.exists():
-                raise PomonaError(f"{where}: recording: {shown(name)} is not there")
-            found.append(RecordedVisit(_row(where, row), _date(where, date), path))
-    except csv.Error as error:
-        raise PomonaError(f"{table}: line {lines.line_num}: {error}") from None
-    if not found:
+    lines = table_lines(table, "a table with the columns row,date,recording")
+    _, header = next(lines)
+    for name in COLUMNS:
+        if (count := header.count(name)) != 1:
+            found = f"found {count} columns {name}" if count else f"has no column {name}"
+            raise PomonaError(f"{table}: line 1: {found}, expected row,date,recording")
+    visits = []
+    for where, cells in lines:
+        row, date, name = (cells[header.index(column)].strip() for column in COLUMNS)
+        path = table.parent / name
+        if not name or not (path.is_file() or path.is_dir()):
+            what = "is no file and no folder" if name and path.exists() else "is not there"
+            raise PomonaError(f"{where}: recording: {shown(name)} {what}")
+        visits.append(RecordedVisit(_row(where, row), _date(where, date), path))
+    if not visits:
         raise PomonaError(f"{table}: has no line, expected one a recording")
-    return _once(str(table), found)
+    return _once(str(table), visits)
 
 
 def _expression(pattern: str) -> re.Pattern[str]:
@@ -128,8 +132,15 @@ def _below(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _row(where: str, name: str) -> str:
-    """Take the name of a row, which becomes the name of files."""
-    odd = not name or len(name) > MOST_NAME or name.startswith((".", "-")) or not name.isprintable()
+    """Take the name of a row, which becomes the name of files, however its accents were written."""
+    name = unicodedata.normalize("NFC", name)
+    odd = (
+        not name
+        or name != name.strip()
+        or len(name) > MOST_NAME
+        or name.startswith((".", "-"))
+        or not name.isprintable()
+    )
     if odd or set(name) & set('/\\:*?"<>|'):
         raise PomonaError(f"{where}: row: found {shown(name)}, expected a name that a file can have")
     return name

@@ -12,14 +12,14 @@ from pomona.errors import PomonaError
 from pomona.farm.executor import Executor, Job, Outcome
 from pomona.farm.farm_plan import FarmPlan
 from pomona.farm.farm_run import FarmRun, Fate
-from pomona.farm.file_hashes import stamps
+from pomona.farm.file_hashes import is_there, stamps
 from pomona.farm.ledger import Ledger, Line
 from pomona.farm.step_keys import Keys
 from pomona.farm.steps import FarmStep
 
 __all__ = ["run_farm"]
 
-TRIES = 3
+TRIES = 5
 """How often a step is begun whose process, or machine, is lost; one that says what is wrong is not tried again."""
 
 EXPECTED_BYTES = {"scan": 1500 << 20}
@@ -158,7 +158,7 @@ class _Driver:
         if stamps(step.inputs) != self.keys.stamps[step.name]:
             raise PomonaError("its input changed while it was read, expected a recording that has ended")
         for output in step.outputs:
-            if not output.exists():
+            if not is_there(output):
                 raise PomonaError(f"{output}: was not written; {_last_line(outcome)}")
         if step.kind == "scan":
             return tuple(json.loads(outcome.out.splitlines()[-1])["output"])

@@ -71,7 +71,8 @@ def keys_of(
             continue
         keys.stamps[step.name] = before
         commands = [[f"<{word.step}>" if isinstance(word, MadeBy) else word for word in line] for line in step.commands]
-        keys.settings[step.name] = _hash([step.settings, sorted(found.values())])
+        named = sorted(found[os.path.relpath(path, folder)] for path in step.settings_files)
+        keys.settings[step.name] = _hash([step.settings, named])
         needed = [keys.of[name] for name in step.needs]
         keys.of[step.name] = _hash([__version__, step.kind, commands, sorted(found.items()), needed])
     return keys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -13,6 +14,8 @@ from pomona.farm.farm_plan import FarmPlan
 from pomona.farm.recorded_visits import RecordedVisit
 
 __all__ = ["FarmStep", "Kind", "MadeBy", "steps_of"]
+
+PLACES = re.compile(r"\{(row|date|beside)\}")
 
 Kind = Literal["scan", "map", "growth", "report", "export"]
 
@@ -46,6 +49,8 @@ class FarmStep:
         What is there afterwards.
     settings : tuple of str
         The flags that the plan gives its verb.
+    settings_files : tuple of Path
+        Those of the inputs that the flags name.
     """
 
     name: str
@@ -56,6 +61,7 @@ class FarmStep:
     needs: tuple[str, ...]
     outputs: tuple[Path, ...]
     settings: tuple[str, ...] = ()
+    settings_files: tuple[Path, ...] = ()
 
     def arguments(self, made: Mapping[str, Sequence[str]]) -> list[list[str]]:
         """Write the commands out, given what the steps before it made."""
@@ -107,9 +113,7 @@ def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> FarmStep:
 def _filled(flag: str, plan: FarmPlan, visit: RecordedVisit) -> str:
     """Let a flag name what lies beside each recording: ``detections = "{beside}/boxes.csv"``."""
     meaning = {"{row}": visit.row, "{date}": visit.date, "{beside}": _shown(plan, visit.path.parent)}
-    for name, value in meaning.items():
-        flag = flag.replace(name, value)
-    return flag
+    return PLACES.sub(lambda found: meaning[found[0]], flag)
 
 
 def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[RecordedVisit, FarmStep]) -> FarmStep:
@@ -133,6 +137,7 @@ def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[R
         needs=tuple(step.name for step in scans.values()),
         outputs=(orchard,),
         settings=settings,
+        settings_files=plan.files["map"],
     )
 
 

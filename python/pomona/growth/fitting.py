@@ -38,6 +38,9 @@ _GRADIENT = 0.05
 _STEP = 0.05
 """Of the finite differences, in standard deviations of the prior."""
 
+_IMPOSSIBLE = -1e9
+"""Logarithm of a likelihood below any that is met."""
+
 # Medians and standard deviations: of the logarithms, but of the onset, in days against the first visit.
 _ONSET_DAYS = (-10.0, 35.0)
 _RATE_SPREAD = 0.30
@@ -65,7 +68,10 @@ class _Posterior:
         return Shape(rate, onset, *spreads)
 
     def __call__(self, z: Numbers) -> float:
-        likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
+        try:
+            likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
+        except np.linalg.LinAlgError:  # so far out that rounding eats what the measurements say
+            likelihood = _IMPOSSIBLE
         return likelihood - 0.5 * float(z @ z) - 0.5 * len(z) * float(np.log(2.0 * np.pi))
 
     def cost(self, z: Numbers) -> float:

@@ -8,7 +8,7 @@ import ssl
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
-from urllib.parse import SplitResult, parse_qs, unquote, urlsplit
+from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from pomona.errors import PomonaError
 
@@ -19,6 +19,10 @@ PORT = 5432
 ANSWER_S = 10
 """How long a server may take to accept a connection."""
 
+REFUSED = "28"
+"""Class of PostgreSQL's errors: invalid authorization."""
+
+OPTIONS = ("sslmode", "host")
 SSL_MODES = ("disable", "require", "verify-full")
 
 
@@ -62,20 +66,20 @@ def parsed_url(url: str) -> Database:
         parts = urlsplit(url)
         port = parts.port or int(os.environ.get("PGPORT", PORT))
     except ValueError:
-        raise PomonaError(f"the database's address: its host or port is none, {expected}") from None
-    if parts.scheme not in SCHEMES:
-        raise PomonaError(f"the database's address: begins with {parts.scheme[:20] or 'no scheme'!r}, {expected}")
+        raise PomonaError(f"the database's address: has no host and port that can be, {expected}") from None
+    if not url.startswith(tuple(f"{scheme}://" for scheme in SCHEMES)) or parts.fragment:
+        raise PomonaError(f"the database's address: is none, {expected}")
     name = unquote(parts.path.lstrip("/"))
     if not name:
         raise PomonaError(f"the database's address: names no database, {expected}")
-    options = parse_qs(parts.query)
+    options = _options(parts.query)
     return Database(
-        host=options.get("host", [unquote(parts.hostname or os.environ.get("PGHOST", "localhost"))])[0],
+        host=options.get("host") or unquote(parts.hostname or os.environ.get("PGHOST", "localhost")),
         port=port,
         name=name,
         user=unquote(parts.username or os.environ.get("PGUSER", "") or _own_name()),
         password=_password(parts),
-        ssl_mode=_ssl_mode(options.get("sslmode", ["disable"])[0]),
+        ssl_mode=_ssl_mode(options.get("sslmode", "disable")),
     )
 
 
@@ -100,13 +104,13 @@ def connected(database: Database) -> Iterator[Any]:
             unix_sock=f"{socket}/.s.PGSQL.{database.port}" if socket else None,
             port=database.port,
             database=database.name,
-            password=database.password,
+            password=database.password or "",
             ssl_context=_ssl_context(database.ssl_mode),
             timeout=ANSWER_S,
             application_name="pomona",
         )
-    except (pg.DatabaseError, pg.InterfaceError, OSError) as error:
-        raise PomonaError(f"{database.shown}: {_line(error, database)}") from None
+    except Exception as error:  # whatever a strange server, or a strange password, makes of pg8000
+        raise PomonaError(f"{database.shown}: {_line(error, database)}{_hint(error, database)}") from None
     try:
         # Only the connection has a time limit: a large map takes as long as it takes.
         connection._usock.settimeout(None)
@@ -122,6 +126,24 @@ def _password(parts: SplitResult) -> str | None:
     if parts.password is not None:
         return unquote(parts.password)
     return os.environ.get("PGPASSWORD")
+
+
+def _options(query: str) -> dict[str, str]:
+    """Read what stands behind the question mark; a slip there might leave a connection open to all."""
+    options: dict[str, str] = {}
+    for name, value in parse_qsl(query, keep_blank_values=True):
+        if name not in OPTIONS or name in options:
+            found = f"{name[:20]!r} twice" if name in options else repr(name[:20])
+            raise PomonaError(f"the database's address: found {found} behind the ?, expected {', '.join(OPTIONS)}")
+        options[name] = value
+    return options
+
+
+def _hint(error: Exception, database: Database) -> str:
+    """Say where the password comes from, when the server wanted one."""
+    said = error.args[0] if error.args else None
+    wanted = isinstance(said, dict) and str(said.get("C")).startswith(REFUSED)
+    return ", expected a password in PGPASSWORD" if wanted and not database.password else ""
 
 
 def _ssl_mode(mode: str) -> str:
@@ -150,7 +172,9 @@ def _line(error: Exception, database: Database) -> str:
     """Say in one line what a server, or the way to it, said."""
     said = error.args[0] if error.args else error
     text = str(said.get("M", said)) if isinstance(said, dict) else str(said)
-    text = " ".join(text.split()) or type(error).__name__
+    text = " ".join(text.split())
+    if not isinstance(said, dict) and not isinstance(error, OSError) and " " not in text:
+        text = f"what answers there is not understood ({type(error).__name__})"
     if text.startswith("Can't create a connection"):
         text = "nothing answers there"
     return text.replace(database.password, "***") if database.password else text

@@ -51,11 +51,14 @@ class Pushed:
     n_written, n_ended : int
         Rows that are new or another now; rows that are no more, or were replaced. Both 0: the store had the map
         as it is.
+    roles_without_rights : tuple of str
+        Roles for the team that are not there, or may not yet see the store, because whoever pushes may not help it.
     """
 
     name: str
     n_written: int
     n_ended: int
+    roles_without_rights: tuple[str, ...] = ()
 
 
 def push_map(path: str | Path, database: Database, *, name: str | None = None, drop_sessions: bool = False) -> Pushed:
@@ -85,7 +88,8 @@ def push_map(path: str | Path, database: Database, *, name: str | None = None, d
             raise WrongContentError("is a session, expected an orchard map")
         ids = last_ids(source)
         target.run("BEGIN")
-        prepare(target)
+        without = prepare(target)
+        target.run("SAVEPOINT prepared")
         # One push of a map at a time; readers wait for nobody.
         target.run("SELECT pg_advisory_xact_lock(hashtext('pomona'), hashtext(:map))", map=name)
         _require_successor(source, target, name, database, drop_sessions=drop_sessions)
@@ -98,8 +102,10 @@ def push_map(path: str | Path, database: Database, *, name: str | None = None, d
         )
         counts = [_push_layer(source, target, layer, name, push) for layer, *_ in LAYERS]
         n_ended, n_written = (sum(numbers) for numbers in zip(*counts, strict=True))
-        target.run("COMMIT" if n_ended or n_written else "ROLLBACK")
-    return Pushed(name, n_written, n_ended)
+        if not n_ended and not n_written:
+            target.run("ROLLBACK TO SAVEPOINT prepared")
+        target.run("COMMIT")
+    return Pushed(name, n_written, n_ended, without)
 
 
 def _require_successor(

@@ -17,8 +17,8 @@ LEAST_SERVER = 130000
 
 TYPES = {"TEXT": "text", "INTEGER": "bigint", "REAL": "double precision", "BLOB": "bytea"}
 
-READER = "pomona_reader"
-"""Role whose members see everything and write nothing."""
+ROLES = {"pomona_reader": ("SELECT",), "pomona_writer": ("SELECT", "INSERT", "UPDATE")}
+"""Roles, and what their members may do to the tables: nothing is ever deleted."""
 
 TABLES = """
 CREATE SCHEMA pomona;
@@ -60,10 +60,12 @@ FROM pomona_now.observations o JOIN pomona_now.sessions s ON s.map = o.map AND s
 """
 """For dashboards: a line a map, a line a session, a line a fruit and date."""
 
-ROLES = """
-DO $$ BEGIN CREATE ROLE {reader} NOLOGIN; EXCEPTION WHEN duplicate_object THEN NULL; END $$;
-GRANT USAGE ON SCHEMA pomona, pomona_now TO {reader};
-GRANT SELECT ON ALL TABLES IN SCHEMA pomona, pomona_now TO {reader};
+NEW_ROLE = "DO $$ BEGIN CREATE ROLE {role} NOLOGIN; EXCEPTION WHEN duplicate_object THEN NULL; END $$"
+
+GRANTS = """
+GRANT USAGE ON SCHEMA pomona, pomona_now TO {role};
+GRANT SELECT ON ALL TABLES IN SCHEMA pomona_now TO {role};
+GRANT {rights} ON ALL TABLES IN SCHEMA pomona TO {role};
 """
 
 
@@ -104,8 +106,8 @@ def columns_of_layer(layer: str) -> tuple[Column, ...]:
     )
 
 
-def prepare(connection: Any) -> None:
-    """Lay out an empty store, inside the open transaction, unless there is one.
+def prepare(connection: Any) -> tuple[str, ...]:
+    """Lay out an empty store, inside the open transaction, unless there is one; return the roles without rights there.
 
     Raises
     ------
@@ -113,16 +115,13 @@ def prepare(connection: Any) -> None:
         The server is too old, has no PostGIS, or holds the store of another format.
     """
     _require_server(connection)
-    # Two programs that both find no store would both make one.
-    connection.run("SELECT pg_advisory_xact_lock(hashtext('pomona'))")
     if not _has_store(connection):
-        connection.run(TABLES)
-        connection.run("INSERT INTO pomona.format VALUES (:version)", version=FORMAT_VERSION)
-        for layer, _, _, description in LAYERS:
-            connection.run(_layer(layer, description))
-        connection.run(VIEWS)
-        _grant(connection)
+        # Two programs that both find no store would both make one.
+        connection.run("SELECT pg_advisory_xact_lock(hashtext('pomona'))")
+    if not _has_store(connection):
+        _lay_out(connection)
     _require_format(connection)
+    return tuple(role for role, rights in ROLES.items() if not _is_granted(connection, role, rights))
 
 
 def require_store(connection: Any, shown: str) -> None:
@@ -166,14 +165,35 @@ def _has_store(connection: Any) -> bool:
     return bool(connection.run("SELECT 1 FROM pg_tables WHERE schemaname = 'pomona' AND tablename = 'format'"))
 
 
+def _lay_out(connection: Any) -> None:
+    if connection.run("SELECT 1 FROM pg_namespace WHERE nspname IN ('pomona', 'pomona_now')"):
+        raise PomonaError("the database: has a schema pomona or pomona_now that is not Pomona's")
+    connection.run(TABLES)
+    connection.run("INSERT INTO pomona.format VALUES (:version)", version=FORMAT_VERSION)
+    for layer, _, _, description in LAYERS:
+        connection.run(_layer(layer, description))
+    connection.run(VIEWS)
+
+
 def _require_format(connection: Any) -> None:
-    ((version,),) = connection.run("SELECT format_version FROM pomona.format")
-    if version != FORMAT_VERSION:
-        raise PomonaError(f"the database: holds maps of format {version}, expected {FORMAT_VERSION}")
+    versions = [version for (version,) in connection.run("SELECT format_version FROM pomona.format")]
+    if versions != [FORMAT_VERSION]:
+        found = ", ".join(map(str, versions)) or "none"
+        raise PomonaError(f"the database: holds maps of format {found}, expected {FORMAT_VERSION}")
 
 
-def _grant(connection: Any) -> None:
-    """Make the readers' role, where whoever lays out the store may."""
-    ((may,),) = connection.run("SELECT rolsuper OR rolcreaterole FROM pg_roles WHERE rolname = current_user")
-    if may:
-        connection.run(ROLES.format(reader=READER))
+def _is_granted(connection: Any, role: str, rights: tuple[str, ...]) -> bool:
+    """Give a role its rights, and make it, where whoever pushes may; tell whether it has them."""
+    if not connection.run("SELECT 1 FROM pg_roles WHERE rolname = :role", role=role):
+        ((may,),) = connection.run("SELECT rolsuper OR rolcreaterole FROM pg_roles WHERE rolname = current_user")
+        if not may:
+            return False
+        connection.run(NEW_ROLE.format(role=role))
+    asked = "SELECT has_table_privilege(:role, 'pomona.pushes', :right)"
+    if not connection.run(asked, role=role, right=rights[-1])[0][0]:
+        owned = "SELECT pg_has_role(tableowner, 'USAGE') FROM pg_tables WHERE schemaname = 'pomona' LIMIT 1"
+        if not connection.run(owned)[0][0]:
+            return False
+        connection.run("SELECT pg_advisory_xact_lock(hashtext('pomona'))")
+        connection.run(GRANTS.format(role=role, rights=", ".join(rights)))
+    return True
