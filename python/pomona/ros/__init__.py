@@ -7,6 +7,7 @@ from pomona.ros.robot_messages import (
     odometry_message,
     path_message,
     pose_message,
+    sightings_of,
     transforms_message,
 )
 
@@ -20,6 +21,7 @@ __all__ = [
     "odometry_message",
     "path_message",
     "pose_message",
+    "sightings_of",
     "store_types",
     "transforms_message",
 ]

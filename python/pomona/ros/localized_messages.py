@@ -20,10 +20,11 @@ from pomona.ros.robot_messages import (
     odometry_message,
     path_message,
     pose_message,
+    sightings_of,
     transforms_message,
 )
 
-__all__ = ["OWN", "localized_messages", "sightings_of"]
+__all__ = ["OWN", "localized_messages"]
 
 OWN = "/pomona/"
 """Begins the names of our topics, but those of the tree of transforms."""
@@ -62,7 +63,7 @@ def localized_messages(
         stamp_ns, logged_ns = times.stamp_ns(step), times.logged_ns(step)
         yield maker(f"{OWN}status", types("std_msgs/msg/String")(data=str(step.found.status)), logged_ns)
         seen = step.cloud.transformed(robot.optical_from_camera)
-        known = sightings_of(step, fruits)
+        known = sightings_of(step.found, fruits)
         yield maker(f"{OWN}detections", detections_message(types, stamp_ns, robot.camera, seen, known), logged_ns)
         if not step.found:
             continue
@@ -73,12 +74,6 @@ def localized_messages(
         if len(path) >= PATH_GROWS * told or step is way.found[-1]:
             told = len(path)
             yield maker(f"{OWN}path", path_message(types, robot.map, path), logged_ns)
-
-
-def sightings_of(step: Step, fruits: FruitCloud) -> list[tuple[int, str, float]]:
-    """Give row, id in the map and probability of each fruit of a frame that the map knows."""
-    pairs = zip(step.found.pairs.tolist(), step.found.probabilities.tolist(), strict=True)
-    return [(row, str(of_map) if fruits.ids is None else fruits.ids[of_map], chance) for (row, of_map), chance in pairs]
 
 
 def _of_pose(types: Any, frames: BagFrames, pose: RobotPose, before: RobotPose | None) -> Iterator[tuple[str, Any]]:

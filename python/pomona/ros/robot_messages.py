@@ -9,11 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.localize import Localization
 from pomona.ros.message_types import MessageTypes
 from pomona.ros.robot_frames import RobotPose
 from pomona.ros.stamped import header_of, plain_pose, quaternion_of, vector_of
 
-__all__ = ["detections_message", "odometry_message", "path_message", "pose_message", "transforms_message"]
+__all__ = [
+    "detections_message",
+    "odometry_message",
+    "path_message",
+    "pose_message",
+    "sightings_of",
+    "transforms_message",
+]
 
 Array = NDArray[np.float64]
 
@@ -102,6 +110,20 @@ def detections_message(
     told = {row: (name, chance) for row, name, chance in known}
     made = [_detection(types, stamp_ns, frame, fruits, row, *told.get(row, ("", 0.0))) for row in range(len(fruits))]
     return types("vision_msgs/msg/Detection3DArray")(header=header_of(types, stamp_ns, frame), detections=made)
+
+
+def sightings_of(found: Localization, fruits: FruitCloud) -> list[tuple[int, str, float]]:
+    """Give row, id and probability of each fruit of a frame that a map knows, as `detections_message` takes them.
+
+    Parameters
+    ----------
+    found : Localization
+        Of the frame.
+    fruits : FruitCloud
+        The map as the Localizer was given it; fruits without ids go by their rows.
+    """
+    pairs = zip(found.pairs.tolist(), found.probabilities.tolist(), strict=True)
+    return [(row, str(of_map) if fruits.ids is None else fruits.ids[of_map], chance) for (row, of_map), chance in pairs]
 
 
 def _detection(
