@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import subprocess
 import sys
 from collections import defaultdict
@@ -13,12 +14,14 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bag_maker import START_NS, image, info, stereo, tf, write_bag
-from pomona import FruitCloud
+from pomona import FruitCloud, PomonaWarning
 from pomona.recording.bags.kinds import open_messages
+from pomona.recording.bags.message_file import Message, Topic
 from pomona.ros import known_store
+from pomona.ros.ros1_as_ros2 import AsRos2
 from robot_bag import BASE, BASE_FROM_CAMERA, CAMERA, FRAMES, MAP, ODOM_FROM_MAP, STEP_NS, entries, make_robot_bag
 from test_ros_messages import matrix
 
@@ -296,3 +299,46 @@ def test_definitions_travel_with_their_topics(replayed):
         assert topic.language == "ros2msg"
         assert topic.definition
         assert topic.type in known.fielddefs
+
+
+def test_every_topic_has_one_channel(replayed):
+    with replayed.output.open("rb") as file:
+        channels = make_reader(file).get_summary().channels.values()
+    names = [channel.topic for channel in channels]
+    assert len(names) == len(set(names))
+
+
+def a_message(kind: str, definition: bytes, body: bytes = b"") -> Message:
+    return Message(Topic("/a", kind, "ros1", "ros1msg", definition), 0, body)
+
+
+def test_types_of_ros1_that_ros2_does_not_know_go_with_their_definitions():
+    made = AsRos2(Path("a.bag"))(a_message("mine/msg/Load", b"Header header\nfloat32[2] kg\ntime at\n" + HEADER, LOAD))
+    assert made is not None
+    assert (made.topic.encoding, made.topic.language) == ("cdr", "ros2msg")
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(made.topic.definition.decode(), "mine/msg/Load"))
+    read = store.deserialize_cdr(made.body, "mine/msg/Load")
+    assert (read.header.stamp.sec, read.header.frame_id, read.kg.tolist(), read.at.sec) == (5, "ab", [1.0, 2.5], 9)
+
+
+HEADER = b"=" * 80 + b"\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+LOAD = struct.pack("<IIII2s2fII", 1, 5, 6, 2, b"ab", 1.0, 2.5, 9, 8)
+
+
+@pytest.mark.parametrize(
+    ("kind", "definition", "body"),
+    [
+        ("a/msg/B:\n    raise SystemExit('run')\nclass C", b"uint8 a", b"\0"),
+        ("a/msg/B", b"std_msgs/Empty[99999999] a\n" + b"=" * 80 + b"\nMSG: std_msgs/Empty\n", b"\0"),
+        ("a/msg/B", b"not a definition", b"\0"),
+        ("a/msg/B", b"a/B[] more", b"\xff\xff\xff\xff"),
+        ("a/msg/B", b"uint32 a", b"\0"),
+    ],
+)
+def test_a_strangers_type_that_makes_no_sense_is_left_out_and_told(kind, definition, body):
+    as_ros2 = AsRos2(Path("a.bag"))
+    with pytest.warns(PomonaWarning, match=r"a.bag: /a: found a message that is no") as told:
+        made = [as_ros2(a_message(kind, definition, body)) for _ in range(2)]
+    assert made == [None, None]
+    assert len(told) == 1

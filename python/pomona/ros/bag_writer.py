@@ -31,7 +31,7 @@ class BagWriter:
         self._writer: Any = Writer(file)
         self._writer.start(profile="ros2", library=MCAP_MARK)
         self._schemas: dict[tuple[str, str, bytes], int] = {}
-        self._channels: dict[Topic, int] = {}
+        self._channels: dict[tuple[str, str, str], int] = {}
         self.n_messages = 0
 
     def __enter__(self) -> BagWriter:
@@ -43,9 +43,11 @@ class BagWriter:
 
     def write(self, message: Message) -> None:
         """Append a message; those of one topic in the order in which they were logged."""
-        channel = self._channels.get(message.topic)
+        # Two who write a topic may word its definition differently: it is one channel all the same.
+        named = (message.topic.name, message.topic.type, message.topic.encoding)
+        channel = self._channels.get(named)
         if channel is None:
-            channel = self._channels[message.topic] = self._channel(message.topic)
+            channel = self._channels[named] = self._channel(message.topic)
         published_ns = message.logged_ns if message.published_ns is None else message.published_ns
         self._writer.add_message(channel, message.logged_ns, message.body, published_ns)
         self.n_messages += 1

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import functools
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pomona.errors import PomonaWarning
+from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.message_file import Message, Topic
+from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES
 from pomona.ros.message_types import known_store
 
 __all__ = ["AsRos2"]
 
 HEADER = "std_msgs/msg/Header"
 OLD_TREE, TREE = "tf/msg/tfMessage", "tf2_msgs/msg/TFMessage"
+
+TYPE_NAME = re.compile(r"[A-Za-z]\w*/msg/[A-Za-z]\w*", re.ASCII)
+"""rosbags makes code of a type's name and definition, and looks at the definition only."""
+
+LARGE_ARRAY = re.compile(rb"\[<?=?\d{7,}\]")
+"""Of a fixed size of ten million and more: reading one of empty things would not end."""
 
 Body = Callable[[bytes], bytes]
 
@@ -63,11 +72,16 @@ def _ros2_type(topic: Topic) -> str:
 
 def _defined(topic: Topic) -> Topic:
     """Say what a type of ROS 2 is where the bag does not, as those in SQLite."""
-    store = known_store()
+    store = _ros2_store()
     if topic.encoding != "cdr" or topic.definition or topic.type not in store.fielddefs:
         return topic
     text = store.generate_msgdef(topic.type, ros_version=2)[0].encode()
     return replace(topic, language="ros2msg", definition=text)
+
+
+@functools.cache
+def _ros2_store() -> Any:
+    return known_store()
 
 
 def _store_of(topic: Topic) -> Any:
@@ -75,6 +89,8 @@ def _store_of(topic: Topic) -> Any:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     from rosbags.typesys.base import TypesysError
 
+    if TYPE_NAME.fullmatch(topic.type) is None or LARGE_ARRAY.search(topic.definition):
+        raise PomonaError("found a name or an array that no type has")
     store = known_store()
     types = get_types_from_msg(topic.definition.decode(errors="replace"), _ros2_type(topic))
     types[HEADER] = store.fielddefs[HEADER]
@@ -83,4 +99,5 @@ def _store_of(topic: Topic) -> Any:
     except TypesysError:
         store = get_typestore(Stores.EMPTY)
         store.register(types)
+    store.max_sequence_length = MOST_CHUNK_BYTES
     return store
