@@ -49,21 +49,14 @@ def localized_messages(
         The map as the localiser was given it.
     """
     types, robot = maker.types, frames.robot
-    times = _Times(recording)
-    start_ns = times.logged_ns(way.steps[0])
-    shown = fruits.transformed(robot.map_from_fruits)
-    scene = fruits_scene(types, start_ns, robot.map, shown)
-    yield maker(f"{OWN}fruits", scene, start_ns, latched=True)
-    if frames.body_is_new:
-        own_body = (robot.camera, robot.base, np.linalg.inv(BODY_FROM_OPTICAL))
-        yield maker("/tf_static", transforms_message(types, start_ns, own_body), start_ns, latched=True)
+    times, last = _Times(recording), way.found[-1:]
+    yield from _of_start(maker, frames, fruits, times.logged_ns(way.steps[0]))
     path: list[RobotPose] = []
     told = 0
     for step in way.steps:
         stamp_ns, logged_ns = times.stamp_ns(step), times.logged_ns(step)
         yield maker(f"{OWN}status", types("std_msgs/msg/String")(data=str(step.found.status)), logged_ns)
-        seen = step.cloud.transformed(robot.optical_from_camera)
-        known = sightings_of(step.found, fruits)
+        seen, known = step.cloud.transformed(robot.optical_from_camera), sightings_of(step.found, fruits)
         yield maker(f"{OWN}detections", detections_message(types, stamp_ns, robot.camera, seen, known), logged_ns)
         if not step.found:
             continue
@@ -71,9 +64,19 @@ def localized_messages(
         for name, content in _of_pose(types, frames, pose, path[-1] if path else None):
             yield maker(name, content, logged_ns)
         path.append(pose)
-        if len(path) >= PATH_GROWS * told or step is way.found[-1]:
+        if len(path) >= PATH_GROWS * told or step in last:
             told = len(path)
             yield maker(f"{OWN}path", path_message(types, robot.map, path), logged_ns)
+
+
+def _of_start(maker: MessageMaker, frames: BagFrames, fruits: FruitCloud, start_ns: int) -> Iterator[Message]:
+    """Give what is said once: the map, and where a body is that the bag does not know."""
+    types, robot = maker.types, frames.robot
+    scene = fruits_scene(types, start_ns, robot.map, fruits.transformed(robot.map_from_fruits))
+    yield maker(f"{OWN}fruits", scene, start_ns, latched=True)
+    if frames.body_is_new:
+        own_body = (robot.camera, robot.base, np.linalg.inv(BODY_FROM_OPTICAL))
+        yield maker("/tf_static", transforms_message(types, start_ns, own_body), start_ns, latched=True)
 
 
 def _of_pose(types: Any, frames: BagFrames, pose: RobotPose, before: RobotPose | None) -> Iterator[tuple[str, Any]]:
