@@ -32,7 +32,6 @@ class BagWriter:
         self._writer.start(profile="ros2", library=MCAP_MARK)
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
-        self.n_messages = 0
 
     def __enter__(self) -> BagWriter:
         return self
@@ -50,7 +49,6 @@ class BagWriter:
             channel = self._channels[named] = self._channel(message.topic)
         published_ns = message.logged_ns if message.published_ns is None else message.published_ns
         self._writer.add_message(channel, message.logged_ns, message.body, published_ns)
-        self.n_messages += 1
 
     def _channel(self, topic: Topic) -> int:
         schema = (topic.type, topic.language, topic.definition)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -112,13 +114,14 @@ def replay(
     localizer = Localizer(fruits, config=config, threads=threads)
     frames = frames_of_bag(bag, map_frame, map_axes(orchard, up))
     way = localize(bag, detector, localizer, single=single, depth=depth, odometry=odometry, up=up, progress=progress)
-    ours = list(localized_messages(maker, bag, way, frames, fruits))
+    theirs, ours = _Counted(_copied(bag.file)), _Counted(localized_messages(maker, bag, way, frames, fruits))
     with whole_file(output) as partial:
         with partial.open("wb") as file, BagWriter(file, output) as writer:
-            for message in _merged(_copied(bag.file), ours):
+            # Theirs come first where the time is the same, and keep their order where theirs goes back.
+            for message in heapq.merge(theirs, ours, key=attrgetter("logged_ns")):
                 writer.write(message)
         require_unused(output)  # something may have come there meanwhile
-    return Replayed(localizer, way, frames, writer.n_messages - len(ours), len(ours))
+    return Replayed(localizer, way, frames, theirs.count, ours.count)
 
 
 def require_unused(output: Path) -> None:
@@ -142,12 +145,13 @@ def _copied(file: MessageFile) -> Iterator[Message]:
             yield made
 
 
-def _merged(theirs: Iterator[Message], ours: list[Message]) -> Iterator[Message]:
-    """Put ours, ascending, between theirs, in the order in which they were logged."""
-    at = 0
-    for message in theirs:
-        while at < len(ours) and ours[at].logged_ns < message.logged_ns:
-            yield ours[at]
-            at += 1
-        yield message
-    yield from ours[at:]
+class _Counted:
+    """Messages, and how many there have been."""
+
+    def __init__(self, messages: Iterator[Message]) -> None:
+        self._messages, self.count = messages, 0
+
+    def __iter__(self) -> Iterator[Message]:
+        for message in self._messages:
+            self.count += 1
+            yield message
