@@ -7,6 +7,9 @@ FUZZ_SECONDS ?= 600
 FUZZ_SEED ?= 1
 # A panic names its source file: in a wheel without the folders of who built it.
 NAMELESS = --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=/cargo --remap-path-prefix=$(CURDIR)=/pomona
+# Where robots live: Jetson, Raspberry Pi. Zig links against the C library of a Linux as old as this.
+ROBOT = aarch64-unknown-linux-gnu
+ROBOT_LIBC = manylinux2014
 
 .DEFAULT_GOAL := help
 .PHONY: all install develop page demo animation test test-rust test-python lint format bench experiments fuzz audit wheel docs clean help
@@ -67,8 +70,11 @@ fuzz: install ## damaged input for every reader and binding, FUZZ_SECONDS=600; w
 audit: install ## licences of all dependencies, and advisories as far as they can be fetched
 	$(RUN) python -m audit
 
-wheel: install ## a wheel for others, into dist/, looked at before it is called done
+wheel: install ## wheels for others and for robots (ARM, built but not run), into dist/, looked at before they are called done
 	RUSTFLAGS="$(NAMELESS)" $(RUN) maturin build --release --locked --out dist
+	rustup target add $(ROBOT)
+	RUSTFLAGS="$(NAMELESS)" $(RUN) --group wheel maturin build --release --locked --out dist \
+		--target $(ROBOT) --zig --compatibility $(ROBOT_LIBC)
 	$(RUN) python -m audit.wheel dist
 
 docs: $(UV) ## the documentation site, into site/

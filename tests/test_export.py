@@ -5,12 +5,15 @@ import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import numpy as np
 import pyogrio
 import pytest
 from pyogrio.raw import read as read_layer
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from growth_maker import grow_row
@@ -271,3 +274,38 @@ def test_growth_is_exported_as_columns(pomona: Pomona, tmp_path: Path) -> None:
         code, _, told = pomona("export", row.path, *flags, "-o", output)
         assert (code, told.count("\n")) == (2, 1)
         assert "--growth: found it with --observations, or --harvest without it" in told
+
+
+def read_scene(path: Path) -> tuple[list[Any], int]:
+    """Entities of the only message of an MCAP, decoded by the definitions that it has, and when it was logged."""
+    with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
+        ((connection, at_ns, body),) = reader.messages()
+        assert (connection.topic, connection.msgtype) == ("/pomona/fruits", "foxglove_msgs/msg/SceneUpdate")
+        return reader.deserialize(body, connection.msgtype).entities, at_ns
+
+
+def test_an_mcap_is_a_scene_for_foxglove(session_file: Path, full_cloud: FruitCloud) -> None:
+    orchard, output = session_file.with_name("orchard.gpkg"), session_file.with_name("fruits.mcap")
+    add_session(orchard, load_session(session_file))
+    export(orchard, "mcap", output)
+    entities, at_ns = read_scene(output)
+    assert [entity.id for entity in entities] == ["1", "2", "3", "4", "5", "6"]
+    assert {entity.frame_id for entity in entities} == {"map"}
+    places = [entity.spheres[0].pose.position for entity in entities]
+    np.testing.assert_array_equal([(place.x, place.y, place.z) for place in places], full_cloud.positions)
+    assert [entity.spheres[0].size.x for entity in entities][:2] == [0.07, 0.07]  # the second one's is not known
+    assert {(note.key, note.value) for note in entities[0].metadata} >= {("state", "seen")}
+    assert at_ns == 1_723_161_600 * 10**9  # 2024-08-09, when they were seen
+    again = session_file.with_name("again.mcap")
+    export(orchard, "mcap", again)
+    assert again.read_bytes() == output.read_bytes()
+    export(orchard, "mcap", output)  # an export may take the place of one
+
+
+def test_a_bag_is_not_replaced_by_an_export(session_file: Path) -> None:
+    bag = session_file.with_name("drive.mcap")
+    bag.write_bytes(b"\x89MCAP0\r\n and a day of work")
+    result = CliRunner().invoke(app, ["export", str(session_file), "-o", str(bag)])
+    assert isinstance(result.exception, PomonaError)
+    assert "is not an MCAP of fruits" in str(result.exception)
+    assert bag.read_bytes().endswith(b"a day of work")

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from audit.wheel import MODELS, MOST_EXTENSION_BYTES, MOST_MODEL_BYTES, NEEDED, PAGE, faults
+from audit.wheel import MACHINES, MODELS, MOST_EXTENSION_BYTES, MOST_MODEL_BYTES, NEEDED, PAGE, faults, missing
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -50,6 +50,27 @@ def test_a_good_wheel_has_no_faults(tmp_path: Path) -> None:
 def test_what_is_wrong_with_a_wheel_is_told(tmp_path: Path, changed: dict[str, bytes | None], said: str) -> None:
     files = {name: content for name, content in {**GOOD, **changed}.items() if content is not None}
     assert any(said in fault for fault in faults(wheel(tmp_path, files)))
+
+
+@pytest.mark.parametrize(("platform", "machine"), [("manylinux_2_17_aarch64", "aarch64"), ("linux_x86_64", "x86_64")])
+def test_a_core_is_for_the_processor_that_its_wheel_names(tmp_path: Path, platform: str, machine: str) -> None:
+    name = f"pomona-0.1.0-cp311-abi3-{platform}.whl"
+    for built, number in MACHINES.items():
+        core = b"\x7fELF".ljust(18, b"\0") + number.to_bytes(2, "little") + bytes(40)
+        path = wheel(tmp_path, {**GOOD, "pomona/_core.abi3.so": core}).rename(tmp_path / name)
+        found = faults(path)
+        assert found == [] if built == machine else f"expected one for {platform}" in found[0]
+    short = wheel(tmp_path, GOOD).rename(tmp_path / name)
+    assert f"expected one for {platform}" in faults(short)[0]
+
+
+def test_a_release_has_a_wheel_for_robots() -> None:
+    desk, robot = Path("pomona-0.1.0-cp311-abi3-linux_x86_64.whl"), Path("pomona-0.1.0-cp311-abi3-linux_aarch64.whl")
+    assert missing([desk, robot]) == []
+    assert missing([desk]) == missing([]) == ["found no wheel for aarch64"]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "built but not run" in makefile
+    assert "ziglang" in tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]["wheel"][0]
 
 
 def test_the_project_says_who_and_what_it_is() -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
 
-ExportFormat = Literal["csv", "ply", "geojson", "shp", "parquet"]
+ExportFormat = Literal["csv", "ply", "geojson", "shp", "parquet", "mcap"]
 
 SUFFIXES: dict[str, ExportFormat] = {
     ".csv": "csv",
@@ -32,6 +32,7 @@ SUFFIXES: dict[str, ExportFormat] = {
     ".json": "geojson",
     ".shp": "shp",
     ".parquet": "parquet",
+    ".mcap": "mcap",
 }
 """What the name of a file says of its format."""
 
@@ -45,11 +46,12 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat, anchor: 
         The fruits, for example ``FruitCloud.read("orchard.gpkg")``.
     path : str or Path
         The file to write; its suffix is yours to choose.
-    to : {"csv", "ply", "geojson", "shp", "parquet"}
-        Its format. Rows without ids get their row numbers in the last three.
+    to : {"csv", "ply", "geojson", "shp", "parquet", "mcap"}
+        Its format. Rows without ids get their row numbers in the last four. An MCAP is a scene for Foxglove.
     anchor : Anchor, optional
-        Where on Earth the frame lies, for example ``OrchardMap("orchard.gpkg").anchor()``. The last three then have
-        longitude, latitude (WGS 84) and height, and a CSV has them as further columns.
+        Where on Earth the frame lies, for example ``OrchardMap("orchard.gpkg").anchor()``. GeoJSON, Shapefile and
+        GeoParquet then have longitude, latitude (WGS 84) and height, a CSV has them as further columns, and an MCAP has
+        metres east, north and up.
     """
     path = Path(path)
     if anchor is not None and to in ("geojson", "shp", "parquet"):
@@ -64,6 +66,8 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat, anchor: 
         write_shapefile(path, cloud.positions, _plain_columns(cloud))
     elif to == "parquet":
         write_geoparquet(path, cloud.positions, _plain_columns(cloud))
+    elif to == "mcap":
+        _write_scene(path, cloud if anchor is None else cloud.transformed(anchor.enu_from_map))
     else:
         raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(ExportFormat))}")
 
@@ -76,6 +80,12 @@ def _write_on_earth(path: Path, cloud: FruitCloud, geodetic: NDArray[np.float64]
         write_shapefile(path, geodetic, _plain_columns(cloud), WGS84_TEXT)
     else:
         write_geoparquet(path, geodetic, _plain_columns(cloud), on_earth=True)
+
+
+def _write_scene(path: Path, cloud: FruitCloud) -> None:
+    from pomona.ros.scene_file import write_scene
+
+    write_scene(path, cloud)
 
 
 def _with_earth(cloud: FruitCloud, anchor: Anchor) -> FruitCloud:

@@ -25,6 +25,7 @@ __all__ = [
     "FARM_PLAN",
     "GROWN",
     "KEPT",
+    "MCAP_MARK",
     "MERGED",
     "MODEL",
     "PAIRS",
@@ -33,6 +34,7 @@ __all__ = [
     "POSES",
     "PULLED",
     "RENDERED",
+    "REPLAYED",
     "REPORT",
     "REPORT_MARK",
     "SCANNED",
@@ -76,6 +78,9 @@ DBASE_MARK = bytes([3, 80, 1, 1])
 
 PARQUET_MARK = b"fruits written by pomona"
 """In the footer of the Parquet files that are written here."""
+
+MCAP_MARK = "fruits written by pomona"
+"""The library, in the first record of the MCAP files that are written here."""
 
 REPORT_MARK = b"<!-- season report written by pomona -->"
 """In the first lines of the reports that are written here."""
@@ -211,6 +216,10 @@ def _is_parquet(path: Path) -> bool:
     return _head(path).startswith(b"PAR1") and PARQUET_MARK in _tail(path)
 
 
+def _is_mcap(path: Path) -> bool:
+    return _head(path).startswith(b"\x89MCAP0\r\n") and MCAP_MARK.encode() in _head(path)[:100]
+
+
 def _is_session(path: Path) -> bool:
     return database_of(path) == "session"
 
@@ -327,6 +336,7 @@ BOXES = Like("a table of boxes", _has_columns("image", "xmin", "ymin", "xmax", "
 MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 PULLED = Like("a pulled map, which takes a name of its own", lambda _: False)
+REPLAYED = Like("a replayed bag, which takes a name of its own", lambda _: False)
 MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
 PICTURE = Like("a plot", _is_picture)
 POSES = Like("poses in a map", _has_poses)
@@ -347,4 +357,5 @@ EXPORTS = {
     "geojson": Like("a GeoJSON of fruits", _is_geojson),
     "shp": Like("a Shapefile of fruits", _is_shapefile),
     "parquet": Like("a GeoParquet of fruits", _is_parquet),
+    "mcap": Like("an MCAP of fruits", _is_mcap),
 }

@@ -21,6 +21,7 @@ from pomona.cli import (
     map,
     match,
     report,
+    ros,
     scan,
     synth,
     thinning,
@@ -67,6 +68,7 @@ app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
 app.command()(localize.localize)
+app.add_typer(ros.app, name="ros")
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)

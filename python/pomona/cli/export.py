@@ -27,6 +27,7 @@ class Format(StrEnum):
     geojson = "geojson"
     shp = "shp"
     parquet = "parquet"
+    mcap = "mcap"
     parquet_by_date = "parquet-by-date"
 
 
@@ -36,6 +37,7 @@ _SINGLE: dict[Format, ExportFormat] = {
     Format.geojson: "geojson",
     Format.shp: "shp",
     Format.parquet: "parquet",
+    Format.mcap: "mcap",
 }
 """Formats of one file."""
 
@@ -82,7 +84,8 @@ def export(
     """Write fruits with their ids, in metres: a session's in its own frame, a map's in the map's, where last seen.
 
     A map with a georeference (`pomona map georeference`) gives longitude, latitude and height to GeoJSON, Shapefile,
-    GeoParquet, and to CSV as further columns.
+    GeoParquet, and to CSV as further columns. An MCAP is a scene for Foxglove, fruits coloured by their state, or with
+    --growth by their rate.
     """
     from pomona.cloud import FruitCloud
     from pomona.export import export_cloud, format_of

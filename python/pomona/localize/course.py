@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pomona.cloud import FruitCloud
 from pomona.localize.localizer import Localization
 from pomona.trajectory import Trajectory
 
@@ -23,16 +24,21 @@ class Step:
         Its number.
     time_s : float
         Its time, or its number where nothing is timed.
-    n_fruits : int
-        Fruits that it shows in 3D.
+    cloud : FruitCloud
+        Fruits that it shows in 3D, in the camera's frame.
     found : Localization
         Where the camera was.
     """
 
     frame: int
     time_s: float
-    n_fruits: int
+    cloud: FruitCloud
     found: Localization
+
+    @property
+    def n_fruits(self) -> int:
+        """Fruits that it shows in 3D."""
+        return len(self.cloud)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -86,7 +86,7 @@ def localize(
             found = localizer.locate(cloud, up=up) if single else localizer.update(cloud, moved, up=up)
             # Where nobody noted the time, frames are numbered: order is all that is known.
             time_s = float(frame.number if frame.time_s is None else frame.time_s)
-            steps.append(Step(frame.number, time_s, len(cloud), found))
+            steps.append(Step(frame.number, time_s, cloud, found))
             if progress is not None:
                 progress(len(steps) + len(skipped), sum(map(bool, (step.found for step in steps))))
     if not steps:

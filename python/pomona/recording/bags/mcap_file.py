@@ -107,18 +107,17 @@ class McapFile:
                     continue  # A raw picture often fills a chunk: that of the other camera need not be decompressed.
                 if start_ns is not None and piece.last_ns < start_ns:
                     continue
-                for logged_ns, channel, body in self._inside(file, piece):
+                for channel, logged_ns, published_ns, body in self._inside(file, piece):
                     topic = self._channels.get(channel)
                     if topic is not None and topic.name in topics and (start_ns is None or logged_ns >= start_ns):
-                        yield Message(topic, logged_ns, body)
+                        yield Message(topic, logged_ns, body, published_ns)
 
-    def _inside(self, file: BinaryIO, piece: Piece) -> Iterator[tuple[int, int, bytes]]:
-        """Give (time, channel, body) of the messages in a piece; a damaged one has none, and is told once."""
+    def _inside(self, file: BinaryIO, piece: Piece) -> Iterator[tuple[int, int, int, bytes]]:
+        """Give channel, both times and body of the messages in a piece; a damaged one has none, and is told once."""
         file.seek(piece.offset)
         content = file.read(piece.length)
         if piece.operation == MESSAGE:
-            channel, logged_ns = _head(content, 0)
-            yield logged_ns, channel, content[MESSAGE_HEAD.size :]
+            yield *_head(content, 0), content[MESSAGE_HEAD.size :]
             return
         try:
             plain = self._chunk(piece, content)
@@ -127,8 +126,7 @@ class McapFile:
             return
         for operation, start, end in _records(plain):
             if operation == MESSAGE:
-                channel, logged_ns = _head(plain, start)
-                yield logged_ns, channel, plain[start + MESSAGE_HEAD.size : end]
+                yield *_head(plain, start), plain[start + MESSAGE_HEAD.size : end]
 
     def _chunk(self, piece: Piece, content: bytes) -> bytes:
         """Unpack a chunk that is whole; note the channels in it."""
@@ -170,10 +168,10 @@ def _records(plain: bytes) -> Iterator[tuple[int, int, int]]:
         at += length
 
 
-def _head(content: bytes, start: int) -> tuple[int, int]:
-    """Channel and time of logging of a message."""
-    channel, _, logged_ns, _ = MESSAGE_HEAD.unpack_from(content, start)
-    return channel, min(logged_ns, LATEST_NS)
+def _head(content: bytes, start: int) -> tuple[int, int, int]:
+    """Channel of a message, and when it was logged and published."""
+    channel, _, logged_ns, published_ns = MESSAGE_HEAD.unpack_from(content, start)
+    return channel, min(logged_ns, LATEST_NS), min(published_ns, LATEST_NS)
 
 
 def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
@@ -229,5 +227,9 @@ def _record(kind: str, content: bytes) -> Any:
 
 def _topic(channel: Any, schemas: dict[int, Any]) -> Topic:
     schema = schemas.get(channel.schema_id)
-    name = "" if schema is None else str(schema.name)
-    return Topic(str(channel.topic), ros2_name(name), str(channel.message_encoding))
+    name, encoding = str(channel.topic), str(channel.message_encoding)
+    if schema is None:
+        return Topic(name, "", encoding, metadata=dict(channel.metadata))
+    return Topic(
+        name, ros2_name(str(schema.name)), encoding, str(schema.encoding), bytes(schema.data), dict(channel.metadata)
+    )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import struct
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -50,11 +50,18 @@ class Topic:
         As ROS 2 writes it: `sensor_msgs/msg/Image`.
     encoding : str
         `cdr` (ROS 2), `ros1`, or what an MCAP says.
+    language, definition : str, bytes
+        What the type is and in which language it says so, `ros2msg` and the like; nothing where the bag does not tell.
+    metadata : mapping
+        More about the topic, as an MCAP has it: `offered_qos_profiles`.
     """
 
     name: str
     type: str
     encoding: str
+    language: str = ""
+    definition: bytes = b""
+    metadata: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +72,14 @@ class Message:
     ----------
     logged_ns : int
         When the recorder received it; the header in the body says when it was made.
+    published_ns : int or None
+        When it was sent, where the bag knows that too.
     """
 
     topic: Topic
     logged_ns: int
     body: bytes
+    published_ns: int | None = None
 
 
 class MessageFile(Protocol):

@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.message_file import Message, Topic, ros2_name
+from pomona.recording.bags.quality_of_service import LATCHED, QOS
 from pomona.recording.bags.unpacked import unpacked
 
 __all__ = ["Ros1Rest", "has_no_index"]
@@ -177,4 +178,7 @@ def _fields(header: bytes) -> Fields:
 
 def _topic(fields: Fields, body: bytes) -> Topic:
     about = _fields(body)
-    return Topic(fields[b"topic"].decode(), ros2_name(about.get(b"type", b"").decode()), "ros1")
+    metadata = {QOS: LATCHED} if about.get(b"latching") == b"1" else {}
+    definition = about.get(b"message_definition", b"")
+    kind = ros2_name(about.get(b"type", b"").decode())
+    return Topic(fields[b"topic"].decode(), kind, "ros1", "ros1msg", definition, metadata)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pomona.errors import PomonaError
 from pomona.recording.bags.message_file import Message, Topic
+from pomona.recording.bags.quality_of_service import LATCHED, QOS, profiles_text
 from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES, unpacked
 
 __all__ = ["DamagedBagError", "RosBag"]
@@ -37,11 +38,9 @@ class RosBag:
         DamagedBagError
             When it cannot be read.
         """
-        ros1 = path.suffix == ".bag"
-        encoding = "ros1" if ros1 else "cdr"
         with _opened(path) as reader:
-            topics = {each.topic: Topic(each.topic, each.msgtype, encoding) for each in reader.connections}
-        return cls(path, "ROS 1 bag" if ros1 else "ROS 2 bag", topics, files)
+            topics = {each.topic: _topic_of(each) for each in reader.connections}
+        return cls(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, files)
 
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
         """Read in order of the time of logging.
@@ -66,6 +65,21 @@ class RosBag:
                 if not isinstance(logged_ns, int) or not isinstance(body, bytes):  # SQLite keeps what it is given
                     raise DamagedBagError(f"{self.path}: damaged (a message is {type(body).__name__})")
                 yield Message(self.topics[connection.topic], logged_ns, body)
+
+
+def _topic_of(connection: Any) -> Topic:
+    from rosbags.interfaces import MessageDefinitionFormat
+
+    about, definition = connection.ext, connection.msgdef
+    ros1 = not hasattr(about, "offered_qos_profiles")
+    if ros1:
+        metadata = {QOS: LATCHED} if about.latching else {}
+    else:
+        metadata = {QOS: profiles_text(about.offered_qos_profiles)} if about.offered_qos_profiles else {}
+    languages = {MessageDefinitionFormat.NONE: "", MessageDefinitionFormat.IDL: "ros2idl"}
+    language = languages.get(definition.format, "ros1msg" if ros1 else "ros2msg")
+    encoding, text = "ros1" if ros1 else "cdr", definition.data.encode()
+    return Topic(connection.topic, connection.msgtype, encoding, language, text, metadata)
 
 
 def _opened(path: Path) -> Any:

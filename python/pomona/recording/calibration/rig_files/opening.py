@@ -19,8 +19,8 @@ ACCEPTED = (
 )
 """For messages and the documentation."""
 
-YAML_KINDS = ("ros", "kalibr", "opencv")
-MAY_BE_SEVERAL_FILES = ("ros", "opencv")
+YAML_KINDS = ("ros_camera_info", "kalibr", "opencv")
+MAY_BE_SEVERAL_FILES = ("ros_camera_info", "opencv")
 
 
 def find_optics(

@@ -1,0 +1,1 @@
+"""A node of ROS 2 that says where a robot is in an orchard."""
