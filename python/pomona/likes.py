@@ -26,6 +26,7 @@ __all__ = [
     "GROWN",
     "KEPT",
     "MERGED",
+    "METRIC_MODEL",
     "MODEL",
     "PAIRS",
     "PARQUET_MARK",
@@ -328,6 +329,7 @@ MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 PULLED = Like("a pulled map, which takes a name of its own", lambda _: False)
 MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
+METRIC_MODEL = Like("a metric model, which takes a folder of its own", lambda _: False, is_folder=True)
 PICTURE = Like("a plot", _is_picture)
 POSES = Like("poses in a map", _has_poses)
 VIDEO = Like("a preview", _is_video)

@@ -20,11 +20,13 @@ from pomona.cli import (
     localize,
     map,
     match,
+    metric,
     report,
     scan,
     synth,
     thinning,
     train,
+    triangulate,
     validate,
     view,
 )
@@ -67,6 +69,8 @@ app.command()(scan.scan)
 app.command()(match.match)
 app.add_typer(map.app, name="map")
 app.command()(localize.localize)
+app.command()(metric.metric)
+app.command()(triangulate.triangulate)
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)
