@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,17 @@ from pomona.atomic import whole_folder
 from pomona.cloud import Cloud, FruitCloud, as_cloud
 from pomona.free_scale.scaling import Scaling, scaling_of
 from pomona.localize.map_fruits import hanging_rows
-from pomona.matching import Match
-from pomona.matching import match as matched
+from pomona.matching import Index, Match
 from pomona.reconstruction import SparseModel, write_reconstruction
 
 __all__ = ["NOTE", "Upgrade", "metric", "write_metric"]
 
 NOTE = "metric.json"
 """Beside the files of an upgraded model: its scale, how sure it is, and of what map."""
+
+
+ROUNDS = 5
+"""Of pairing anew under the scale that was fitted: where a row bends, the first pairs are those of one part of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +78,18 @@ def metric(
     query: FruitCloud = as_cloud(fruits, "free")
     known = as_cloud(map)
     known = known.select(hanging_rows(known))
-    match = matched(query, known, scale="free", config=config, threads=threads)
-    return Upgrade(match, scaling_of(match, query, known))
+    index = Index(known, scale="free", config=config, threads=threads)
+    match = index.match(query)
+    scaling = scaling_of(match, query, known)
+    for _ in range(ROUNDS):
+        if scaling is None:
+            break
+        again = index.pairs_under(query, scaling.map_from_model, noise_m=match.noise_m)
+        if len(again.pairs) <= len(match.pairs):
+            break
+        match = replace(again, log_odds=match.log_odds, noise_m=match.noise_m)
+        scaling = scaling_of(match, query, known)
+    return Upgrade(match, scaling)
 
 
 def write_metric(folder: Path, model: SparseModel, upgrade: Upgrade, about: Mapping[str, Any]) -> None:

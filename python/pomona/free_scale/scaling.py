@@ -1,14 +1,17 @@
 """The scale of a reconstruction from the fruits of a map, and how sure it is.
 
-The similarity is fitted to the pairs anew, each weighted by its probability, by its covariance, and by Cauchy's loss.
-Residuals of neighbouring fruits are alike (drift, sag, a bent reconstruction), so that their number says little: the
-uncertainty is that of the jackknife over stretches of the row. Left out one after the other, `k` stretches give
-scales `s_i`; the variance of `ln s` is (k - 1)/k sum (ln s_i - mean)^2, and Student's t with k - 1 degrees of freedom
-gives the interval.
+Pairs of fruits, m in the map and q in the model, are off by e = m - (s R q + t). Noise of each fruit is one part of e,
+the other moves what is near together: drift, sag, a reconstruction that is not straight. Cov(e) = v (D + r K), with D
+the X as independent, the residuals of a bent row give a scale that is several times surer than it is.
+
+For each r, l and shape of a grid, turn, place and ln s are the generalised least squares, whose restricted likelihood
+(Patterson and Thompson, 1971) knows that seven numbers were fitted to the same residuals. The answer is the mean over
+the grid, so that what the pairs cannot tell about the bend is uncertainty of the scale too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,12 +25,25 @@ __all__ = ["LEAST_PAIRS", "Scaling", "scaling_of"]
 Array = NDArray[np.float64]
 
 LEAST_PAIRS = 6
-"""For an uncertainty: four numbers of the similarity are turns and scale, and each stretch has a pair at least."""
+"""For an uncertainty: seven numbers are fitted to three of each pair."""
 
-STRETCHES = 12
-"""Of the row, with about as many pairs each."""
+BENDS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""r: variance of the bend over that of the mean fruit."""
 
-CONFIDENCE = 0.9
+LENGTHS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0)
+"""l, in lengths of what the pairs reach over."""
+
+SHAPES: tuple[Callable[[Array], Array], ...] = (
+    lambda apart: np.exp(-apart),
+    lambda apart: (1 + np.sqrt(3) * apart) * np.exp(-np.sqrt(3) * apart),
+)
+"""K of a distance over l: a random walk that is held, and one of velocities (Matern, 1/2 and 3/2)."""
+
+MOST_PAIRS = 400
+"""That the uncertainty is made of; more are thinned out along the row: bends are its most, not noise."""
+
+Z_OF_CONFIDENCE = 1.645
+"""Sigmas on both sides of nine draws of ten."""
 
 SCALE2 = 3.0
 """Cauchy's c^2 for places, as in the core's `bundle`."""
@@ -72,20 +88,17 @@ def scaling_of(match: Match, query: FruitCloud, known: FruitCloud) -> Scaling | 
     query, known : FruitCloud
         Of the model and of the map.
     """
-    from scipy.stats import t
-
     if not match or match.map_from_query is None or len(match.pairs) < LEAST_PAIRS:
         return None
     pairs = _Pairs.of(match, query, known)
     fitted = _fitted(pairs, match.map_from_query)
-    stretches = _stretches(pairs.in_map)
-    left_out = [_fitted(pairs.select(stretches != one), fitted) for one in range(stretches.max() + 1)]
-    logs = np.log([_scale(transform) for transform in left_out])
-    n = len(logs)
-    sigma = float(np.sqrt((n - 1) / n * ((logs - logs.mean()) ** 2).sum()))
-    reach = float(t.ppf((1 + CONFIDENCE) / 2, n - 1)) * sigma
-    scale = _scale(fitted)
-    return Scaling(fitted, scale, scale * sigma, scale * np.exp(-reach), scale * np.exp(reach), len(match.pairs))
+    logs, variances, probabilities = _scales_of_bends(pairs.thinned(), fitted)
+    step = float(probabilities @ logs)
+    sigma = float(np.sqrt(probabilities @ (variances + (logs - step) ** 2)))
+    refined = _rescaled(fitted, np.exp(step), pairs)
+    reach = Z_OF_CONFIDENCE * sigma
+    scale = _scale(refined)
+    return Scaling(refined, scale, scale * sigma, scale * np.exp(-reach), scale * np.exp(reach), len(match.pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +120,11 @@ class _Pairs:
             variances = variances + in_map * _scale(match.map_from_query) ** 2
         return cls(query.positions[asked], known.positions[answers], match.probabilities, variances)
 
-    def select(self, rows: NDArray[np.bool_]) -> _Pairs:
+    def thinned(self) -> _Pairs:
+        """Give at most `MOST_PAIRS`, evenly along the row."""
+        centred = self.in_map - self.in_map.mean(axis=0)
+        order = np.argsort(centred @ np.linalg.svd(centred, full_matrices=False)[2][0], kind="stable")
+        rows = order[:: -(-len(order) // MOST_PAIRS)]
         return _Pairs(self.in_model[rows], self.in_map[rows], self.weights[rows], self.variances[rows])
 
 
@@ -115,12 +132,62 @@ def _scale(transform: Array) -> float:
     return float(np.cbrt(np.linalg.det(transform[:3, :3])))
 
 
-def _stretches(positions: Array) -> NDArray[np.int64]:
-    """Give numbers to the stretches of the row in which places lie, as many in each."""
-    centred = positions - positions.mean(axis=0)
-    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
-    order = np.argsort(np.argsort(along, kind="stable"), kind="stable")
-    return np.asarray(order * min(STRETCHES, len(positions)) // len(positions))
+def _scales_of_bends(pairs: _Pairs, fitted: Array) -> tuple[Array, Array, Array]:
+    """Give the step of ln s, its variance and the probability of each bend of the grid."""
+    placed = pairs.in_model @ fitted[:3, :3].T + fitted[:3, 3]
+    errors = pairs.in_map - placed
+    spread = pairs.variances / (pairs.weights / (1 + (errors**2).sum(axis=1) / pairs.variances / SCALE2))
+    distances = np.linalg.norm(placed[:, None] - placed[None], axis=2)
+    noise, reach = np.diag(spread / np.median(spread)), distances.max()
+    columns = _columns(placed)
+    found = [
+        _of_bend(noise + bend * shape(distances / (length * reach)), columns, errors)
+        for shape in SHAPES
+        for length in LENGTHS
+        for bend in BENDS
+    ]
+    logs, variances, likelihoods = np.array(found).T
+    probabilities = np.exp(likelihoods - likelihoods.max())
+    return logs, variances, probabilities / probabilities.sum()
+
+
+def _columns(placed: Array) -> Array:
+    """Give how places (N, 3) follow turns, steps along the axes and ln s: (N, 3, 7)."""
+    x, y, z = (placed - placed.mean(axis=0)).T
+    nothing, one = np.zeros_like(x), np.ones_like(x)
+    rows = [
+        [nothing, z, -y, one, nothing, nothing, x],
+        [-z, nothing, x, nothing, one, nothing, y],
+        [y, -x, nothing, nothing, nothing, one, z],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _of_bend(covariance: Array, columns: Array, errors: Array) -> tuple[float, float, float]:
+    """Give ln s, its variance and the logarithm of the restricted likelihood, where v is unknown."""
+    from scipy.linalg import solve_triangular
+
+    root = np.linalg.cholesky(covariance)
+    n = len(errors)
+    both = np.concatenate([columns.reshape(n, -1), errors], axis=1)
+    white = solve_triangular(root, both, lower=True, check_finite=False)
+    design, seen = white[:, :21].reshape(3 * n, 7), white[:, 21:].reshape(3 * n)
+    normal = design.T @ design
+    answer = np.linalg.solve(normal, design.T @ seen)
+    degrees = 3 * n - 7
+    variance = float(((seen - design @ answer) ** 2).sum()) / degrees
+    log_volumes = 3 * 2 * np.log(np.diag(root)).sum() + np.linalg.slogdet(normal)[1]
+    likelihood = -(degrees * np.log(variance) + log_volumes) / 2
+    return float(answer[6]), variance * float(np.linalg.inv(normal)[6, 6]), float(likelihood)
+
+
+def _rescaled(transform: Array, factor: float, pairs: _Pairs) -> Array:
+    """Give the transform with another scale, its middle where it was."""
+    middle = (pairs.in_model @ transform[:3, :3].T + transform[:3, 3]).mean(axis=0)
+    about = np.eye(4)
+    about[:3, :3] *= factor
+    about[:3, 3] = (1 - factor) * middle
+    return np.asarray(about @ transform)
 
 
 def _fitted(pairs: _Pairs, start: Array) -> Array:
