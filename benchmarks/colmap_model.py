@@ -25,7 +25,7 @@ def write_model(folder: Path, recording: Recording, rng: np.random.Generator, *,
     units_per_m = float(np.exp(rng.uniform(np.log(0.1), np.log(10))))
     turn, shift = Rotation.random(random_state=rng).as_matrix(), units_per_m * rng.uniform(-20, 20, 3)
     poses = [_words(pose, turn, units_per_m, shift) for pose in recording.trajectory.session_from_camera]
-    names = [f"left/{number:04d}.png" for number in recording.numbers]
+    names = [f"left/{name}" for name in sorted(file.name for file in (recording.path / "left").iterdir())]
     calibration = recording.calibration
     numbers = (calibration.fx, calibration.fy, calibration.cx, calibration.cy)
     (_write_text if form == "text" else _write_binary)(folder, names, poses, calibration.size_px, numbers)

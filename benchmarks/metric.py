@@ -69,6 +69,9 @@ def main(arguments: list[str]) -> None:
         write_text("metric.md", text)
 
 
+NUMBERS = ("pairs", "within", "error %", "worst %", "sigma %", "inside", "sigmas")
+"""Columns of the table that need scales."""
+
 Found = list[tuple[Upgrade, float]]
 """Answers, and the true scale of each."""
 
@@ -149,6 +152,8 @@ def _detector(recording: Recording, boxes: str) -> Callable[..., object]:
 def summary(name: str, found: Found) -> dict[str, object]:
     """Put the draws of one kind into a row."""
     scalings = [(one.scaling, scale) for one, scale in found if one.scaling is not None]
+    if not scalings:
+        return {"clouds": name, "draws": len(found), "found": 0, **dict.fromkeys(NUMBERS, "-")}
     errors = np.array([scaling.scale / scale - 1 for scaling, scale in scalings])
     sigmas = np.array([scaling.sigma / scaling.scale for scaling, _ in scalings])
     return {

@@ -46,8 +46,8 @@ def open_reconstruction(folder: str | Path) -> SparseModel:
         rigs=reader.read_rigs(files["rigs"]) if has_rigs else None,
         frames=reader.read_frames(files["frames"]) if has_rigs else None,
     )
-    _require_images(files["images"], model)
     _require_points(files["points3D"], model)
+    _require_images(files["images"], model)
     if has_rigs:
         _require_frames(files["frames"], model)
     return model

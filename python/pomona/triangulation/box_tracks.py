@@ -20,8 +20,8 @@ Rows = NDArray[np.int64]
 LEAST_VIEWS = 3
 """Two directions meet by chance all the time, three seldom."""
 
-LEAST_EVIDENCE = 6.0
-"""Nats: a row of a hundred fruits has some ten thousand chances to be wrong."""
+MARGIN = 3.0
+"""Nats beyond what the best of all proposals has by chance; without it boxes at random are four times as many fruits."""
 
 ROUNDS = 2
 """Of taking boxes and moving."""
@@ -37,20 +37,25 @@ def tracks_of_boxes(pictures: PosedPictures, boxes: PosedBoxes) -> Rows:
         for row, found in enumerate(proposed)
         for place, evidence in enumerate(found.evidence)
     )
+    # Of as many as are proposed chance makes one so likely; and that a place was moved to its boxes explains more.
+    least_evidence = MARGIN + np.log(1 + sum(found.n_proposed for found in proposed))
     for _, box, row, place in order:
         if fruits[box] >= 0:
             continue
-        taken = _taken(pictures, boxes, first_box, fruits, proposed[row].select(np.array([place])), row)
-        if len(taken) >= LEAST_VIEWS:
+        taken, evidence = _taken(pictures, boxes, first_box, fruits, proposed[row].select(np.array([place])), row)
+        if len(taken) >= LEAST_VIEWS and evidence >= least_evidence:
             fruits[taken], n_fruits = n_fruits, n_fruits + 1
     return fruits
 
 
 def _taken(
     pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, fruits: Rows, place: Hypotheses, row: int
-) -> Rows:
-    """Give the boxes that a place takes of those that are left; none where too little speaks for it by now."""
-    nothing = np.empty(0, np.int64)
+) -> tuple[Rows, float]:
+    """Give the boxes that a place takes of those that are left, and what speaks for it by now, nats.
+
+    The picture that proposed the place does not: the place is where its box is.
+    """
+    nothing = np.empty(0, np.int64), -np.inf
     for _ in range(ROUNDS):
         _, taken = _asked(pictures, boxes, first_box, fruits, place)
         if len(taken) < LEAST_VIEWS:
@@ -61,8 +66,8 @@ def _taken(
         diameter = np.median(boxes.diameters(pictures.in_cameras(views.positions, boxes.pictures[taken]), taken))
         place = Hypotheses(place.boxes, views.positions, views.covariances, np.array([diameter]), place.evidence)
     gains, taken = _asked(pictures, boxes, first_box, fruits, place)
-    asked = np.union1d(neighbours_of(pictures, row), boxes.pictures[taken])
-    return taken if gains[asked].sum() >= LEAST_EVIDENCE else nothing
+    asked = np.setdiff1d(np.union1d(neighbours_of(pictures, row), boxes.pictures[taken]), [row])
+    return taken, float(gains[asked].sum())
 
 
 def _asked(

@@ -26,7 +26,7 @@ FARTHEST_OFF = 0.1
 LEAST_SIGHTS = 2
 """Of a fruit whose boxes are named."""
 
-WHOLE_SHARE = 0.8
+WHOLE_SHARE = 0.75
 """Of the diameters that the boxes of a fruit show: leaves make boxes smaller, and nothing makes them larger."""
 
 HIDDEN_SIGMA = 0.1
@@ -86,8 +86,8 @@ def _cloud(pictures: PosedPictures, boxes: PosedBoxes, fruits: Rows, names: tupl
     views = triangulated(pictures, boxes, rows, fruits[rows], starts)
     known = np.bincount(fruits[rows], minlength=len(names)) >= LEAST_SIGHTS
     known &= np.isfinite(views.positions).all(axis=1) & _is_near(pictures, boxes, rows, fruits[rows], views)
-    new_row = np.where(known, np.cumsum(known) - 1, -1)
-    of_boxes = np.where(fruits >= 0, new_row[fruits], -1)
+    new_row = np.append(np.where(known, np.cumsum(known) - 1, -1), -1)  # boxes of no fruit, -1, take the last
+    of_boxes = new_row[fruits]
     rows = np.flatnonzero(of_boxes >= 0)
     positions = views.positions[known]
     sizes, sigmas = _sizes(pictures, boxes, rows, of_boxes[rows], positions)

@@ -7,7 +7,8 @@ it is expected, against one that chance put there, or none although it should sh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,8 @@ class Hypotheses:
         Units of the model.
     evidence : (H,) float64
         For one fruit against chance, nats.
+    n_proposed : int
+        Of how many these are the best.
     """
 
     boxes: Rows
@@ -64,10 +67,16 @@ class Hypotheses:
     covariances: Array
     diameters: Array
     evidence: Array
+    n_proposed: int = 0
 
     def select(self, rows: NDArray[np.generic]) -> Hypotheses:
         """Give some of them."""
-        return Hypotheses(*(getattr(self, name)[rows] for name in Hypotheses.__dataclass_fields__))
+        return Hypotheses(*(column[rows] for column in self.columns), self.n_proposed)
+
+    @property
+    def columns(self) -> tuple[NDArray[Any], ...]:
+        """All of it but their number."""
+        return self.boxes, self.positions, self.covariances, self.diameters, self.evidence
 
 
 def hypotheses_of(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, row: int) -> Hypotheses:
@@ -76,17 +85,13 @@ def hypotheses_of(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, r
     proposed = [_of_two(pictures, boxes, first_box, row, int(other)) for other in ladder]
     if not proposed:
         return _none()
-    all_ = Hypotheses(*(np.concatenate(columns) for columns in zip(*(map(_columns, proposed)), strict=True)))
+    all_ = Hypotheses(*(np.concatenate(parts) for parts in zip(*(one.columns for one in proposed), strict=True)))
     evidence = np.zeros(len(all_.evidence))
     for other in ladder.tolist():
         span = slice(int(first_box[other]), int(first_box[other + 1]))
         gains, _ = evidence_of_boxes(pictures, boxes, np.arange(span.start, span.stop), other, all_)
         evidence += gains
-    return _best_of_each(Hypotheses(all_.boxes, all_.positions, all_.covariances, all_.diameters, evidence))
-
-
-def _columns(hypotheses: Hypotheses) -> list[Array]:
-    return [getattr(hypotheses, name) for name in Hypotheses.__dataclass_fields__]
+    return _best_of_each(replace(all_, evidence=evidence, n_proposed=len(evidence)))
 
 
 def _none() -> Hypotheses:

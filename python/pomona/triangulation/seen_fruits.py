@@ -71,7 +71,7 @@ def fruits_of_model(recording: ModelRecording, boxes: FoundBoxes, progress: Look
     Raises
     ------
     PomonaError
-        There are fewer pictures than two, or boxes of no use.
+        There are fewer pictures than two, or none of them can be read.
     """
     if len(recording) < LEAST_PICTURES:
         raise PomonaError(f"{recording.model.folder}: found one picture, expected two that show a fruit")
@@ -79,9 +79,11 @@ def fruits_of_model(recording: ModelRecording, boxes: FoundBoxes, progress: Look
     for frame in recording.frames():
         try:
             found.append(boxes(frame))
-        except UnreadablePictureError:
+        except UnreadablePictureError as error:
             found.append(Detections.none(looked=False))
             n_skipped += 1
+            if n_skipped == len(recording):
+                raise PomonaError(f"{recording.path}: none of {n_skipped} pictures can be read: {error}") from None
         if progress is not None:
             progress(len(found), len(recording))
     poses = [recording.model.camera_from_model(image) for image in recording.images.values()]
