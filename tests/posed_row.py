@@ -45,7 +45,7 @@ class PosedRow:
     @property
     def model(self) -> Model:
         names = [f"cam/{row:04d}.png" for row in range(len(self.boxes_px))]
-        return Model(names, self.camera_from_model, "SIMPLE_PINHOLE", SIZE_PX, (FOCAL_PX, *CENTRE_PX))
+        return Model(names, self.camera_from_model, "SIMPLE_PINHOLE", SIZE_PX, (FOCAL_PX, *CENTRE_PX.tolist()))
 
     def write_boxes(self, path: Path, by: str = "frame", ids: bool = False) -> Path:
         with path.open("w", newline="") as file:

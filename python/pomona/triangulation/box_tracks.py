@@ -21,7 +21,7 @@ LEAST_VIEWS = 3
 """Two directions meet by chance all the time, three seldom."""
 
 MARGIN = 3.0
-"""Nats beyond what the best of all proposals has by chance; without it boxes at random are four times as many fruits."""
+"""Nats beyond what the best of all proposals has by chance; boxes at random make four times as many fruits without."""
 
 ROUNDS = 2
 """Of taking boxes and moving."""

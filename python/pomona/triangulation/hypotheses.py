@@ -8,7 +8,6 @@ it is expected, against one that chance put there, or none although it should sh
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,12 +70,14 @@ class Hypotheses:
 
     def select(self, rows: NDArray[np.generic]) -> Hypotheses:
         """Give some of them."""
-        return Hypotheses(*(column[rows] for column in self.columns), self.n_proposed)
-
-    @property
-    def columns(self) -> tuple[NDArray[Any], ...]:
-        """All of it but their number."""
-        return self.boxes, self.positions, self.covariances, self.diameters, self.evidence
+        return Hypotheses(
+            self.boxes[rows],
+            self.positions[rows],
+            self.covariances[rows],
+            self.diameters[rows],
+            self.evidence[rows],
+            self.n_proposed,
+        )
 
 
 def hypotheses_of(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, row: int) -> Hypotheses:
@@ -85,12 +86,18 @@ def hypotheses_of(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, r
     proposed = [_of_two(pictures, boxes, first_box, row, int(other)) for other in ladder]
     if not proposed:
         return _none()
-    all_ = Hypotheses(*(np.concatenate(parts) for parts in zip(*(one.columns for one in proposed), strict=True)))
-    evidence = np.zeros(len(all_.evidence))
+    all_ = Hypotheses(
+        np.concatenate([one.boxes for one in proposed]),
+        np.concatenate([one.positions for one in proposed]),
+        np.concatenate([one.covariances for one in proposed]),
+        np.concatenate([one.diameters for one in proposed]),
+        np.zeros(sum(len(one.evidence) for one in proposed)),
+    )
+    evidence = all_.evidence
     for other in ladder.tolist():
         span = slice(int(first_box[other]), int(first_box[other + 1]))
         gains, _ = evidence_of_boxes(pictures, boxes, np.arange(span.start, span.stop), other, all_)
-        evidence += gains
+        evidence = evidence + gains
     return _best_of_each(replace(all_, evidence=evidence, n_proposed=len(evidence)))
 
 
