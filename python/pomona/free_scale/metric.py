@@ -10,7 +10,7 @@ from typing import Any
 
 from pomona.atomic import whole_folder
 from pomona.cloud import Cloud, FruitCloud, as_cloud
-from pomona.free_scale.scaling import Scaling, scaling_of
+from pomona.free_scale.scaling import FreeScaling, scaling_of
 from pomona.localize.map_fruits import hanging_rows
 from pomona.matching import Index, Match
 from pomona.reconstruction import SparseModel, write_reconstruction
@@ -33,12 +33,12 @@ class Upgrade:
     ----------
     match : Match
         Of the fruits of the model with those of the map, the scale free.
-    scaling : Scaling or None
+    scaling : FreeScaling or None
         None where nothing was found, or too few pairs say how sure the scale is.
     """
 
     match: Match
-    scaling: Scaling | None
+    scaling: FreeScaling | None
 
     def __bool__(self) -> bool:
         return self.scaling is not None

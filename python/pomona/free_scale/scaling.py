@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.matching import Match
 
-__all__ = ["LEAST_PAIRS", "Scaling", "scaling_of"]
+__all__ = ["LEAST_PAIRS", "FreeScaling", "scaling_of"]
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ FITS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Scaling:
+class FreeScaling:
     """How a reconstruction lies in a map.
 
     Attributes
@@ -78,7 +78,7 @@ class Scaling:
     n_pairs: int
 
 
-def scaling_of(match: Match, query: FruitCloud, known: FruitCloud) -> Scaling | None:
+def scaling_of(match: Match, query: FruitCloud, known: FruitCloud) -> FreeScaling | None:
     """Say how sure the scale of a match is; None where nothing was found, or too few pairs to tell.
 
     Parameters
@@ -98,7 +98,7 @@ def scaling_of(match: Match, query: FruitCloud, known: FruitCloud) -> Scaling | 
     refined = _rescaled(fitted, np.exp(step), pairs)
     reach = Z_OF_CONFIDENCE * sigma
     scale = _scale(refined)
-    return Scaling(refined, scale, scale * sigma, scale * np.exp(-reach), scale * np.exp(reach), len(match.pairs))
+    return FreeScaling(refined, scale, scale * sigma, scale * np.exp(-reach), scale * np.exp(reach), len(match.pairs))
 
 
 @dataclass(frozen=True, eq=False)
