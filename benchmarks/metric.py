@@ -5,6 +5,7 @@
 - rendered row: the true fruits of one date, each hidden with 40 % on both sides, with 1 cm of noise per axis; *bent*:
   and a drift of 2 cm per axis besides that changes over 1.5 m of the row, which is 9 m long, as odometry has it.
 - few fruits: 30 % of them are left in the query.
+- copy: the fruits of the row, and the oranges, against themselves, 20 % hidden on both sides.
 - oranges: odd against even frames of a structure from motion, of which each detection is real (as in `clouds`), 20 %
   hidden on both sides. The two halves are one pair of real clouds, so that their draws err alike.
 
@@ -51,7 +52,7 @@ Draw = Callable[[np.random.Generator], Pair]
 
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks metric", description=__doc__)
-    parser.add_argument("--draws", type=int, default=200)
+    parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--parts", nargs="+", choices=("drawn", "models"))
     options = parser.parse_args(arguments)
     data = shared_data()
@@ -88,6 +89,8 @@ def clouds_of(data: Path, draws: int) -> Iterator[tuple[str, Found]]:
             hidden(rng, truth, 0.4),
         ),
     }
+    kinds["rendered row, copy"] = _thinned(truth, truth)
+    kinds["oranges, copy of run 1"] = _thinned(halves[0][1], halves[0][1])
     for run, (query, map_) in enumerate(halves):
         kinds[f"oranges, halves of run {run + 1}"] = _thinned(query, map_)
     for name, draw in kinds.items():

@@ -127,7 +127,7 @@ def test_a_session_without_a_scale_says_so_and_no_map_takes_it(row, given, tmp_p
     assert not (tmp_path / "orchard.gpkg").exists()
     with pytest.raises(PomonaError, match="without a scale"):
         add_session(tmp_path / "orchard.gpkg", found)
-    with pytest.raises(PomonaError, match="--scale free takes it"):
+    with pytest.raises(PomonaError, match="only a match with --scale free takes it"):
         FruitCloud.read(session)
     matched = pomona("match", session, orchard, "--scale", "free", "--json")
     assert json.loads(matched.stdout)["scale"] == pytest.approx(row.scale, rel=0.005)

@@ -48,6 +48,11 @@ Z_OF_CONFIDENCE = 1.645
 SCALE2 = 3.0
 """Cauchy's c^2 for places, as in the core's `bundle`."""
 
+LEAST_WEIGHT = 0.01
+"""Of a pair that is surely wrong: one of none has a variance without end."""
+
+TINY = 1e-12
+
 FITS = 10
 """Of reweighting."""
 
@@ -92,13 +97,11 @@ def scaling_of(match: Match, query: FruitCloud, known: FruitCloud) -> FreeScalin
         return None
     pairs = _Pairs.of(match, query, known)
     fitted = _fitted(pairs, match.map_from_query)
-    logs, variances, probabilities = _scales_of_bends(pairs.thinned(), fitted)
-    step = float(probabilities @ logs)
-    sigma = float(np.sqrt(probabilities @ (variances + (logs - step) ** 2)))
-    refined = _rescaled(fitted, np.exp(step), pairs)
-    reach = Z_OF_CONFIDENCE * sigma
+    step, sigma = _mean_over(_bends(pairs.thinned(), fitted))
+    refined = _rescaled(fitted, float(np.exp(step)), pairs)
     scale = _scale(refined)
-    return FreeScaling(refined, scale, scale * sigma, scale * np.exp(-reach), scale * np.exp(reach), len(match.pairs))
+    low, high = (scale * float(np.exp(side * Z_OF_CONFIDENCE * sigma)) for side in (-1, 1))
+    return FreeScaling(refined, scale, scale * sigma, low, high, len(match.pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +121,8 @@ class _Pairs:
         if query.covariances is not None:
             in_map = np.trace(query.covariances[asked], axis1=1, axis2=2) / 3
             variances = variances + in_map * _scale(match.map_from_query) ** 2
-        return cls(query.positions[asked], known.positions[answers], match.probabilities, variances)
+        weights = np.maximum(match.probabilities, LEAST_WEIGHT)
+        return cls(query.positions[asked], known.positions[answers], weights, variances)
 
     def thinned(self) -> _Pairs:
         """Give at most `MOST_PAIRS`, evenly along the row."""
@@ -132,28 +136,44 @@ def _scale(transform: Array) -> float:
     return float(np.cbrt(np.linalg.det(transform[:3, :3])))
 
 
-def _scales_of_bends(pairs: _Pairs, fitted: Array) -> tuple[Array, Array, Array]:
-    """Give the step of ln s, its variance and the probability of each bend of the grid."""
+@dataclass(frozen=True)
+class _Bend:
+    """A step of ln s under one bend of the grid, its variance, and how likely the bend is."""
+
+    step: float
+    variance: float
+    log_likelihood: float
+
+
+def _bends(pairs: _Pairs, fitted: Array) -> list[_Bend]:
     placed = pairs.in_model @ fitted[:3, :3].T + fitted[:3, 3]
     errors = pairs.in_map - placed
     spread = pairs.variances / (pairs.weights / (1 + (errors**2).sum(axis=1) / pairs.variances / SCALE2))
     distances = np.linalg.norm(placed[:, None] - placed[None], axis=2)
-    noise, reach = np.diag(spread / np.median(spread)), distances.max()
-    columns = _columns(placed)
-    found = [
+    noise, reach = np.diag(spread / np.median(spread)), distances.max() or 1.0
+    columns = _columns(placed - placed.mean(axis=0))
+    return [
         _of_bend(noise + bend * shape(distances / (length * reach)), columns, errors)
         for shape in SHAPES
         for length in LENGTHS
         for bend in BENDS
     ]
-    logs, variances, likelihoods = np.array(found).T
+
+
+def _mean_over(bends: list[_Bend]) -> tuple[float, float]:
+    """Give the mean step over the grid, and its sigma: within each bend, and of what they say."""
+    likelihoods = np.array([bend.log_likelihood for bend in bends])
     probabilities = np.exp(likelihoods - likelihoods.max())
-    return logs, variances, probabilities / probabilities.sum()
+    probabilities /= probabilities.sum()
+    steps = np.array([bend.step for bend in bends])
+    mean = float(probabilities @ steps)
+    variances = np.array([bend.variance for bend in bends]) + (steps - mean) ** 2
+    return mean, float(np.sqrt(probabilities @ variances))
 
 
 def _columns(placed: Array) -> Array:
-    """Give how places (N, 3) follow turns, steps along the axes and ln s: (N, 3, 7)."""
-    x, y, z = (placed - placed.mean(axis=0)).T
+    """Give how places (N, 3) about the middle follow turns, steps along the axes and ln s: (N, 3, 7)."""
+    x, y, z = placed.T
     nothing, one = np.zeros_like(x), np.ones_like(x)
     rows = [
         [nothing, z, -y, one, nothing, nothing, x],
@@ -163,8 +183,8 @@ def _columns(placed: Array) -> Array:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def _of_bend(covariance: Array, columns: Array, errors: Array) -> tuple[float, float, float]:
-    """Give ln s, its variance and the logarithm of the restricted likelihood, where v is unknown."""
+def _of_bend(covariance: Array, columns: Array, errors: Array) -> _Bend:
+    """Fit under one bend, by generalised least squares and restricted likelihood, where v is unknown."""
     from scipy.linalg import solve_triangular
 
     root = np.linalg.cholesky(covariance)
@@ -173,16 +193,17 @@ def _of_bend(covariance: Array, columns: Array, errors: Array) -> tuple[float, f
     white = solve_triangular(root, both, lower=True, check_finite=False)
     design, seen = white[:, :21].reshape(3 * n, 7), white[:, 21:].reshape(3 * n)
     normal = design.T @ design
+    normal += TINY * np.trace(normal) * np.eye(7)  # fruits on one line leave a turn open
     answer = np.linalg.solve(normal, design.T @ seen)
     degrees = 3 * n - 7
-    variance = float(((seen - design @ answer) ** 2).sum()) / degrees
+    variance = max(float(((seen - design @ answer) ** 2).sum()) / degrees, np.finfo(np.float64).tiny)
     log_volumes = 3 * 2 * np.log(np.diag(root)).sum() + np.linalg.slogdet(normal)[1]
     likelihood = -(degrees * np.log(variance) + log_volumes) / 2
-    return float(answer[6]), variance * float(np.linalg.inv(normal)[6, 6]), float(likelihood)
+    return _Bend(float(answer[6]), variance * float(np.linalg.inv(normal)[6, 6]), float(likelihood))
 
 
 def _rescaled(transform: Array, factor: float, pairs: _Pairs) -> Array:
-    """Give the transform with another scale, its middle where it was."""
+    """Give the transform with another scale, the middle of the pairs where it was."""
     middle = (pairs.in_model @ transform[:3, :3].T + transform[:3, 3]).mean(axis=0)
     about = np.eye(4)
     about[:3, :3] *= factor

@@ -86,12 +86,14 @@ def _require_images(path: Path, model: SparseModel) -> None:
     if not model.images:
         raise PomonaError(f"{path}: found no image with a pose, expected at least one")
     names: dict[str, int] = {}
+    known = np.append(np.sort(model.points.ids), -1)
     for image in model.images.values():
         if image.camera_id not in model.cameras:
             raise PomonaError(f"{path}: image {image.id}: found the camera {image.camera_id}, which is not there")
         if (other := names.setdefault(image.name, image.id)) != image.id:
             raise PomonaError(f"{path}: images {other} and {image.id}: found the same name twice, expected it once")
-        strange = np.setdiff1d(image.point_ids[image.point_ids >= 0], model.points.ids)
+        seen = image.point_ids[image.point_ids != -1]
+        strange = seen[known[np.searchsorted(known[:-1], seen)] != seen]
         if len(strange):
             raise PomonaError(f"{path}: image {image.id}: found the point {strange[0]}, which is not there")
 
@@ -102,10 +104,11 @@ def _require_points(path: Path, model: SparseModel) -> None:
         raise PomonaError(f"{path}: found point {ids[counts > 1][0]} twice, expected it once")
     n_key_points = {image.id: len(image.point_ids) for image in model.images.values()}
     seen, rows = np.unique(model.points.tracks[:, 0], return_inverse=True)
-    for place, image_id in enumerate(seen.tolist()):
-        highest = int(model.points.tracks[rows == place, 1].max())
-        if not highest < n_key_points.get(image_id, 0):
-            found = f"found key point {highest} of image {image_id} in a track"
+    highest = np.full(len(seen), -1, np.int64)
+    np.maximum.at(highest, rows, model.points.tracks[:, 1])
+    for image_id, key_point in zip(seen.tolist(), highest.tolist(), strict=True):
+        if not key_point < n_key_points.get(image_id, 0):
+            found = f"found key point {key_point} of image {image_id} in a track"
             raise PomonaError(f"{path}: {found}, which is not there")
 
 
