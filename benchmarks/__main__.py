@@ -28,6 +28,7 @@ NAMES = (
     "scan",
     "shipped",
     "localize",
+    "metric",
     "disturbed",
     "endurance",
     "page",

@@ -27,6 +27,7 @@ __all__ = [
     "KEPT",
     "MCAP_MARK",
     "MERGED",
+    "METRIC_MODEL",
     "MODEL",
     "PAIRS",
     "PARQUET_MARK",
@@ -338,6 +339,7 @@ DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 PULLED = Like("a pulled map, which takes a name of its own", lambda _: False)
 REPLAYED = Like("a replayed bag, which takes a name of its own", lambda _: False)
 MERGED = Like("a merged map, which takes a name of its own", lambda _: False)
+METRIC_MODEL = Like("a metric model, which takes a folder of its own", lambda _: False, is_folder=True)
 PICTURE = Like("a plot", _is_picture)
 POSES = Like("poses in a map", _has_poses)
 VIDEO = Like("a preview", _is_video)

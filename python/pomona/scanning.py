@@ -25,7 +25,7 @@ from pomona.survey import scan as survey_of
 from pomona.survey.files import identity
 from pomona.survey.part_files import parts_there
 
-__all__ = ["SUFFIXES", "Scan", "prepared", "require_date", "require_session_name", "scan"]
+__all__ = ["SUFFIXES", "Scan", "guessed_date", "prepared", "require_date", "require_session_name", "scan"]
 
 SUFFIXES = (".gpkg", ".csv", ".ply")
 """Of what a scan writes."""
@@ -90,7 +90,7 @@ class Scan:
             survey,
             self.recording,
             name=name or self.recording.name,
-            date=day or _guessed_date(self.recording),
+            date=day or guessed_date(self.recording),
             configuration={"scan": about, **self.config},
             inputs=self.boxes.inputs,
         )
@@ -252,8 +252,8 @@ def _made_from(recording: Recording, boxes: FoundBoxes) -> dict[str, Any]:
     return {"version": __version__, "recording": str(recording.path.resolve()), "files": files}
 
 
-def _guessed_date(recording: Recording) -> str:
-    """Take the day of the newest file, and say so."""
+def guessed_date(recording: Recording) -> str:
+    """Give the day of the newest file, and say so."""
     newest_s = max(file.stat().st_mtime for file in recording.inputs())
     day = datetime.datetime.fromtimestamp(newest_s).date().isoformat()
     message = f"{recording.path}: no date noted, took {day} from the age of its files; --date says it better"

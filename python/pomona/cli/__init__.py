@@ -20,12 +20,14 @@ from pomona.cli import (
     localize,
     map,
     match,
+    metric,
     report,
     ros,
     scan,
     synth,
     thinning,
     train,
+    triangulate,
     validate,
     view,
 )
@@ -69,6 +71,8 @@ app.command()(match.match)
 app.add_typer(map.app, name="map")
 app.command()(localize.localize)
 app.add_typer(ros.app, name="ros")
+app.command()(metric.metric)
+app.command()(triangulate.triangulate)
 app.command()(growth.growth)
 app.command()(thinning.thinning)
 app.command()(validate.validate)

@@ -43,7 +43,7 @@ def read_cloud(path: Path, unit: Unit, make: type[FruitCloud]) -> FruitCloud:
     if suffix == ".gpkg":
         from pomona.store.stored_fruits import stored_cloud
 
-        return stored_cloud(path, make)
+        return stored_cloud(path, make, in_metres=unit != "free")
     if suffix not in (".csv", ".ply"):
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv, .ply or .gpkg")
     cloud = csv_file.read(path, make) if suffix == ".csv" else ply_file.read(path, make)

@@ -84,6 +84,9 @@ def add_session(
         raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected .gpkg for a map")
     if not len(session.cloud):
         raise PomonaError(f"session {session.name}: has no fruits, expected at least one")
+    if session.is_scale_free:
+        found = "was triangulated without a scale, and a map is in metres"
+        raise PomonaError(f"session {session.name}: {found}: triangulate it again with --map")
     if not path.exists():
         try:
             with new_file(path) as partial, blank(partial, path) as connection:

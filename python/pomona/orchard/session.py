@@ -13,7 +13,7 @@ from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.fruit_crop import FruitCrop
-from pomona.store.values import FARTHEST_M, iso_date
+from pomona.store.values import FARTHEST_M, is_scale_free, iso_date
 from pomona.trajectory import Trajectory
 
 __all__ = ["GUESSED", "Session"]
@@ -74,6 +74,11 @@ class Session:
         """Whether the date is only that of the newest file of the recording."""
         scan = self.configuration.get("scan")
         return isinstance(scan, Mapping) and scan.get("date") == GUESSED
+
+    @property
+    def is_scale_free(self) -> bool:
+        """Whether its unit is that of a reconstruction whose scale nobody knows."""
+        return is_scale_free(self.configuration)
 
     @property
     def content_sha256(self) -> str:

@@ -15,6 +15,7 @@ from pomona.recording.calibration import Calibration
 from pomona.recording.picture_size import encoded_size, require_size
 
 __all__ = [
+    "PICTURE_SUFFIXES",
     "UnreadablePictureError",
     "decoded_picture",
     "numbered_pictures",

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
+from pomona.errors import PomonaError
 from pomona.store.cells import finite_json
 from pomona.store.failures import WrongContentError, content
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of, one_of
+from pomona.store.values import is_scale_free
 from pomona.views import Views
 
 if TYPE_CHECKING:
@@ -32,12 +34,18 @@ AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id{}
 """The observation of each fruit by the session that saw it last."""
 
 
-def stored_cloud(path: Path, make: type[FruitCloud]) -> FruitCloud:
-    """Read a session's fruits with the session's own ids, or a map's with theirs, each where it was last seen."""
+def stored_cloud(path: Path, make: type[FruitCloud], *, in_metres: bool = True) -> FruitCloud:
+    """Read a session's fruits with the session's own ids, or a map's with theirs, each where it was last seen.
+
+    A session without a scale is refused where metres are asked for.
+    """
     with snapshot(path) as (connection, kind):
         if kind == "map":
             return fruits_in_map(connection, make)
-        return observed_cloud(connection, only_session(connection)["id"], make)
+        about = only_session(connection)
+        if in_metres and is_scale_free(about["configuration"]):
+            raise PomonaError(f"{path}: was triangulated without a scale, expected metres: only a match with --scale free takes it")
+        return observed_cloud(connection, about["id"], make)
 
 
 def observed_cloud(connection: sqlite3.Connection, session_id: int, make: type[FruitCloud]) -> FruitCloud:

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 
 from pomona.errors import PomonaError
 
-__all__ = ["FARTHEST_M", "iso_date"]
+__all__ = ["FARTHEST_M", "FREE", "is_scale_free", "iso_date"]
 
 FARTHEST_M = 1e12
 """Nothing that grows is farther from anything than the planets; squares of such numbers can still be added."""
+
+
+FREE = "free"
+"""What `configuration["scan"]["scale"]` of a session says whose scale nobody knows."""
+
+
+def is_scale_free(configuration: object) -> bool:
+    """Tell whether a session of this configuration has no metres."""
+    scan = configuration.get("scan") if isinstance(configuration, Mapping) else None
+    return isinstance(scan, Mapping) and scan.get("scale") == FREE
 
 
 def iso_date(date: str) -> str:

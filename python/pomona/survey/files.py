@@ -18,7 +18,7 @@ from pomona.survey.part import Part
 from pomona.survey.part_files import part_files, tell_others
 from pomona.survey.story import Survey
 
-__all__ = ["identity", "write_stages", "write_survey"]
+__all__ = ["hashes_of", "identity", "write_stages", "write_survey"]
 
 CHUNK_BYTES = 1 << 20
 
@@ -62,7 +62,7 @@ def write_survey(
         for number, path in files.items():
             _write_cloud(path, survey.parts[number].cloud)
         return files
-    hashes = {_shown(file, recording): _sha256(file) for file in dict.fromkeys([*recording.inputs(), *inputs])}
+    hashes = hashes_of(recording, inputs)
     for number, path in files.items():
         part = survey.parts[number]
         write_session(
@@ -77,6 +77,11 @@ def write_survey(
             input_hashes=hashes,
         )
     return files
+
+
+def hashes_of(recording: Recording, inputs: Iterable[Path]) -> dict[str, str]:
+    """Give the SHA-256 of the files of a recording, by their names in it, and of others."""
+    return {_shown(file, recording): _sha256(file) for file in dict.fromkeys([*recording.inputs(), *inputs])}
 
 
 def _write_cloud(path: Path, cloud: FruitCloud) -> None:
