@@ -163,7 +163,7 @@ fn sightings_of_the_same_fruit_close_a_loop() {
     for second in 1..truth.poses.len() {
         let noise = deviations.map(|sigma| sigma * random.normal());
         let first_from_second = steps::moved(&truth.poses[second].seen_from(&truth.poses[second - 1]), &noise);
-        relative_poses.push(RelativePose { first: second - 1, second, first_from_second, information });
+        relative_poses.push(RelativePose { first: second - 1, second, first_from_second, information, doubtful: false });
         start.poses.push(start.poses[second - 1].after(&first_from_second));
     }
     let mut fixed = vec![false; truth.poses.len()];
@@ -196,7 +196,7 @@ fn a_drift_of_sixty_sigma_is_closed() {
         camera: camera(),
         fixed: vec![true, false],
         observations: observations.collect(),
-        relative_poses: vec![RelativePose { first: 0, second: 1, first_from_second: drifted, information }],
+        relative_poses: vec![RelativePose { first: 0, second: 1, first_from_second: drifted, information, doubtful: false }],
     };
     let left_m = |settings: &Settings| {
         let start = State { poses: vec![Pose::IDENTITY, drifted], points: fruits.to_vec() };
