@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
-from pomona.slam.constellation_links import LEAST_FRUITS, Constellations
+from pomona.survey.slam.constellation_links import LEAST_FRUITS, Constellations
 
 __all__ = ["Loop", "SeenMap", "loops"]
 

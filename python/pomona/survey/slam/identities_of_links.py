@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.slam.constellation_links import ConstellationLink
+from pomona.survey.slam.constellation_links import ConstellationLink
 
 __all__ = ["joined_fruits", "linked_fruits"]
 

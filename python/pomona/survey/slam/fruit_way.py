@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
-from pomona.slam.fruit_graph import FruitGraph
-from pomona.slam.loops import Loop, loops
-from pomona.slam.spanning import spanned_poses
 from pomona.survey.refinement import Motions
+from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
+from pomona.survey.slam.fruit_graph import FruitGraph
+from pomona.survey.slam.loops import Loop, loops
+from pomona.survey.slam.spanning import spanned_poses
 
 __all__ = ["FruitWay", "way_by_fruits"]
 

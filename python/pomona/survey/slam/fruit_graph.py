@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
-from pomona.slam.constellation_links import ConstellationLink, motions_of
-from pomona.slam.identities_of_links import joined_fruits, linked_fruits
-from pomona.slam.loops import Loop, SeenMap
 from pomona.survey.refinement import Motions, SeenFruits, refine
+from pomona.survey.slam.constellation_links import ConstellationLink, motions_of
+from pomona.survey.slam.identities_of_links import joined_fruits, linked_fruits
+from pomona.survey.slam.loops import Loop, SeenMap
 
 __all__ = ["BELIEVED2", "FruitGraph"]
 

@@ -1,6 +1,6 @@
 """Where the camera went, from the constellations of the fruits that it saw: links of frames, loops, and their graph."""
 
-from pomona.slam.constellation_links import ConstellationLink, Constellations, chained
-from pomona.slam.fruit_way import FruitWay, way_by_fruits
+from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained
+from pomona.survey.slam.fruit_way import FruitWay, way_by_fruits
 
 __all__ = ["ConstellationLink", "Constellations", "FruitWay", "chained", "way_by_fruits"]
