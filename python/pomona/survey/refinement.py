@@ -88,6 +88,14 @@ class Motions:
             np.concatenate([one.which_are_doubtful() for one in both]),
         )
 
+    def trusted(self) -> Motions:
+        """Give the same, none of which may be wrong."""
+        return Motions(self.first, self.second, self.first_from_second, self.information)
+
+    def weakened(self, part: float) -> Motions:
+        """Give the same with a part of their information."""
+        return Motions(self.first, self.second, self.first_from_second, part * self.information, self.doubtful)
+
     def which_are_doubtful(self) -> NDArray[np.bool_]:
         """Say it of each, (M,)."""
         return np.zeros(len(self), bool) if self.doubtful is None else np.asarray(self.doubtful, bool)

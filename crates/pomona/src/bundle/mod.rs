@@ -48,7 +48,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_steps: 30, tolerance: 1e-6, first_scale: 1.0, picture_scale2: 5.7, place_scale2: 3.0, relative_scale2: 6.0 }
+        Self {
+            max_steps: 30,
+            tolerance: 1e-6,
+            first_scale: 1.0,
+            picture_scale2: 5.7,
+            place_scale2: 3.0,
+            relative_scale2: 6.0,
+        }
     }
 }
 

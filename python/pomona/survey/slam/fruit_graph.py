@@ -14,17 +14,15 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.survey.refinement import Motions, SeenFruits, refine
+from pomona.survey.slam.consistency import BELIEVED2, NO_FRUITS, explained
 from pomona.survey.slam.constellation_links import ConstellationLink, motions_of
 from pomona.survey.slam.identities_of_links import joined_fruits, linked_fruits
 from pomona.survey.slam.loops import Loop, SeenMap
 
-__all__ = ["BELIEVED2", "FruitGraph"]
+__all__ = ["FruitGraph"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-
-BELIEVED2 = 22.5
-"""Squared Mahalanobis distance up to which a link is believed: one of a thousand true ones is farther off."""
 
 OWN_M = 0.005
 """What the middle of a fruit seems to move by as it is seen from elsewhere, beyond what its depth says."""
@@ -65,7 +63,9 @@ class FruitGraph:
         SeenMap
             The fruits where they are then.
         """
-        errors2 = self._laid_out(motions_of(links))
+        motions = self._motions.and_those(self._once(links))
+        found = refine(self.poses, NO_FRUITS, motions)
+        self.poses, errors2 = found.session_from_camera, found.motion_squared_errors[len(self._motions) :]
         self.links = [link for link, error2 in zip(links, errors2, strict=True) if error2 <= BELIEVED2]
         fruits = linked_fruits(self.links, self._begins, self._sightings.frames)
         return self._adjusted(replace(self._sightings, fruits=fruits))
@@ -74,20 +74,18 @@ class FruitGraph:
         """Adjust to loops too; those that are believed, which are returned, join fruits."""
         if not found:
             return []
-        errors2 = self._laid_out(motions_of([*self.links, *found]))[len(self.links) :]
-        believed = [loop for loop, error2 in zip(found, errors2, strict=True) if error2 <= BELIEVED2]
+        motions = self._motions.and_those(self._once(self.links).trusted())
+        rows, adjusted = explained(self.poses, motions, found)
+        self.poses, believed = adjusted.session_from_camera, [found[row] for row in rows]
         sighting_of = np.unique(self._sightings.fruits, return_index=True)[1]
         pairs = [(int(sighting_of[one]), int(sighting_of[other])) for loop in believed for one, other in loop.pairs]
         fruits = joined_fruits(self._sightings.fruits, self._sightings.frames, pairs)
         self._adjusted(replace(self._sightings, fruits=fruits))
         return believed
 
-    def _laid_out(self, doubtful: Motions) -> Array:
-        """Adjust the poses alone, and give the squared errors of what is doubtful."""
-        nothing = SeenFruits(*(values[:0] for values in vars(self._sightings).values()))
-        found = refine(self.poses, nothing, self._motions.and_those(doubtful))
-        self.poses = found.session_from_camera
-        return found.motion_squared_errors[len(self._motions) :]
+    def _once(self, links: Sequence[ConstellationLink]) -> Motions:
+        """Give links as motions; what each sighting says in several links counts as one."""
+        return motions_of(links).weakened(min(1.0, (len(self.poses) - 1) / max(len(links), 1)))
 
     def _adjusted(self, sightings: SeenFruits) -> SeenMap:
         """Adjust poses and fruits to the sightings and odometry."""
