@@ -14,7 +14,7 @@ from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
 from pomona.survey.refinement import Motions, SeenFruits, refine
-from pomona.survey.slam import FruitWay, way_by_fruits
+from pomona.survey.slam import Anchors, FruitWay, way_by_fruits
 from pomona.survey.slam.consistency import explained
 from pomona.survey.slam.identities_of_links import joined_fruits
 from pomona.survey.slam.loops import Loop
@@ -190,6 +190,50 @@ def test_a_row_is_known_again_from_its_other_side() -> None:
     way = way_by_fruits(clouds, round_the_end, threads=1)
     assert any(loop.first < 12 <= loop.second for loop in way.loops)
     assert np.linalg.norm(errors_of(way, true)[:, :3], axis=1).max() < 0.06
+
+
+def world(rng: np.random.Generator, seen_from_first: np.ndarray) -> np.ndarray:
+    """The poses in a frame with z up, in which the row runs north-east."""
+    upright = np.eye(4)
+    upright[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix() @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    upright[:3, 3] = [1200.0, -340.0, 80.0]
+    return upright @ seen_from_first
+
+
+def test_a_way_hangs_on_gnss_and_verticals() -> None:
+    """Places to 2 cm at every third frame, one of them a reflection; verticals to half a degree."""
+    rng = np.random.default_rng(4)
+    fruits, poses = drawn_row(rng, 4.0), wobbling(rng, [facing(0.25 * step) for step in range(16)])
+    true = world(rng, poses)
+    at = np.arange(0, 16, 3)
+    positions = true[at, :3, 3] + rng.normal(0, 0.02, (len(at), 3))
+    positions[2] += [0.0, 2.0, 1.0]
+    sigma_rad = np.radians(0.5)
+    ups = true[:, 2, :3] + rng.normal(0, sigma_rad, (16, 3))
+    spreads = np.tile(0.02**2 * np.eye(3), (len(at), 1, 1))
+    anchors = Anchors(at, positions, spreads, np.arange(16), ups, sigma_rad)
+    way = way_by_fruits([seen(rng, fruits, pose) for pose in poses], anchors=anchors, threads=1)
+    left = np.array([log(one) for one in np.linalg.inv(way.session_from_camera) @ true])
+    assert np.linalg.norm(left[:, :3], axis=1).max() < 0.06
+    assert np.degrees(np.linalg.norm(left[:, 3:], axis=1)).max() < 1.0
+    squared = [error @ np.linalg.solve(spread, error) for error, spread in zip(left, way.covariances, strict=True)]
+    assert 0.5 < np.mean(squared) < 15.0
+
+
+def test_verticals_alone_level_a_way() -> None:
+    rng = np.random.default_rng(6)
+    fruits, poses = drawn_row(rng, 2.5), wobbling(rng, [facing(0.25 * step) for step in range(8)])
+    true = world(rng, poses)
+    anchors = Anchors.of_verticals(np.arange(8), true[:, 2, :3], 0.001)
+    way = way_by_fruits([seen(rng, fruits, pose) for pose in poses], anchors=anchors, threads=1)
+    np.testing.assert_allclose(way.session_from_camera[:, 2, :3], true[:, 2, :3], atol=0.01)
+
+
+def test_anchors_of_a_wrong_shape_are_told() -> None:
+    with pytest.raises(PomonaError, match="anchors: found shapes"):
+        Anchors.of_places(np.arange(2), np.zeros((3, 3)), np.zeros((2, 3, 3)))
+    with pytest.raises(PomonaError, match="anchors: found a vertical without a direction"):
+        Anchors.of_verticals(np.arange(1), np.zeros((1, 3)))
 
 
 def test_frames_of_other_fruits_are_another_part() -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.survey.refinement import Motions, SeenFruits, refine
+from pomona.survey.slam.anchors import Anchors, anchored
 from pomona.survey.slam.consistency import BELIEVED2, NO_FRUITS, explained
 from pomona.survey.slam.constellation_links import ConstellationLink, motions_of
 from pomona.survey.slam.identities_of_links import joined_fruits, linked_fruits
@@ -82,6 +83,13 @@ class FruitGraph:
         fruits = joined_fruits(self._sightings.fruits, self._sightings.frames, pairs)
         self._adjusted(replace(self._sightings, fruits=fruits))
         return believed
+
+    def anchor(self, anchors: Anchors) -> None:
+        """Adjust to what is known from outside, in its frame of reference."""
+        found = anchored(self.poses, self._sightings, self._motions, anchors)
+        self.poses = found.session_from_camera
+        if found.pose_covariances is not None:
+            self.covariances = found.pose_covariances
 
     def _once(self, links: Sequence[ConstellationLink]) -> Motions:
         """Give links as motions; what each sighting says in several links counts as one."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.survey.refinement import Motions
+from pomona.survey.slam.anchors import Anchors
 from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
 from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.loops import Loop, loops
@@ -66,6 +67,7 @@ def way_by_fruits(
     clouds: Sequence[FruitCloud],
     motions: Motions | None = None,
     *,
+    anchors: Anchors | None = None,
     config: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> FruitWay:
@@ -77,6 +79,8 @@ def way_by_fruits(
         What each frame saw, in the frame of its camera, metres, with covariances; in order of time.
     motions : Motions, optional
         What was measured between the frames otherwise, by odometry.
+    anchors : Anchors, optional
+        Places by GNSS, verticals by an IMU. Parts with a place, or a vertical, are in the frame of the anchors then.
     config : mapping, optional
         Values of the core's tables that differ from `pomona.default_config()`.
     threads : int, optional
@@ -97,22 +101,28 @@ def way_by_fruits(
     for part in range(int(parts.max(initial=-1)) + 1):
         rows = np.flatnonzero(parts == part)
         if len(rows) > 1:
-            way = _with_part(way, rows, constellations, links, known)
+            way = _with_part(way, rows, constellations, links, (known, anchors))
     return way
 
 
 def _with_part(
-    way: FruitWay, rows: Rows, constellations: Constellations, links: Sequence[ConstellationLink], motions: Motions
+    way: FruitWay,
+    rows: Rows,
+    constellations: Constellations,
+    links: Sequence[ConstellationLink],
+    known: tuple[Motions, Anchors | None],
 ) -> FruitWay:
     """Adjust one part of a way; rows of a part are those of its frames, in order."""
     row_of = np.full(len(way), -1, np.int64)
     row_of[rows] = np.arange(len(rows))
     graph = FruitGraph(
-        [constellations.cloud(row) for row in rows.tolist()], _inside(motions, row_of), way.session_from_camera[rows]
+        [constellations.cloud(row) for row in rows.tolist()], _inside(known[0], row_of), way.session_from_camera[rows]
     )
     ours = [_renamed(link, row_of) for link in links if row_of[link.first] >= 0]
     found = list(loops(graph.link(ours), constellations))
     believed = graph.close(found)
+    if known[1] is not None and len(here := known[1].inside(row_of)):
+        graph.anchor(here)
     poses, covariances = way.session_from_camera.copy(), way.covariances.copy()
     poses[rows], covariances[rows] = graph.poses, graph.covariances
     return FruitWay(
