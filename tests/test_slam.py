@@ -84,7 +84,7 @@ def test_covariances_of_a_graph_are_those_of_its_errors() -> None:
 
 def loop_of(motions: Motions, n_pairs: int) -> Loop:
     """The first of some motions as a loop."""
-    pairs = np.zeros((n_pairs, 2), np.int64)
+    pairs = np.zeros((n_pairs, 2, 2), np.int64)
     rows = int(motions.first[0]), int(motions.second[0])
     return Loop(*rows, motions.first_from_second[0], motions.information[0], pairs)
 

@@ -13,10 +13,16 @@ from pomona.cloud import FruitCloud
 from pomona.localize import Localizer
 from pomona.survey.refinement import Motions
 
-__all__ = ["SAME_VISIT", "ConstellationLink", "Constellations", "chained", "motions_of"]
+__all__ = ["ConstellationLink", "Constellations", "chained", "motions_of"]
 
-SAME_VISIT: Mapping[str, Any] = {"localization": {"own_m": 0.005, "shared_m": 0.001}}
+SAME_VISIT: Mapping[str, Mapping[str, float]] = {"localization": {"own_m": 0.005, "shared_m": 0.001}}
 """Within a visit nothing grows or sags: the middle of a fruit differs by what each side shows of it, and wind."""
+
+NEIGHBOURS: Mapping[str, Mapping[str, float]] = {
+    "localization": {**SAME_VISIT["localization"], "false_alarm_rate": 1e-3},
+    "verified": {"false_alarm_rate": 0.3},
+}
+"""Frames that follow each other mostly do see the same fruits: less evidence will do than for a place on any map."""
 
 NEAR = 3
 """Frames before that each is looked for in."""
@@ -62,7 +68,7 @@ class Constellations:
     clouds : sequence of FruitCloud
         Of each frame, in the frame of its camera, with covariances.
     config : mapping, optional
-        Values of the core's tables that differ from `pomona.default_config()` and from `SAME_VISIT`.
+        Values of the core's tables that differ from `pomona.default_config()` and from what is set here.
     threads : int, optional
         As in `pomona.Localizer`.
     """
@@ -71,7 +77,7 @@ class Constellations:
         self, clouds: Sequence[FruitCloud], *, config: Mapping[str, Any] | None = None, threads: int | None = None
     ) -> None:
         self._clouds, self._threads = clouds, threads
-        self._config = {**(config or {}), "localization": {**SAME_VISIT["localization"], **_given(config)}}
+        self._config = config or {}
         self._ready: dict[int, Localizer] = {}
 
     def __len__(self) -> int:
@@ -81,9 +87,10 @@ class Constellations:
         """Give what a frame saw."""
         return self._clouds[row]
 
-    def of(self, cloud: FruitCloud) -> Localizer:
-        """Make other fruits of the same visit ready to be looked in."""
-        return Localizer(cloud, config=self._config, threads=self._threads)
+    def of(self, cloud: FruitCloud, *, neighbours: bool = False) -> Localizer:
+        """Make fruits of the same visit ready to be looked in, for what follows on them or for anything."""
+        config = _over(NEIGHBOURS if neighbours else SAME_VISIT, self._config)
+        return Localizer(cloud, config=config, threads=self._threads)
 
     def between(self, first: int, second: int) -> ConstellationLink | None:
         """Look for a frame in another one; None where it is not found."""
@@ -91,7 +98,7 @@ class Constellations:
             return None
         if first not in self._ready:
             self._ready = {row: ready for row, ready in self._ready.items() if abs(row - first) <= REACH}
-            self._ready[first] = self.of(self._clouds[first])
+            self._ready[first] = self.of(self._clouds[first], neighbours=True)
         found = self._ready[first].locate(self._clouds[second])
         if not found or found.map_from_camera is None:
             return None
@@ -140,5 +147,6 @@ def motions_of(links: Sequence[_Related]) -> Motions:
     )
 
 
-def _given(config: Mapping[str, Any] | None) -> Mapping[str, Any]:
-    return dict((config or {}).get("localization", {}))
+def _over(ours: Mapping[str, Mapping[str, float]], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of settings; what the user gives counts."""
+    return {**given, **{name: {**table, **given.get(name, {})} for name, table in ours.items()}}

@@ -78,8 +78,8 @@ class FruitGraph:
         motions = self._motions.and_those(self._once(self.links).trusted())
         rows, adjusted = explained(self.poses, motions, found)
         self.poses, believed = adjusted.session_from_camera, [found[row] for row in rows]
-        sighting_of = np.unique(self._sightings.fruits, return_index=True)[1]
-        pairs = [(int(sighting_of[one]), int(sighting_of[other])) for loop in believed for one, other in loop.pairs]
+        same = np.concatenate([np.empty((0, 2, 2), np.int64), *(loop.pairs for loop in believed)])
+        pairs = (self._begins[same[..., 0]] + same[..., 1]).tolist()
         fruits = joined_fruits(self._sightings.fruits, self._sightings.frames, pairs)
         self._adjusted(replace(self._sightings, fruits=fruits))
         return believed

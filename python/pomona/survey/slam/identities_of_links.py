@@ -38,7 +38,7 @@ def linked_fruits(links: Sequence[ConstellationLink], begins: Rows, frames: Rows
     return joined_fruits(np.arange(len(frames)), frames, ((one, other) for _, one, other in sorted(pairs)))
 
 
-def joined_fruits(fruits: Rows, frames: Rows, pairs: Iterable[tuple[int, int]]) -> Rows:
+def joined_fruits(fruits: Rows, frames: Rows, pairs: Iterable[Sequence[int]]) -> Rows:
     """Join fruits, named by one sighting each, unless some frame saw both.
 
     Parameters
@@ -47,7 +47,7 @@ def joined_fruits(fruits: Rows, frames: Rows, pairs: Iterable[tuple[int, int]]) 
         Fruit of each sighting so far.
     frames : (S,) int64
         Frame of each sighting.
-    pairs : iterable of (int, int)
+    pairs : iterable of pairs of int
         Sightings of the same fruit, in the order in which they are believed.
     """
     owner = list(range(int(fruits.max(initial=-1)) + 1))

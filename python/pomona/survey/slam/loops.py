@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.survey.slam.constellation_links import LEAST_FRUITS, Constellations
 
-__all__ = ["Loop", "SeenMap", "loops"]
+__all__ = ["Loop", "SeenMap", "joined", "loops"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -52,6 +52,12 @@ class SeenMap:
         """Give the fruits that the frames of a range saw."""
         return np.unique(self.fruits[(self.frames >= first) & (self.frames < end)])
 
+    def sightings_of(self, fruits: Rows) -> Rows:
+        """Give the frame and the row in it of the first sighting of each fruit, (..., 2)."""
+        first = np.unique(self.fruits, return_index=True)[1][fruits]
+        frames = self.frames[first]
+        return np.stack((frames, first - np.searchsorted(self.frames, frames)), axis=-1)
+
     def cloud(self, fruits: Rows, pose: Array) -> FruitCloud:
         """Give fruits in the frame of a camera."""
         turn = pose[:3, :3]
@@ -71,8 +77,8 @@ class Loop:
     first_from_second : (4, 4) float64
     information : (6, 6) float64
         As in `ConstellationLink`.
-    pairs : (M, 2) int64
-        Fruit among the earlier, and among the later ones, that are the same.
+    pairs : (M, 2, 2) int64
+        Of each fruit that is the same: frame and row in it of a sighting of the earlier and of the later one.
     """
 
     first: int
@@ -105,4 +111,27 @@ def _found(seen: SeenMap, constellations: Constellations, second: int, here: Row
     saw = np.isin(seen.fruits, fruits[:, 0]) & (seen.frames < second)
     first = int(np.bincount(seen.frames[saw]).argmax())
     step = np.linalg.inv(seen.poses[first]) @ found.map_from_camera
-    yield Loop(first, second, step, np.asarray(np.linalg.inv(found.covariance), np.float64), fruits)
+    yield Loop(first, second, step, np.asarray(np.linalg.inv(found.covariance), np.float64), seen.sightings_of(fruits))
+
+
+def joined(before: SeenMap, after: SeenMap, constellations: Constellations) -> Loop | None:
+    """Look for what the first frames of a part saw in what the last ones of an earlier part did.
+
+    Returns
+    -------
+    Loop or None
+        From the last frame of the one to the first of the other, each frame by its row in its own part.
+    """
+    last = len(before.poses) - 1
+    there, here = before.seen_in(last + 1 - TOGETHER, last + 1), after.seen_in(0, TOGETHER)
+    if min(len(there), len(here)) < LEAST_FRUITS:
+        return None
+    map = constellations.of(before.cloud(there, before.poses[last]), neighbours=True)
+    found = map.locate(after.cloud(here, after.poses[0]))
+    if not found or found.map_from_camera is None:
+        return None
+    pairs = np.stack(
+        (before.sightings_of(there[found.pairs[:, 1]]), after.sightings_of(here[found.pairs[:, 0]])), axis=1
+    )
+    information = np.asarray(np.linalg.inv(found.covariance), np.float64)
+    return Loop(last, 0, found.map_from_camera, information, pairs)
