@@ -14,10 +14,11 @@ from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
 from pomona.survey.refinement import Motions, SeenFruits, refine
-from pomona.survey.slam import Anchors, FruitWay, way_by_fruits
+from pomona.survey.slam import Anchors, Constellations, FruitWay, chained, way_by_fruits
 from pomona.survey.slam.consistency import explained
+from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.identities_of_links import joined_fruits
-from pomona.survey.slam.loops import Loop
+from pomona.survey.slam.loops import Loop, joined
 from pomona.survey.slam.spanning import spanned_poses
 from recording_maker import make_recording
 
@@ -190,6 +191,30 @@ def test_a_row_is_known_again_from_its_other_side() -> None:
     way = way_by_fruits(clouds, round_the_end, threads=1)
     assert any(loop.first < 12 <= loop.second for loop in way.loops)
     assert np.linalg.norm(errors_of(way, true)[:, :3], axis=1).max() < 0.06
+
+
+def test_two_parts_are_joined_by_what_several_of_their_frames_saw() -> None:
+    rng = np.random.default_rng(8)
+    fruits = drawn_row(rng, 3.0)
+    true = wobbling(rng, [facing(0.25 * step) for step in range(10)])
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    both = []
+    for rows in (slice(0, 5), slice(5, 10)):
+        links = chained(Constellations(clouds[rows], threads=1))
+        start = np.linalg.inv(true[rows][0]) @ true[rows]
+        both.append(FruitGraph(clouds[rows], Motions.none(), start).link(links))
+    join = joined(*both, Constellations(clouds, threads=1))
+    assert join is not None
+    assert (join.first, join.second) == (4, 0)
+    assert np.linalg.norm(log(np.linalg.inv(join.first_from_second) @ np.linalg.inv(true[4]) @ true[5])[:3]) < 0.03
+    # Sightings that are said to be of one fruit lie at one place.
+    for (frame, row), (other, other_row) in join.pairs:
+        places = [
+            pose[:3, :3] @ cloud.positions[at] + pose[:3, 3]
+            for pose, cloud, at in ((true[frame], clouds[frame], row), (true[5 + other], clouds[5 + other], other_row))
+        ]
+        assert np.linalg.norm(places[0] - places[1]) < 0.1
+    assert len(join.pairs) > 10
 
 
 def world(rng: np.random.Generator, seen_from_first: np.ndarray) -> np.ndarray:
