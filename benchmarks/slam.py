@@ -62,6 +62,7 @@ class Found:
     way: FruitWay
     score: TrajectoryScore
     honest: float
+    worst_mm: float
     n_fruits: float
     found_s: float
 
@@ -118,7 +119,8 @@ def found(walk: Walk, variant: str, order: list[int]) -> Found:
     of = (TimedPoses(Path(name), one, None) for name, one in (("found", poses), ("true", true)))
     score = score_trajectory(*of, spans=(Span(1, "f"), Span(1.0, "m"), Span(len(rows) - 1, "f")))
     seen_fruits = float(np.mean([len(walk.clouds[row]) for row in order]))
-    return Found(walk.name, variant, way, score, honesty(poses, true, way.covariances[rows]), seen_fruits, found_s)
+    honest = honesty(poses, true, way.covariances[rows])
+    return Found(walk.name, variant, way, score, honest, worst_mm(way, walk.poses[order]), seen_fruits, found_s)
 
 
 def honesty(poses: Array, true: Array, covariances: Array) -> float:
@@ -131,6 +133,13 @@ def honesty(poses: Array, true: Array, covariances: Array) -> float:
     return float(np.median(squared) / MEDIAN_CHI2)
 
 
+def worst_mm(way: FruitWay, true: Array) -> float:
+    """Of all links and loops that are believed: the largest error in place, for a false one is off by far."""
+    found = [*way.links, *way.loops]
+    left = [np.linalg.inv(np.linalg.inv(true[one.first]) @ true[one.second]) @ one.first_from_second for one in found]
+    return float(max((1000 * np.linalg.norm(pose[:3, 3]) for pose in left), default=0.0))
+
+
 def row_of(one: Found) -> dict[str, object]:
     frame, metre, end = (dict(errors.figures()) for _, errors in one.score.relative)
     absolute = one.score.absolute.figures()
@@ -141,8 +150,11 @@ def row_of(one: Found) -> dict[str, object]:
         "fruits_a_frame": one.n_fruits,
         "followed": len(one.score.true),
         "parts": len(np.unique(one.way.parts)),
+        "links": len(one.way.links),
+        "refused_links": one.way.refused,
         "loops": len(one.way.loops),
         "refused_loops": one.way.refused_loops,
+        "worst_mm": one.worst_mm,
         "length_m": one.score.length_m,
         **figures("rms", absolute, "rmse"),
         **figures("frame", frame, "rmse"),
@@ -167,14 +179,30 @@ def report(rows: list[dict[str, object]]) -> str:
         return "-" if mm is None else f"{mm:.1f} mm, {deg:.2f}°"
 
     table = markdown(
-        ("recording", "fruits", "followed", "parts", "loops", "way", "rms", "a frame", "a metre", "end", "honest"),
+        (
+            "recording",
+            "fruits",
+            "followed",
+            "parts",
+            "links",
+            "loops",
+            "worst",
+            "way",
+            "rms",
+            "a frame",
+            "a metre",
+            "end",
+            "honest",
+        ),
         [
             (
                 f"{row['recording']}, {row['variant']}",
                 f"{row['fruits_a_frame']:.0f}",
                 f"{row['followed']} of {row['frames']}",
                 str(row["parts"]),
+                str(row["links"]),
                 str(row["loops"]),
+                f"{row['worst_mm']:.0f} mm",
                 f"{row['length_m']:.1f} m",
                 *(both(row, name) for name in ("rms", "frame", "metre", "end")),
                 f"{row['honest']:.1f}",
@@ -185,7 +213,7 @@ def report(rows: list[dict[str, object]]) -> str:
     return f"The constellations of the fruits alone.\n\n{table}\n{NOTES}\n"
 
 
-NOTES = """Fruits: of a frame, mean. Followed: frames of the longest part, of which the rest of the row tells. Rms: of
-all poses after the rigid motion that fits positions and orientations best. A frame, a metre: error of the motion over
+NOTES = """Fruits: of a frame, mean. Followed: frames of the longest part, of which the rest of the row tells. Worst: the
+link or loop that is farthest off. Rms: of all poses after the rigid motion that fits positions and orientations best. A frame, a metre: error of the motion over
 each, rms. End: of the last pose seen from the first. Honest: median squared error of the poses by their covariances,
 over that of true ones: 1 is honest, less is careful."""

@@ -30,7 +30,8 @@ def _draw_way(axes: Any, one: Found) -> None:
     across, up = sorted(np.argsort(-np.ptp(one.score.true[:, :3, 3], axis=0), kind="stable")[:2])
     for poses, colour, width, label in ((one.score.true, TRUE, 3.5, "true"), (one.score.aligned, FOUND, 1.2, "found")):
         axes.plot(poses[:, across, 3], poses[:, up, 3], color=colour, linewidth=width, label=label)
-    axes.set(title=f"{one.name}, {one.variant}", xlabel=f"{'xyz'[across]}, m", ylabel=f"{'xyz'[up]}, m")
+    followed = f"{len(one.score.true)} of {len(one.way)} frames"
+    axes.set(title=f"{one.name}, {one.variant}: {followed}", xlabel=f"{'xyz'[across]}, m", ylabel=f"{'xyz'[up]}, m")
     axes.set_aspect("equal", adjustable="datalim")
 
 
