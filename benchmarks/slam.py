@@ -213,7 +213,7 @@ def report(rows: list[dict[str, object]]) -> str:
     return f"The constellations of the fruits alone.\n\n{table}\n{NOTES}\n"
 
 
-NOTES = """Fruits: of a frame, mean. Followed: frames of the longest part, of which the rest of the row tells. Worst: the
-link or loop that is farthest off. Rms: of all poses after the rigid motion that fits positions and orientations best. A frame, a metre: error of the motion over
-each, rms. End: of the last pose seen from the first. Honest: median squared error of the poses by their covariances,
-over that of true ones: 1 is honest, less is careful."""
+NOTES = """Fruits: of a frame, mean. Followed: frames of the longest part, of which the rest of the row tells. Worst:
+the link or loop that is farthest off. Rms: of all poses after the rigid motion that fits positions and orientations
+best. A frame, a metre: error of the motion over each, rms. End: of the last pose seen from the first. Honest: median
+squared error of the poses by their covariances, over that of true ones: 1 is honest, less is careful."""

@@ -10,7 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
+from pomona.localize import Localization, Step, Way
+from pomona.localize.files import write_way
+from pomona.matching import Verdict
 from pomona.orchard import write_session
 from pomona.recording.poses import read_kitti, read_tum, write_poses
 from pomona.trajectory import Trajectory
@@ -157,6 +160,24 @@ def test_kitti_text_comes_back(tmp_path: Path) -> None:
     assert read_poses(tmp_path / "poses.kitti").times_s is None
     write_poses(tmp_path / "poses.txt", trajectory(poses))
     np.testing.assert_allclose(read_poses(tmp_path / "poses.txt").times_s, [0.0, 0.1, 0.2, 0.3])
+
+
+def step(frame: int, pose: np.ndarray | None) -> Step:
+    status = Verdict.NO_MATCH if pose is None else Verdict.FOUND
+    nothing = np.zeros((0, 2), np.int64)
+    found = Localization(status, pose, np.zeros((6, 6)), nothing, np.zeros(0), float("nan"), tracked=False)
+    return Step(frame, 0.1 * frame, 30, found)
+
+
+def test_kitti_text_with_a_frame_that_was_not_found_is_told(tmp_path: Path) -> None:
+    poses = straight(3)
+    way = Way((step(0, poses[0]), step(1, None), step(2, poses[2])), {})
+    with pytest.warns(PomonaWarning, match="1 frame without a pose: its lines are not those of the frames"):
+        write_way(tmp_path / "way.kitti", way)
+    np.testing.assert_array_equal(read_kitti(tmp_path / "way.kitti"), poses[[0, 2]])
+    write_way(tmp_path / "way.tum", way)
+    assert (tmp_path / "way.tum").read_text().startswith("# time tx ty tz qx qy qz qw: map_from_camera\n0.000000 ")
+    np.testing.assert_allclose(read_tum(tmp_path / "way.tum")[0], [0.0, 0.2])
 
 
 def test_the_table_and_the_picture(pomona: Pomona, tmp_path: Path) -> None:
