@@ -24,6 +24,7 @@ NAMES = (
     "mapscale",
     "clouds",
     "odometry",
+    "slam",
     "tracking",
     "scan",
     "shipped",

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from pomona.trajectory_scores import Span, absolute_errors, alignment, relative_errors
+from pomona.trajectory_scores.spans import travelled
 
 Array = NDArray[np.float64]
 
@@ -28,46 +30,30 @@ def compare(found: Array, true: Array, parts: int, segments_m: tuple[float, ...]
     """Compare poses of one part with the truth.
 
     End: the last pose seen from the first one. Rms: after the rigid motion that fits positions and orientations best
-    (`aligned`). Segments: KITTI's measure, mean over all sub-drives of the given lengths.
+    (`pomona.trajectory_scores`). Segments: KITTI's measure, mean over all
+    sub-drives of the given lengths.
     """
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true[:, :3, 3], axis=0), axis=1))])
-    end = np.linalg.inv(np.linalg.inv(true[0]) @ true[-1]) @ (np.linalg.inv(found[0]) @ found[-1])
-    after = np.linalg.inv(true) @ aligned(found, true)
-    percents, rates = [], []
-    for first in range(len(true)):
-        for length_m in segments_m:
-            last = int(np.searchsorted(travelled, travelled[first] + length_m))
-            if last == len(true):
-                continue
-            error = np.linalg.inv(np.linalg.inv(true[first]) @ true[last]) @ np.linalg.inv(found[first]) @ found[last]
-            percents.append(100 * np.linalg.norm(error[:3, 3]) / length_m)
-            rates.append(angle_deg(error) / length_m)
+    end = relative_errors(found, true, Span(len(true) - 1, "f"))
+    after = absolute_errors(alignment(found, true).of(found), true)
+    drives = [(length_m, relative_errors(found, true, Span(length_m, "m"))) for length_m in segments_m]
     return Errors(
         frames=len(true),
         parts=parts,
-        length_m=float(travelled[-1]),
-        end_m=float(np.linalg.norm(end[:3, 3])),
-        end_deg=angle_deg(end),
-        rms_m=float(np.sqrt(np.mean(np.sum(after[:, :3, 3] ** 2, axis=1)))),
-        rms_deg=float(np.sqrt(np.mean([angle_deg(one) ** 2 for one in after]))),
-        segment_percent=float(np.mean(percents)) if percents else 0.0,
-        segment_deg_per_m=float(np.mean(rates)) if rates else 0.0,
+        length_m=float(travelled(true)[-1]),
+        end_m=float(end.translation_m[0]),
+        end_deg=float(end.rotation_deg[0]),
+        rms_m=rms(after.translation_m),
+        rms_deg=rms(after.rotation_deg),
+        segment_percent=mean([100 * errors.translation_m / length_m for length_m, errors in drives]),
+        segment_deg_per_m=mean([errors.rotation_deg / length_m for length_m, errors in drives]),
     )
 
 
-def aligned(found: Array, true: Array) -> Array:
-    """Move poses by the rigid motion that fits the truth best, orientations and positions.
-
-    Positions alone do not fix the turn about a straight drive. The rotation is the mean of those that take each found
-    orientation to the true one (the nearest rotation to their sum), the shift that of the centres.
-    """
-    u, _, vt = np.linalg.svd((true[:, :3, :3] @ found[:, :3, :3].transpose(0, 2, 1)).sum(axis=0))
-    u[:, 2] *= np.sign(np.linalg.det(u @ vt))
-    motion = np.eye(4)
-    motion[:3, :3] = u @ vt
-    motion[:3, 3] = true[:, :3, 3].mean(axis=0) - motion[:3, :3] @ found[:, :3, 3].mean(axis=0)
-    return motion @ found
+def rms(errors: Array) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
 
 
-def angle_deg(transform: Array) -> float:
-    return float(np.degrees(np.linalg.norm(cv2.Rodrigues(transform[:3, :3])[0])))
+def mean(of_lengths: list[Array]) -> float:
+    """Mean over all stretches of all lengths, 0 where there is none."""
+    every = np.concatenate([np.empty(0), *of_lengths])
+    return float(every.mean()) if len(every) else 0.0

@@ -38,6 +38,7 @@ def _adjust(draw: Drawn) -> None:
         draw.numbers(p, 3),
         places=_seen(draw, k, p),
         relative_poses=draw.choice(None, _between(draw, k)),
+        pose_covariances=draw.choice(False, True),
     )
 
 
@@ -50,7 +51,7 @@ def _seen(draw: Drawn, k: int, p: int) -> Any:
 def _between(draw: Drawn, k: int) -> Any:
     m = draw.count() % 5
     information = np.tile(np.eye(6), (m, 1, 1)) * draw.positive()
-    rows = {"first": draw.rows(m, k), "second": draw.rows(m, k)}
+    rows = {"first": draw.rows(m, k), "second": draw.rows(m, k), "doubtful": draw.rows(m, 2).astype(bool)}
     return {**rows, "first_from_second": draw.poses(m), "information": information}
 
 

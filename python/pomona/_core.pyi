@@ -378,6 +378,7 @@ class _Between(TypedDict):
     second: NDArray[np.int64]
     first_from_second: NDArray[np.float64]
     information: NDArray[np.float64]
+    doubtful: NDArray[np.bool_]
 
 def adjust(
     poses: NDArray[np.float64],
@@ -386,7 +387,15 @@ def adjust(
     *,
     places: _Seen,
     relative_poses: _Between | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    pose_covariances: bool = False,
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64] | None,
+]: ...
 def default_config() -> str: ...
 def setting_meanings() -> dict[str, str]: ...
 def contracted(

@@ -44,7 +44,7 @@ class Scan:
     looks : mapping
         All that looking at one frame depends on, JSON values.
     choices : mapping
-        Where poses and identities come from: `odometry`, `retrack`.
+        Where poses and identities come from: `odometry`, `slam`, `retrack`.
     config : mapping
         Values of the core's tables that differ from the defaults.
     every : int
@@ -106,6 +106,7 @@ def scan(
     date: str | None = None,
     depth: str = "auto",
     odometry: bool = False,
+    slam: bool = False,
     retrack: bool = False,
     every: int = 1,
     first: int | None = None,
@@ -135,8 +136,9 @@ def scan(
         Of the session; else the recording's.
     depth : str
         ``auto``, ``stereo``, ``dense`` or the file of a stereo network.
-    odometry, retrack : bool
-        Find poses although there are some; track boxes although they have ids.
+    odometry, slam, retrack : bool
+        Find poses although there are some, by the pictures, or by the fruits in all frames too; track boxes although
+        they have ids.
     every, first, last : int, optional
         Take one of so many frames, from one frame number to another.
     keep : str or Path, optional
@@ -166,12 +168,13 @@ def scan(
         require_outputs([Output(path, SCANNED) for path in (target, *parts_there(target))], [])
     require_date(date)
     ready = prepared(
-        open_recording(recording, own_poses=not odometry) if isinstance(recording, str | Path) else recording,
+        open_recording(recording, own_poses=not (odometry or slam)) if isinstance(recording, str | Path) else recording,
         detections=_boxes_given(detections),
         model=None if model is None else Path(model),
         outputs=[] if target is None else [target],
         depth=depth,
         odometry=odometry,
+        slam=slam,
         retrack=retrack,
         every=every,
         first=first,
@@ -195,6 +198,7 @@ def prepared(
     outputs: Iterable[Path],
     depth: str,
     odometry: bool,
+    slam: bool,
     retrack: bool,
     every: int,
     first: int | None,
@@ -219,7 +223,9 @@ def prepared(
     looks = {"detector": boxes.configuration, "depth": depth}
     kept = None if keep is None else Kept(keep, {**_made_from(taken, boxes), **looks})
     check_sides(taken)
-    return Scan(taken, boxes, looks, {"odometry": odometry, "retrack": retrack}, config, every, kept, crops)
+    return Scan(
+        taken, boxes, looks, {"odometry": odometry, "slam": slam, "retrack": retrack}, config, every, kept, crops
+    )
 
 
 def _boxes_given(detections: object) -> Path | Detector | None:

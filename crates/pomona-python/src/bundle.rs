@@ -60,6 +60,8 @@ pub struct Between<'py> {
     first_from_second: PyReadonlyArray3<'py, f64>,
     #[pyo3(item)]
     information: PyReadonlyArray3<'py, f64>,
+    #[pyo3(item)]
+    doubtful: PyReadonlyArray1<'py, bool>,
 }
 
 impl Between<'_> {
@@ -68,28 +70,38 @@ impl Between<'_> {
         let transforms = poses("first_from_second", &self.first_from_second, Pose::from_exact_matrix)?;
         let information: Vec<Matrix6<f64>> =
             squares::<6>(&self.information)?.map(|block| Matrix6::from_fn(|row, column| block[row][column])).collect();
-        if first.len() != second.len() || transforms.len() != first.len() || information.len() != first.len() {
+        let doubtful = self.doubtful.as_array();
+        let lengths = [second.len(), transforms.len(), information.len(), doubtful.len()];
+        if lengths.iter().any(|&length| length != first.len()) {
             return Err(wrong("relative poses: found arrays of different lengths"));
         }
-        let pairs = first.into_iter().zip(second).zip(transforms.into_iter().zip(information));
+        let pairs = first.into_iter().zip(second).zip(transforms.into_iter().zip(information)).zip(doubtful);
         Ok(pairs
-            .map(|((first, second), (first_from_second, information))| RelativePose {
+            .map(|(((first, second), (first_from_second, information)), &doubtful)| RelativePose {
                 first,
                 second,
                 first_from_second,
                 information,
+                doubtful,
             })
             .collect())
     }
 }
 
-/// Poses (K, 4, 4), points (P, 3), covariances of the points (P, 3, 3), squared errors of the sightings (M,).
-type Adjusted<'py> =
-    (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>);
+/// Poses (K, 4, 4), points (P, 3), covariances of the points (P, 3, 3), squared errors of the sightings (M,) and of the
+/// relative poses (R,), and, where asked for and held, covariances of the poses (K, 6, 6).
+type Adjusted<'py> = (
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Option<Bound<'py, PyArray3<f64>>>,
+);
 
 /// The poses and points of a session that explain best what was measured.
 #[pyfunction]
-#[pyo3(signature = (poses, fixed, points, *, places, relative_poses))]
+#[pyo3(signature = (poses, fixed, points, *, places, relative_poses, pose_covariances=false))]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn adjust<'py>(
     py: Python<'py>,
@@ -98,6 +110,7 @@ pub fn adjust<'py>(
     points: PyReadonlyArray2<'py, f64>,
     places: Seen<'py>,
     relative_poses: Option<Between<'py>>,
+    pose_covariances: bool,
 ) -> PyResult<Adjusted<'py>> {
     let relative_poses = relative_poses.map_or(Ok(Vec::new()), |between| between.to_relative_poses())?;
     let initial =
@@ -105,12 +118,20 @@ pub fn adjust<'py>(
     let (fixed, observations) = (fixed.as_array().to_vec(), places.to_observations()?);
     // Sightings are places; there are no pictures to project into.
     let problem = Problem { camera: Camera::UNIT, fixed, observations, relative_poses };
-    let found = py.detach(|| adjust_bundle(&problem, initial, &Settings::after_drift())).map_err(wrong)?;
+    let (found, of_poses) = py
+        .detach(|| {
+            let found = adjust_bundle(&problem, initial, &Settings::after_drift())?;
+            let of_poses = if pose_covariances { found.pose_covariances() } else { None };
+            Ok::<_, pomona::Error>((found, of_poses))
+        })
+        .map_err(wrong)?;
     Ok((
         pose_arrays(py, &found.state.poses)?,
         array(py, found.state.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect(), [found.state.points.len(), 3])?,
         blocks(py, found.point_covariances.iter().copied())?,
         PyArray1::from_vec(py, found.squared_errors),
+        PyArray1::from_vec(py, found.relative_squared_errors),
+        of_poses.map(|of_poses| blocks(py, of_poses.into_iter())).transpose()?,
     ))
 }
 

@@ -1,7 +1,7 @@
 //! Where a camera is: rigid transforms.
 
 use crate::error::{Error, Result};
-use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3};
 
 /// A rigid transform, `session_from_camera` where nothing else is said: takes points of the camera into the session.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +76,14 @@ impl Pose {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self { rotation, translation: -(rotation * self.translation) }
+    }
+
+    /// Its rotation as a vector: the axis, as long as the angle in radians.
+    ///
+    /// By way of a quaternion: the angle of a matrix is an arc cosine, which rounding next to identity makes NaN.
+    #[inline]
+    pub(crate) fn turn(&self) -> Vector3<f64> {
+        UnitQuaternion::from_rotation_matrix(&self.rotation).scaled_axis()
     }
 
     /// A point of the session in the camera's frame.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from pomona.cli.evaluate_trajectory import evaluate_trajectory
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Verbs
 
@@ -20,6 +21,9 @@ app = Verbs(help="Compare results with the truth.", no_args_is_help=True)
 @app.callback()
 def _evaluate() -> None:
     """Compare results with the truth."""
+
+
+app.command("trajectory")(evaluate_trajectory)
 
 
 @app.command("match")

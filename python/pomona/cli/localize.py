@@ -19,7 +19,10 @@ def localize(
         metavar="RECORDING", help="Stereo or depth recording, whatever `pomona info` reads."
     ),
     output: Annotated[Path, Writes(POSES)] = typer.Option(
-        ..., "-o", "--output", help="Poses to write, map_from_camera as TUM text; - is the standard output."
+        ...,
+        "-o",
+        "--output",
+        help="Poses to write, map_from_camera: TUM text, or KITTI (.kitti); - is the standard output.",
     ),
     single: bool = typer.Option(False, "--single", help="Find each frame from nothing, not from the one before."),
     detections: Path | None = typer.Option(

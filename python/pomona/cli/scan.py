@@ -58,6 +58,11 @@ def scan(
         "auto", metavar="auto|stereo|dense|ONNX", help="Depth pictures, else stereo at the fruits; or stereo all over."
     ),
     odometry: bool = typer.Option(False, "--odometry", help="Poses from the pictures, even where they were recorded."),
+    slam: bool = typer.Option(
+        False,
+        "--slam",
+        help="Poses by the constellations of the fruits too, loops closed, even where some were recorded.",
+    ),
     retrack: bool = typer.Option(False, "--retrack", help="Track the boxes, even where they have ids."),
     config: Path | None = typer.Option(None, metavar="TOML", help="Settings; `pomona config` prints them all."),
     every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
@@ -93,8 +98,10 @@ def scan(
     overrides = Settings.load(config, {}).overrides
     chosen = None if topics is None else parsed_topics(topics)
     # What is overridden is not read.
-    given = None if odometry else poses
-    whole = open_recording(recording, calibration=calibration, topics=chosen, poses=given, own_poses=not odometry)
+    given = None if odometry or slam else poses
+    whole = open_recording(
+        recording, calibration=calibration, topics=chosen, poses=given, own_poses=not (odometry or slam)
+    )
     _require_drawable(whole, preview)
     ready = prepared(
         whole,
@@ -103,6 +110,7 @@ def scan(
         outputs=[path for path in (output, preview) if path],
         depth=depth,
         odometry=odometry,
+        slam=slam,
         retrack=retrack,
         every=every,
         first=first,

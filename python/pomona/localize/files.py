@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
-from pomona.atomic import whole_file
+from pomona.amounts import amount
+from pomona.errors import PomonaWarning
 from pomona.localize.course import Way
-from pomona.recording.poses import write_tum
+from pomona.recording.poses import KITTI_SUFFIX, write_poses
 
 __all__ = ["write_way"]
 
 
 def write_way(path: Path, way: Way) -> None:
-    """Write `map_from_camera` of the frames that were found as TUM text, time tx ty tz qx qy qz qw."""
-    with whole_file(path) as partial:
-        write_tum(partial, way.trajectory, "map_from_camera")
+    """Write `map_from_camera` of the frames that were found: TUM text, or KITTI's where the name ends in .kitti."""
+    lost = len(way.steps) + len(way.skipped) - len(way.found)
+    if path.suffix.lower() == KITTI_SUFFIX and lost:
+        without = f"{amount(lost, 'frame')} without a pose"
+        message = f"{path}: {without}: its lines are not those of the frames; TUM text says which"
+        warnings.warn(message, PomonaWarning, stacklevel=2)
+    write_poses(path, way.trajectory, "map_from_camera")

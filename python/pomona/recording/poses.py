@@ -7,11 +7,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text
 from pomona.trajectory import Trajectory
 
-__all__ = ["is_kitti", "read_kitti", "read_tum", "transforms", "write_tum"]
+__all__ = [
+    "KITTI_SUFFIX",
+    "is_kitti",
+    "read_kitti",
+    "read_tum",
+    "transforms",
+    "write_kitti",
+    "write_poses",
+    "write_tum",
+]
+
+KITTI_SUFFIX = ".kitti"
+"""Of names under which poses are written as KITTI's; under all others as TUM's."""
 
 TUM_COLUMNS = "# time tx ty tz qx qy qz qw"
 """First line of the TUM files that are written here, before what their poses are."""
@@ -56,6 +69,8 @@ def read_kitti(path: Path) -> NDArray[np.float64]:
     rotations = matrices[:, :3, :3]
     if len(matrices) and np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max() > UNIT_TOLERANCE:
         raise PomonaError(f"{path}: found a pose that does not turn but stretch, expected 3x4 rotation and position")
+    if (np.linalg.det(rotations) < 0).any():
+        raise PomonaError(f"{path}: found a pose that mirrors, expected 3x4 rotation and position")
     return matrices
 
 
@@ -70,6 +85,22 @@ def write_tum(path: Path, trajectory: Trajectory, transform: str = "session_from
     for time_s, pose, quaternion in zip(trajectory.times_s, poses, turns, strict=True):
         lines.append(f"{time_s:.6f} " + " ".join(f"{number:.9f}" for number in (*pose[:3, 3], *quaternion)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_kitti(path: Path, trajectory: Trajectory) -> None:
+    """Write poses as `read_kitti` reads them: 12 numbers a line, and neither times nor a heading."""
+    rows = trajectory.session_from_camera[:, :3].reshape(-1, 12)
+    lines = [" ".join(f"{number:.9f}" for number in row) for row in rows]
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+
+
+def write_poses(path: Path, trajectory: Trajectory, transform: str = "session_from_camera") -> None:
+    """Write poses as the name says, `KITTI_SUFFIX` or TUM; the file appears whole or not at all."""
+    with whole_file(path) as partial:
+        if path.suffix.lower() == KITTI_SUFFIX:
+            write_kitti(partial, trajectory)
+        else:
+            write_tum(partial, trajectory, transform)
 
 
 def is_kitti(path: Path) -> bool:

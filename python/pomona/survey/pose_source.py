@@ -20,7 +20,7 @@ from pomona.survey.refinement import Motions, SeenFruits, refine
 from pomona.survey.sightings import Sightings
 from pomona.survey.thinning import between_keys, followed, stride
 
-__all__ = ["Place", "PoseSource", "pose_source_of"]
+__all__ = ["Followed", "Place", "PoseSource", "odometry_of", "pose_source_of"]
 
 
 OFF_PX = 0.5
@@ -98,7 +98,14 @@ def pose_source_of(
         return _Recorded(recording)
     if len(recording) == 1 and not odometry:
         return _Recorded(recording)
-    return _Followed(recording, config)
+    return Followed(recording, config)
+
+
+def odometry_of(recording: Recording, config: Mapping[str, Any] | None = None) -> Followed | None:
+    """Follow the camera by its pictures; None where the recording has not those that it takes."""
+    pictures = recording.description()["pictures"]
+    stereo = "right" in pictures and recording.calibration.baseline_m is not None
+    return Followed(recording, config) if "left" in pictures and (stereo or "depth" in pictures) else None
 
 
 class _Recorded:
@@ -123,7 +130,7 @@ class _Recorded:
         return np.array([self._pose_of[frame] for frame in frames]).reshape(-1, 4, 4)
 
 
-class _Followed:
+class Followed:
     """Poses found in the pictures by odometry, refined with the fruits at the end.
 
     Raises
@@ -159,6 +166,15 @@ class _Followed:
             return self._odometry.with_depth(left, _read(frame, "depth", frame.read_depth))
         except UnreadablePictureError as error:
             return self._odometry.skip(str(error))
+
+    def motions(self, frames: Sequence[int]) -> Motions:
+        """Give what was measured between some frames, by their rows in the list."""
+        row_of = {self._count_of[frame]: row for row, frame in enumerate(frames)}
+        way = self._way
+        rows = np.array([row_of.get(int(count), -1) for count in way.frames], np.int64).reshape(-1)
+        first, second = rows[way.first], rows[way.second]
+        kept = np.flatnonzero((first >= 0) & (second >= 0))
+        return Motions(first[kept], second[kept], way.first_from_second[kept], way.information[kept])
 
     def refined(
         self, part: int, frames: Sequence[int], sightings: Sightings, fruits: NDArray[np.int64]

@@ -58,12 +58,47 @@ class Motions:
         Take points of the second camera into the first.
     information : (M, 6, 6) float64
         Inverse covariances of a step (translation, rotation) of the second camera in its own frame.
+    doubtful : (M,) bool, optional
+        Which may be wrong altogether, of a place that looks the same: Cauchy's loss lets them go. Else none may.
     """
 
     first: Rows
     second: Rows
     first_from_second: Array
     information: Array
+    doubtful: NDArray[np.bool_] | None = None
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    @classmethod
+    def none(cls) -> Motions:
+        """Nothing measured: fruits alone say where the cameras are."""
+        rows = np.zeros(0, np.int64)
+        return cls(rows, rows, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)))
+
+    def and_those(self, other: Motions) -> Motions:
+        """Take these and then others, between the same frames."""
+        both = (self, other)
+        return Motions(
+            np.concatenate([one.first for one in both]),
+            np.concatenate([one.second for one in both]),
+            np.concatenate([one.first_from_second for one in both]),
+            np.concatenate([one.information for one in both]),
+            np.concatenate([one.which_are_doubtful() for one in both]),
+        )
+
+    def trusted(self) -> Motions:
+        """Give the same, none of which may be wrong."""
+        return Motions(self.first, self.second, self.first_from_second, self.information)
+
+    def weakened(self, part: float) -> Motions:
+        """Give the same with a part of their information."""
+        return Motions(self.first, self.second, self.first_from_second, part * self.information, self.doubtful)
+
+    def which_are_doubtful(self) -> NDArray[np.bool_]:
+        """Say it of each, (M,)."""
+        return np.zeros(len(self), bool) if self.doubtful is None else np.asarray(self.doubtful, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,15 +116,28 @@ class Refined:
         neighbours together, is not in it.
     squared_errors : (S,) float64
         Squared Mahalanobis distance of each sighting; 3 is the mean of true ones.
+    motion_squared_errors : (M,) float64
+        The same of each motion; 6 is the mean of true ones.
+    pose_covariances : (F, 6, 6) float64 or None
+        Of the step (translation, rotation) of each pose in its own frame, the first pose being sure; None where they
+        were not asked for, or not all frames hang together.
     """
 
     session_from_camera: Array
     centres: Array
     covariances: Array
     squared_errors: Array
+    motion_squared_errors: Array
+    pose_covariances: Array | None
 
 
-def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions | None = None) -> Refined:
+def refine(
+    session_from_camera: Array,
+    sightings: SeenFruits,
+    motions: Motions | None = None,
+    *,
+    with_pose_covariances: bool = False,
+) -> Refined:
     """Adjust the poses and fruits of one part of a session, robustly (Cauchy's loss on sightings).
 
     Parameters
@@ -100,6 +148,8 @@ def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions |
         Which frame saw which fruit where.
     motions : Motions, optional
         What was measured between frames. Without them the poses are trusted, and only the fruits are adjusted.
+    with_pose_covariances : bool
+        Say how sure the poses are.
 
     Raises
     ------
@@ -128,7 +178,9 @@ def refine(session_from_camera: Array, sightings: SeenFruits, motions: Motions |
                 "second": np.ascontiguousarray(motions.second, np.int64),
                 "first_from_second": np.ascontiguousarray(motions.first_from_second, np.float64),
                 "information": np.ascontiguousarray(motions.information, np.float64),
+                "doubtful": motions.which_are_doubtful(),
             },
+            pose_covariances=with_pose_covariances,
         )
     except ValueError as error:
         raise PomonaError(f"refinement: {error}") from None

@@ -27,6 +27,7 @@ from pomona.survey.box_check import check_boxes, check_long_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.kept import Kept
+from pomona.survey.mapped_way import mapped_way
 from pomona.survey.part import OpenPart, Part
 from pomona.survey.pose_check import check_poses
 from pomona.survey.pose_source import Place, PoseSource, pose_source_of
@@ -114,6 +115,7 @@ def scan(
     *,
     depth: str = "auto",
     odometry: bool = False,
+    slam: bool = False,
     retrack: bool = False,
     crops: bool = True,
     config: Mapping[str, Any] | None = None,
@@ -133,6 +135,9 @@ def scan(
         ``auto``: depth pictures, else from left and right at the fruits; or as in `pomona.stereo.open_stereo`.
     odometry : bool
         Find the poses even where the recording has some.
+    slam : bool
+        Find the poses by the constellations of the fruits in all frames, with odometry where it holds, even where the
+        recording has some; loops are closed.
     retrack : bool
         Track the boxes even where they have ids.
     crops : bool
@@ -154,20 +159,27 @@ def scan(
     """
     if not (depth == "auto" and "depth" in recording.description()["pictures"]):
         recording = straightened(recording)
-    if not odometry:
+    if not (odometry or slam):
         check_poses(recording)
     seeing = Seeing(recording, detector, depth=depth)
-    camera = pose_source_of(recording, odometry=odometry, config=config)
+    look_at = keep.remembering(seeing) if keep is not None else seeing
+    camera: PoseSource
+    n_before = 0
+    if slam:
+        n_before = len(recording)
+        camera = way = mapped_way(recording, look_at, seeing.needs, config=config, progress=progress, stop=stop)
+        look_at, stop = way.look, way.stop_after(stop)
+    else:
+        camera = pose_source_of(recording, odometry=odometry, config=config)
     # In a single frame nothing can be seen twice: each box is a fruit.
     named = len(recording) == 1 or (not retrack and bool(getattr(detector, "with_ids", False)))
     findings = _Findings(partial(_open_part, recording, None if named else config or {}, crops))
-    look_at = keep.remembering(seeing) if keep is not None else seeing
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
     with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
         for done, (frame, look) in enumerate(looked_ahead(frames, look_at, looker), start=1):
             findings.add(frame, _placed(camera, frame), look)
             if progress is not None:
-                progress(done, len(recording), findings.n_fruits)
+                progress(n_before + done, n_before + len(recording), findings.n_fruits)
             if stop is not None and stop():
                 findings.stopped = frame.number
                 break

@@ -6,7 +6,7 @@
 //! 1/2 `sum_k` `c_k^2` ln(1 + `m_k^2` / `c_k^2`) + 1/2 `sum_l` `e_l^T` `I_l` `e_l`,
 //!
 //! `m_k^2` being the squared Mahalanobis distance of an observation (Cauchy's loss: what is far off hardly pulls), `e_l` the
-//! error of a relative pose and `I_l` its information. Levenberg's and Marquardt's steps on reweighted normal equations
+//! error of a relative pose and `I_l` its information; relative poses that are doubtful have Cauchy's loss too. Levenberg's and Marquardt's steps on reweighted normal equations
 //! (`normal`), points eliminated, poses in a folded order (`ordering`) solved within their envelope (`envelope`):
 //! time and memory grow with the length of the drive, not with its cube. One thread, no random numbers.
 //!
@@ -42,11 +42,20 @@ pub struct Settings {
     pub picture_scale2: f64,
     /// Cauchy's c^2 for places: 3, the mean of m^2 of a Gaussian place. The depth of a single sighting is often a leaf's.
     pub place_scale2: f64,
+    /// Cauchy's c^2 for relative poses that are doubtful: 6, the mean of m^2 of a Gaussian pose.
+    pub relative_scale2: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_steps: 30, tolerance: 1e-6, first_scale: 1.0, picture_scale2: 5.7, place_scale2: 3.0 }
+        Self {
+            max_steps: 30,
+            tolerance: 1e-6,
+            first_scale: 1.0,
+            picture_scale2: 5.7,
+            place_scale2: 3.0,
+            relative_scale2: 6.0,
+        }
     }
 }
 
@@ -69,6 +78,8 @@ pub struct Adjustment {
     pub point_covariances: Vec<Matrix3<f64>>,
     /// Squared Mahalanobis distance of each observation, infinite behind the camera.
     pub squared_errors: Vec<f64>,
+    /// Squared Mahalanobis distance of each relative pose.
+    pub relative_squared_errors: Vec<f64>,
     /// Cost before and after.
     pub costs: [f64; 2],
     /// Steps taken.
@@ -107,6 +118,7 @@ pub fn adjust(problem: &Problem, initial: State, settings: &Settings) -> Result<
     Ok(Adjustment {
         point_covariances: last.point_covariances(),
         squared_errors: problem.observations.iter().map(distance).collect(),
+        relative_squared_errors: problem.relative_poses.iter().map(|pair| pair.squared_error(&state)).collect(),
         costs: [first_cost, cost],
         steps,
         places: plan.order.place,
@@ -152,6 +164,15 @@ impl Adjustment {
         let Some(factor) = self.reduced.clone().cholesky() else { return vec![None; pairs.len()] };
         let covariances = factor.inverse();
         pairs.iter().map(|&pair| self.information(&covariances, pair)).collect()
+    }
+
+    /// Covariance of each pose, points and all other poses free: of its step (translation, rotation) in its own frame.
+    ///
+    /// Zeros for fixed poses; `None` where what was measured does not hold all poses.
+    pub fn pose_covariances(&self) -> Option<Vec<Matrix6<f64>>> {
+        let covariances = self.reduced.clone().cholesky()?.inverse();
+        let of = |place: &Option<usize>| place.map_or_else(Matrix6::zeros, |place| *covariances.block(place, place));
+        Some(self.places.iter().map(of).collect())
     }
 
     fn information(&self, covariances: &Envelope, (first, second): (usize, usize)) -> Option<Matrix6<f64>> {

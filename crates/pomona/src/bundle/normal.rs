@@ -7,7 +7,7 @@
 use super::Settings;
 use super::envelope::Envelope;
 use super::ordering::Order;
-use super::problem::{Measured, PointView, Problem, State};
+use super::problem::{Measured, PointView, Problem, RelativePose, State};
 use super::steps::moved;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
@@ -53,7 +53,7 @@ impl<'a> Plan<'a> {
     /// Half the robust cost of a state.
     pub(super) fn cost(&self, state: &State) -> f64 {
         let seen: f64 = self.by_point.iter().map(|seen| self.loss(seen, state).0).sum();
-        let relative: f64 = self.problem.relative_poses.iter().map(|pair| pair.squared_error(state)).sum();
+        let relative: f64 = self.problem.relative_poses.iter().map(|pair| self.relative_loss(pair, state).0).sum();
         0.5 * (seen + relative)
     }
 
@@ -63,8 +63,13 @@ impl<'a> Plan<'a> {
             Measured::Picture(_) => self.settings.picture_scale2,
             Measured::Place(_) => self.settings.place_scale2,
         } * self.scale;
-        let squared = seen.squared_error(&self.problem.camera, state).unwrap_or(BEHIND);
-        (scale2 * (squared / scale2).ln_1p(), 1.0 / (1.0 + squared / scale2))
+        cauchy(seen.squared_error(&self.problem.camera, state).unwrap_or(BEHIND), scale2)
+    }
+
+    /// The same of a relative pose; one that is not doubtful weighs in full.
+    fn relative_loss(&self, pair: &RelativePose, state: &State) -> (f64, f64) {
+        let squared = pair.squared_error(state);
+        if pair.doubtful { cauchy(squared, self.settings.relative_scale2 * self.scale) } else { (squared, 1.0) }
     }
 
     /// The equations at a state; `damping` is added to the diagonal in proportion to it (Marquardt, 1963).
@@ -93,15 +98,16 @@ impl<'a> Plan<'a> {
     fn add_relative_poses(&self, state: &State, normal: &mut NormalEquations, diagonal: &mut [Matrix6<f64>]) {
         for pair in &self.problem.relative_poses {
             let (error, by_first, by_second) = pair.linear(state);
+            let information = pair.information * self.relative_loss(pair, state).1;
             let places = [self.order.place[pair.first], self.order.place[pair.second]];
             for (place, slope) in places.iter().zip([&by_first, &by_second]) {
                 if let Some(place) = *place {
-                    diagonal[place] += slope.tr_mul(&(pair.information * slope));
-                    normal.right[place] -= slope.tr_mul(&(pair.information * error));
+                    diagonal[place] += slope.tr_mul(&(information * slope));
+                    normal.right[place] -= slope.tr_mul(&(information * error));
                 }
             }
             if let [Some(first), Some(second)] = places {
-                let mixed = by_first.tr_mul(&(pair.information * by_second));
+                let mixed = by_first.tr_mul(&(information * by_second));
                 let (row, column, block) =
                     if first > second { (first, second, mixed) } else { (second, first, mixed.transpose()) };
                 *normal.reduced.block_mut(row, column) += block;
@@ -173,6 +179,11 @@ impl NormalEquations {
     pub(super) fn point_covariances(&self) -> Vec<Matrix3<f64>> {
         self.points.iter().map(|point| point.inverse).collect()
     }
+}
+
+/// Cauchy's loss of a squared distance, and its slope by it.
+fn cauchy(squared: f64, scale2: f64) -> (f64, f64) {
+    (scale2 * (squared / scale2).ln_1p(), 1.0 / (1.0 + squared / scale2))
 }
 
 /// What a point behind its camera counts: far outside every gate, yet finite, so that a step that brings it to the front

@@ -38,6 +38,8 @@ pub struct RelativePose {
     pub first_from_second: Pose,
     /// Inverse covariance of the step (translation, rotation) of the second camera, in its own frame.
     pub information: Matrix6<f64>,
+    /// Whether it may be wrong altogether: of another place that looks the same.
+    pub doubtful: bool,
 }
 
 /// Measurements of one adjustment. All rows are valid: [`super::adjust`] checks them.
@@ -195,7 +197,8 @@ mod tests {
         let state = state();
         let first_from_second =
             Pose { rotation: Rotation3::from_euler_angles(0.0, 0.2, 0.1), translation: Vector3::new(0.2, -0.1, 0.1) };
-        let measured = RelativePose { first: 0, second: 1, first_from_second, information: Matrix6::identity() };
+        let measured =
+            RelativePose { first: 0, second: 1, first_from_second, information: Matrix6::identity(), doubtful: false };
         let (_, by_first, by_second) = measured.linear(&state);
         let residual = |state: &State| measured.linear(state).0;
         // The inverse right Jacobian is cut after its second term: 1e-4 at these 20 degrees.

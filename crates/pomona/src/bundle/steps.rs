@@ -26,7 +26,7 @@ pub(crate) fn moved(pose: &Pose, xi: &Vector6<f64>) -> Pose {
 /// Residual (t, log R) of a measured relative pose, `error` = measured^-1 predicted.
 #[inline]
 pub(crate) fn logarithm(error: &Pose) -> Vector6<f64> {
-    let (t, r) = (error.translation, error.rotation.scaled_axis());
+    let (t, r) = (error.translation, error.turn());
     Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
 }
 
@@ -61,6 +61,17 @@ mod tests {
         let direct = second_in_first.seen_from(&moved(&Pose::IDENTITY, &xi));
         let carried = moved(&second_in_first, &-(carried(&second_in_first) * xi));
         assert!((direct.to_matrix() - carried.to_matrix()).norm() < 1e-11);
+    }
+
+    #[test]
+    fn a_pose_seen_from_itself_has_no_error() {
+        // The trace of such a rotation is now and then larger than 3.
+        for i in 0..2000 {
+            let turn = Vector3::new(0.1, -0.2, 0.3) * (0.01 * f64::from(i));
+            let pose = Pose { rotation: Rotation3::new(turn), translation: Vector3::new(0.3, -0.2, 0.5) };
+            let again = moved(&pose, &Vector6::zeros());
+            assert!(logarithm(&again.seen_from(&pose)).norm() < 1e-12, "{turn}");
+        }
     }
 
     #[test]

@@ -163,7 +163,13 @@ fn sightings_of_the_same_fruit_close_a_loop() {
     for second in 1..truth.poses.len() {
         let noise = deviations.map(|sigma| sigma * random.normal());
         let first_from_second = steps::moved(&truth.poses[second].seen_from(&truth.poses[second - 1]), &noise);
-        relative_poses.push(RelativePose { first: second - 1, second, first_from_second, information });
+        relative_poses.push(RelativePose {
+            first: second - 1,
+            second,
+            first_from_second,
+            information,
+            doubtful: false,
+        });
         start.poses.push(start.poses[second - 1].after(&first_from_second));
     }
     let mut fixed = vec![false; truth.poses.len()];
@@ -196,7 +202,13 @@ fn a_drift_of_sixty_sigma_is_closed() {
         camera: camera(),
         fixed: vec![true, false],
         observations: observations.collect(),
-        relative_poses: vec![RelativePose { first: 0, second: 1, first_from_second: drifted, information }],
+        relative_poses: vec![RelativePose {
+            first: 0,
+            second: 1,
+            first_from_second: drifted,
+            information,
+            doubtful: false,
+        }],
     };
     let left_m = |settings: &Settings| {
         let start = State { poses: vec![Pose::IDENTITY, drifted], points: fruits.to_vec() };
@@ -204,6 +216,38 @@ fn a_drift_of_sixty_sigma_is_closed() {
     };
     assert!(left_m(&Settings::default()) > 0.2, "{}", left_m(&Settings::default()));
     assert!(left_m(&Settings::after_drift()) < 0.03, "{}", left_m(&Settings::after_drift()));
+}
+
+#[test]
+fn a_doubtful_relative_pose_that_is_false_is_let_go() {
+    // A chain of five, a loop that agrees with it, and one that is a metre off.
+    let place = |i: usize| Pose { translation: Vector3::x() * (0.5 * i as f64), ..Pose::IDENTITY };
+    let information = Matrix6::identity() * 1e4;
+    let pair = |first: usize, second: usize, beside_m: f64, doubtful: bool| RelativePose {
+        first,
+        second,
+        first_from_second: Pose {
+            translation: place(second).seen_from(&place(first)).translation + Vector3::z() * beside_m,
+            ..Pose::IDENTITY
+        },
+        information,
+        doubtful,
+    };
+    let adjusted = |doubtful: bool| {
+        let mut relative_poses: Vec<_> = (1..6).map(|second| pair(second - 1, second, 0.0, false)).collect();
+        relative_poses.extend([pair(0, 5, 0.0, true), pair(1, 4, 1.0, doubtful)]);
+        let fixed = (0..6).map(|pose| pose == 0).collect();
+        let problem = Problem { camera: camera(), fixed, observations: Vec::new(), relative_poses };
+        let start = State { poses: (0..6).map(place).collect(), points: Vec::new() };
+        adjust(&problem, start, &Settings::after_drift()).expect("a valid problem")
+    };
+    let (refused, trusted) = (adjusted(true), adjusted(false));
+    assert!(refused.state.poses[4].translation.z.abs() < 0.01, "{}", refused.state.poses[4].translation);
+    assert!(refused.relative_squared_errors[6] > 5000.0 && refused.relative_squared_errors[5] < 1.0);
+    assert!(trusted.state.poses[4].translation.z > 0.1, "{}", trusted.state.poses[4].translation);
+    let sigma2 = refused.pose_covariances().expect("all hang together")[1][(0, 0)];
+    // Of a chain of six sides that closes, one side: 5 / 6 of its variance.
+    assert!((sigma2 * 1e4 - 5.0 / 6.0).abs() < 0.01, "{sigma2}");
 }
 
 #[test]

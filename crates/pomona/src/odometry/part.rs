@@ -96,7 +96,7 @@ impl Part {
     /// Why a pose is not to be believed.
     fn objection(&self, frame: usize, found: &Found, config: &OdometryConfig) -> Option<String> {
         let away = found.pose.seen_from(&self.predicted(frame));
-        let (shift_m, turn_rad) = (away.translation.norm(), away.rotation.angle());
+        let (shift_m, turn_rad) = (away.translation.norm(), away.turn().norm());
         let smooth = self.velocity.is_some() && shift_m < config.smooth_m && turn_rad < config.smooth_rad;
         let (least, share) =
             if smooth { (config.min_inliers, config.min_share) } else { (config.sure_inliers, config.sure_share) };
@@ -142,7 +142,7 @@ impl Part {
         let median_depth_m = median(&mut found.agreeing.iter().map(depth_m).collect::<Vec<_>>());
         (found.agreeing.len() as f64) < config.keyframe_share * self.reference.numbers.len() as f64
             || moved.translation.norm() > config.keyframe_shift * median_depth_m
-            || moved.rotation.angle() > config.keyframe_rad
+            || moved.turn().norm() > config.keyframe_rad
     }
 
     /// Makes a frame the reference: points that agree go on, new corners fill the gaps. Gives its pose, adjusted.
@@ -176,5 +176,5 @@ fn root(motion: &Pose, steps: usize) -> Pose {
         return *motion;
     }
     let part = 1.0 / steps as f64;
-    Pose { rotation: Rotation3::new(motion.rotation.scaled_axis() * part), translation: motion.translation * part }
+    Pose { rotation: Rotation3::new(motion.turn() * part), translation: motion.translation * part }
 }

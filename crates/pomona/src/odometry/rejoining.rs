@@ -170,8 +170,8 @@ fn stepped(before: &Places, moved: &Places, pairs: &[(usize, usize)], pose: &Pos
     let weights = [PRIOR_M.powi(-2), PRIOR_M.powi(-2), PRIOR_M.powi(-2)];
     let turns = [PRIOR_RAD.powi(-2), PRIOR_RAD.powi(-2), PRIOR_RAD.powi(-2)];
     let prior = Matrix6::from_diagonal(&Vector6::from_iterator(weights.into_iter().chain(turns)));
-    let (shift, turn) =
-        (pose.translation - start.translation, (pose.rotation * start.rotation.inverse()).scaled_axis());
+    let shift = pose.translation - start.translation;
+    let turn = pose.after(&start.inverse()).turn();
     let mut matrix = prior;
     let mut right = -prior * Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
     for &pair in pairs {

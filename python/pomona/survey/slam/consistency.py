@@ -1,0 +1,53 @@
+"""Which loops are believed: those that drift can explain.
+
+With one loop more, the least sum of squared errors of a graph grows by the squared distance of that loop from where the
+graph has it, by the covariances of both: chi-square with six degrees where the loop is true. So each is tried, the ones
+with the most fruits first, and one that is refused leaves no trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
+from pomona.survey.slam.constellation_links import motions_of
+from pomona.survey.slam.loops import Loop
+
+__all__ = ["BELIEVED2", "explained"]
+
+BELIEVED2 = 22.5
+"""Squared distance up to which a link or a loop is believed: one of a thousand true ones is farther off."""
+
+NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+
+def explained(poses: NDArray[np.float64], motions: Motions, found: Sequence[Loop]) -> tuple[list[int], Refined]:
+    """Say which loops are believed, and adjust the poses to them.
+
+    Parameters
+    ----------
+    poses : (F, 4, 4) float64
+        To begin with.
+    motions : Motions
+        What is trusted.
+    found : sequence of Loop
+        What may be wrong.
+
+    Returns
+    -------
+    rows : list of int
+        Of the loops that are believed, ascending.
+    adjusted : Refined
+    """
+    believed: list[int] = []
+    now = refine(poses, NO_FRUITS, motions)
+    for row in sorted(range(len(found)), key=lambda row: (-len(found[row].pairs), row)):
+        closed = motions.and_those(motions_of([found[row]]).trusted())
+        then = refine(now.session_from_camera, NO_FRUITS, closed)
+        if then.motion_squared_errors.sum() - now.motion_squared_errors.sum() <= BELIEVED2:
+            motions, now = closed, then
+            believed.append(row)
+    return sorted(believed), now

@@ -1,0 +1,152 @@
+"""Where one frame's camera is in another one's frame, by the constellations of the fruits that both saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.localize import Localizer
+from pomona.survey.refinement import Motions
+
+__all__ = ["ConstellationLink", "Constellations", "chained", "motions_of"]
+
+SAME_VISIT: Mapping[str, Mapping[str, float]] = {"localization": {"own_m": 0.005, "shared_m": 0.001}}
+"""Within a visit nothing grows or sags: the middle of a fruit differs by what each side shows of it, and wind."""
+
+NEIGHBOURS: Mapping[str, Mapping[str, float]] = {
+    "localization": {**SAME_VISIT["localization"], "false_alarm_rate": 1e-3},
+    "verified": {"false_alarm_rate": 0.3},
+}
+"""Frames that follow each other mostly do see the same fruits: less evidence will do than for a place on any map."""
+
+NEAR = 3
+"""Frames before that each is looked for in."""
+
+REACH = 10
+"""Frames before that it is looked for in as long as it is found in none."""
+
+LEAST_FRUITS = 5
+"""Fewer make no constellation that could be checked."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConstellationLink:
+    """One frame found in another one.
+
+    Attributes
+    ----------
+    first, second : int
+        Rows of the frames.
+    first_from_second : (4, 4) float64
+        Takes points of the second camera into the first.
+    information : (6, 6) float64
+        Inverse covariance of a step (translation, rotation) of the second camera in its own frame.
+    pairs : (M, 2) int64
+        Row in the first and row in the second frame of each fruit that both saw.
+    probabilities : (M,) float64
+        That the two are one fruit.
+    """
+
+    first: int
+    second: int
+    first_from_second: NDArray[np.float64]
+    information: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    probabilities: NDArray[np.float64]
+
+
+class Constellations:
+    """The fruits of each frame, in which other frames are looked for.
+
+    Parameters
+    ----------
+    clouds : sequence of FruitCloud
+        Of each frame, in the frame of its camera, with covariances.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()` and from what is set here.
+    threads : int, optional
+        As in `pomona.Localizer`.
+    """
+
+    def __init__(
+        self, clouds: Sequence[FruitCloud], *, config: Mapping[str, Any] | None = None, threads: int | None = None
+    ) -> None:
+        self._clouds, self._threads = clouds, threads
+        self._config = config or {}
+        self._ready: dict[int, Localizer] = {}
+
+    def __len__(self) -> int:
+        return len(self._clouds)
+
+    def cloud(self, row: int) -> FruitCloud:
+        """Give what a frame saw."""
+        return self._clouds[row]
+
+    def of(self, cloud: FruitCloud, *, neighbours: bool = False) -> Localizer:
+        """Make fruits of the same visit ready to be looked in, for what follows on them or for anything."""
+        config = _over(NEIGHBOURS if neighbours else SAME_VISIT, self._config)
+        return Localizer(cloud, config=config, threads=self._threads)
+
+    def between(self, first: int, second: int) -> ConstellationLink | None:
+        """Look for a frame in another one; None where it is not found."""
+        if min(len(self._clouds[first]), len(self._clouds[second])) < LEAST_FRUITS:
+            return None
+        if first not in self._ready:
+            self._ready = {row: ready for row, ready in self._ready.items() if abs(row - first) <= REACH}
+            self._ready[first] = self.of(self._clouds[first], neighbours=True)
+        found = self._ready[first].locate(self._clouds[second])
+        if not found or found.map_from_camera is None:
+            return None
+        information = np.asarray(np.linalg.inv(found.covariance), np.float64)
+        pairs = found.pairs[:, ::-1]
+        return ConstellationLink(first, second, found.map_from_camera, information, pairs, found.probabilities)
+
+
+def chained(constellations: Constellations) -> list[ConstellationLink]:
+    """Look for each frame in those just before it."""
+    links: list[ConstellationLink] = []
+    for second in range(1, len(constellations)):
+        found = False
+        for first in range(second - 1, max(second - 1 - REACH, -1), -1):
+            if found and second - first > NEAR:
+                break
+            if (link := constellations.between(first, second)) is not None:
+                links.append(link)
+                found = True
+    return links
+
+
+class _Related(Protocol):
+    """Two frames, one of which was found from the other."""
+
+    @property
+    def first(self) -> int: ...
+    @property
+    def second(self) -> int: ...
+    @property
+    def first_from_second(self) -> NDArray[np.float64]: ...
+    @property
+    def information(self) -> NDArray[np.float64]: ...
+
+
+def motions_of(links: Sequence[_Related]) -> Motions:
+    """Give links as motions, each of which may be wrong."""
+    if not links:
+        return Motions.none()
+    return Motions(
+        first=np.array([link.first for link in links], np.int64),
+        second=np.array([link.second for link in links], np.int64),
+        first_from_second=np.array([link.first_from_second for link in links]),
+        information=np.array([link.information for link in links]),
+        doubtful=np.ones(len(links), bool),
+    )
+
+
+def _over(ours: Mapping[str, Mapping[str, float]], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of settings; what the user gives counts."""
+    return {**given, **{name: {**table, **given.get(name, {})} for name, table in ours.items()}}

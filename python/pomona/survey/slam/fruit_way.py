@@ -1,0 +1,203 @@
+"""The story of a way by fruits: frames -> links -> graph of poses -> fruits -> loops -> poses and fruits together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+from pomona.errors import PomonaError
+from pomona.survey.refinement import Motions
+from pomona.survey.slam.anchors import Anchors
+from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
+from pomona.survey.slam.fruit_graph import FruitGraph
+from pomona.survey.slam.loops import Loop, SeenMap, joined, loops
+from pomona.survey.slam.spanning import spanned_poses
+
+__all__ = ["FruitWay", "way_by_fruits"]
+
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FruitWay:
+    """Where the camera was in each frame.
+
+    Attributes
+    ----------
+    parts : (F,) int64
+        Number of the part that each frame is in, from 0: frames that hang together.
+    session_from_camera : (F, 4, 4) float64
+        In the frame of reference of its part, the camera of the part's first frame.
+    covariances : (F, 6, 6) float64
+        Of a step (translation, rotation) of each pose in its own frame, the first pose of its part being sure.
+    links : tuple of ConstellationLink
+        Frames found in frames just before.
+        Those that are believed.
+    refused : int
+        Other links, which these contradict.
+    loops : tuple of Loop
+        Places come back to, those that are believed.
+    refused_loops : int
+    """
+
+    parts: NDArray[np.int64]
+    session_from_camera: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    links: tuple[ConstellationLink, ...]
+    refused: int
+    loops: tuple[Loop, ...]
+    refused_loops: int
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __repr__(self) -> str:
+        n_parts = len(np.unique(self.parts))
+        return f"FruitWay({len(self)} frames in {n_parts} parts, {len(self.links)} links, {len(self.loops)} loops)"
+
+
+def way_by_fruits(
+    clouds: Sequence[FruitCloud],
+    motions: Motions | None = None,
+    *,
+    anchors: Anchors | None = None,
+    config: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+) -> FruitWay:
+    """Find the camera's way past some fruits.
+
+    Parameters
+    ----------
+    clouds : sequence of FruitCloud
+        What each frame saw, in the frame of its camera, metres, with covariances; in order of time.
+    motions : Motions, optional
+        What was measured between the frames otherwise, by odometry.
+    anchors : Anchors, optional
+        Places by GNSS, verticals by an IMU. Parts with a place, or a vertical, are in the frame of the anchors then.
+    config : mapping, optional
+        Values of the core's tables that differ from `pomona.default_config()`.
+    threads : int, optional
+        As in `pomona.Localizer`.
+
+    Raises
+    ------
+    PomonaError
+        A cloud has no covariances, or a setting is wrong. Frames that hang together with no other are parts of one
+        frame.
+    """
+    _require_covariances(clouds)
+    constellations = Constellations(clouds, config=config, threads=threads)
+    known = Known(constellations, Motions.none() if motions is None else motions, anchors, chained(constellations), [])
+    parts, start = known.laid_out()
+    if joins := list(_joins(known, parts, start)):
+        known = replace(known, joins=joins)
+        parts, start = known.laid_out()
+    n = len(clouds)
+    way = FruitWay(parts, start, np.zeros((n, 6, 6)), (), len(known.links), (), 0)
+    for rows in _rows_of(parts):
+        way = _with_part(way, rows, known)
+    return way
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """All that is known of how frames lie to each other, by the rows of the recording or of a part."""
+
+    constellations: Constellations
+    motions: Motions
+    anchors: Anchors | None
+    links: list[ConstellationLink]
+    joins: list[Loop]
+
+    def laid_out(self) -> tuple[Rows, NDArray[np.float64]]:
+        """Give the part of each frame, and poses to begin with."""
+        doubtful = motions_of([*self.links, *self.joins])
+        return spanned_poses(self.motions.and_those(doubtful), len(self.constellations))
+
+    def graph(self, rows: Rows, poses: NDArray[np.float64]) -> tuple[FruitGraph, SeenMap]:
+        """Adjust the frames of a part to each other."""
+        row_of = _row_of(rows, len(self.constellations))
+        clouds = [self.constellations.cloud(row) for row in rows.tolist()]
+        graph = FruitGraph(clouds, _inside(self.motions, row_of), poses[rows])
+        return graph, graph.link([_renamed(link, row_of) for link in self.links if row_of[link.first] >= 0])
+
+
+def _joins(known: Known, parts: Rows, start: NDArray[np.float64]) -> Iterator[Loop]:
+    """Look for each part in the one before it, and in the one before that."""
+    rows = _rows_of(parts)
+    maps = [known.graph(ours, start)[1] for ours in rows] if len(rows) > 1 else []
+    for second in range(1, len(maps)):
+        for first in range(second - 1, max(second - 3, -1), -1):
+            if (join := joined(maps[first], maps[second], known.constellations)) is not None:
+                pairs = join.pairs.copy()
+                for side, ours in enumerate((rows[first], rows[second])):
+                    pairs[:, side, 0] = ours[pairs[:, side, 0]]
+                ends = int(rows[first][join.first]), int(rows[second][join.second])
+                yield replace(join, first=ends[0], second=ends[1], pairs=pairs)
+                break
+
+
+def _with_part(way: FruitWay, rows: Rows, known: Known) -> FruitWay:
+    """Adjust one part of a way; rows of a part are those of its frames, in order."""
+    row_of = _row_of(rows, len(way))
+    graph, seen = known.graph(rows, way.session_from_camera)
+    found = [_of_part(join, row_of) for join in known.joins if row_of[join.first] >= 0]
+    n_joins = len(found)
+    found += loops(seen, known.constellations)
+    believed = graph.close(found)
+    if known.anchors is not None and len(here := known.anchors.inside(row_of)):
+        graph.anchor(here)
+    poses, covariances = way.session_from_camera.copy(), way.covariances.copy()
+    poses[rows], covariances[rows] = graph.poses, graph.covariances
+    closed = [loop for loop in found[n_joins:] if loop in believed]
+    return FruitWay(
+        parts=way.parts,
+        session_from_camera=poses,
+        covariances=covariances,
+        links=(*way.links, *(_renamed(link, rows) for link in graph.links)),
+        refused=way.refused - len(graph.links),
+        loops=(*way.loops, *(_of_part(loop, rows) for loop in closed)),
+        refused_loops=way.refused_loops + len(found) - n_joins - len(closed),
+    )
+
+
+def _rows_of(parts: Rows) -> list[Rows]:
+    return [np.flatnonzero(parts == part) for part in range(int(parts.max(initial=-1)) + 1)]
+
+
+def _row_of(rows: Rows, n_frames: int) -> Rows:
+    row_of = np.full(n_frames, -1, np.int64)
+    row_of[rows] = np.arange(len(rows))
+    return row_of
+
+
+def _renamed(link: ConstellationLink, row_of: Rows) -> ConstellationLink:
+    return replace(link, first=int(row_of[link.first]), second=int(row_of[link.second]))
+
+
+def _of_part(loop: Loop, row_of: Rows) -> Loop:
+    pairs = loop.pairs.copy()
+    pairs[..., 0] = row_of[pairs[..., 0]]
+    return replace(loop, first=int(row_of[loop.first]), second=int(row_of[loop.second]), pairs=pairs)
+
+
+def _inside(motions: Motions, row_of: Rows) -> Motions:
+    kept = np.flatnonzero(row_of[motions.first] >= 0)
+    return Motions(
+        row_of[motions.first[kept]],
+        row_of[motions.second[kept]],
+        motions.first_from_second[kept],
+        motions.information[kept],
+        motions.which_are_doubtful()[kept],
+    )
+
+
+def _require_covariances(clouds: Sequence[FruitCloud]) -> None:
+    bare = next((row for row, cloud in enumerate(clouds) if len(cloud) and cloud.covariances is None), None)
+    if bare is not None:
+        raise PomonaError(f"clouds: frame {bare} has no covariances, expected those of every fruit")

@@ -1,0 +1,330 @@
+"""Ways by fruits alone: drawn graphs and rows whose truth is known, and a scan of a shipped recording."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pomona import FruitCloud
+from pomona import scan as pomona_scan
+from pomona.errors import PomonaError
+from pomona.recording import open_recording
+from pomona.survey.refinement import Motions, SeenFruits, refine
+from pomona.survey.slam import Anchors, Constellations, FruitWay, chained, way_by_fruits
+from pomona.survey.slam.consistency import explained
+from pomona.survey.slam.fruit_graph import FruitGraph
+from pomona.survey.slam.identities_of_links import joined_fruits
+from pomona.survey.slam.loops import Loop, joined
+from pomona.survey.slam.spanning import spanned_poses
+from recording_maker import make_recording
+
+ROW = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09"
+
+Pomona = Callable[..., tuple[int, str, str]]
+
+NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+SIGMAS = np.array([0.02, 0.02, 0.03, 0.004, 0.004, 0.004])
+
+
+def exp(step: np.ndarray) -> np.ndarray:
+    moved = np.eye(4)
+    moved[:3, :3], moved[:3, 3] = Rotation.from_rotvec(step[3:]).as_matrix(), step[:3]
+    return moved
+
+
+def log(pose: np.ndarray) -> np.ndarray:
+    return np.concatenate([pose[:3, 3], Rotation.from_matrix(pose[:3, :3]).as_rotvec()])
+
+
+def drawn_drive(rng: np.random.Generator, n: int) -> np.ndarray:
+    """A camera that goes round in a circle and wobbles."""
+    turn = exp(np.array([0.3, 0.0, 0.05, 0.0, 2 * np.pi / n, 0.0]))
+    poses = [np.eye(4)]
+    for _ in range(n - 1):
+        poses.append(poses[-1] @ turn @ exp(rng.normal(0, 0.01, 6)))
+    return np.array(poses)
+
+
+def measured(rng: np.random.Generator, true: np.ndarray, pairs: list[tuple[int, int]], doubtful: bool) -> Motions:
+    first, second = np.array(pairs, np.int64).T
+    noise = [exp(SIGMAS * rng.normal(size=6)) for _ in pairs]
+    return Motions(
+        first=first,
+        second=second,
+        first_from_second=np.linalg.inv(true[first]) @ true[second] @ np.array(noise),
+        information=np.tile(np.diag(SIGMAS**-2.0), (len(pairs), 1, 1)),
+        doubtful=np.full(len(pairs), doubtful),
+    )
+
+
+def neighbours(n: int) -> list[tuple[int, int]]:
+    return [(row, row + 1) for row in range(n - 1)]
+
+
+def test_covariances_of_a_graph_are_those_of_its_errors() -> None:
+    """Squared errors of poses in a loop, by their covariances, have the mean of chi-square with six degrees."""
+    squared = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        true = drawn_drive(rng, 12)
+        motions = measured(rng, true, [*neighbours(12), (0, 11), (3, 9)], doubtful=False)
+        start = spanned_poses(motions, 12)[1]
+        found = refine(start, NO_FRUITS, motions, with_pose_covariances=True)
+        assert found.pose_covariances is not None
+        for row in (3, 6, 11):
+            error = log(np.linalg.inv(found.session_from_camera[row]) @ true[row])
+            squared.append(error @ np.linalg.solve(found.pose_covariances[row], error))
+        assert not found.pose_covariances[0].any(), "the first pose stays"
+    # Poses of one draw go together: of 40 draws the mean scatters by sqrt(12 / 40) = 0.55.
+    assert np.mean(squared) == pytest.approx(6.0, abs=1.7)
+
+
+def loop_of(motions: Motions, n_pairs: int) -> Loop:
+    """The first of some motions as a loop."""
+    pairs = np.zeros((n_pairs, 2, 2), np.int64)
+    rows = int(motions.first[0]), int(motions.second[0])
+    return Loop(*rows, motions.first_from_second[0], motions.information[0], pairs)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_false_loops_are_refused_and_true_ones_kept(seed: int) -> None:
+    """The false ones are off by more than drift explains; they have the most fruits and are tried first."""
+    rng = np.random.default_rng(seed)
+    true = drawn_drive(rng, 40)
+    chain = measured(rng, true, neighbours(40), doubtful=False)
+    start = spanned_poses(chain, 40)[1]
+    found = [loop_of(measured(rng, true, [pair], True), 10) for pair in ((0, 39), (2, 37), (8, 20))]
+    for pair in ((5, 25), (10, 30)):
+        loop = loop_of(measured(rng, true, [pair], True), 30)
+        found.append(
+            replace(loop, first_from_second=loop.first_from_second @ exp(np.array([1.5, 0.6, -1.4, 0.1, 0.5, 0])))
+        )
+    rows, adjusted = explained(start, chain, found)
+    assert rows == [0, 1, 2]
+    drift, left = (log(np.linalg.inv(poses[-1]) @ true[-1]) for poses in (start, adjusted.session_from_camera))
+    assert np.linalg.norm(left[:3]) < 0.15
+    assert np.linalg.norm(left[:3]) < np.linalg.norm(drift[:3])
+
+
+def drawn_row(rng: np.random.Generator, length_m: float) -> np.ndarray:
+    """Fruits in clusters of up to three: x along the row, y down, z into it."""
+    spurs = rng.uniform([-1.0, -0.8, -0.25], [length_m + 1, 0.8, 0.25], (int(28 * length_m), 3))
+    fruits = np.repeat(spurs, rng.integers(1, 4, len(spurs)), axis=0)
+    return fruits + rng.normal(0, 0.05, fruits.shape)
+
+
+def seen(rng: np.random.Generator, fruits: np.ndarray, pose: np.ndarray) -> FruitCloud:
+    """What a camera sees of them: a part is hidden, and depth is poorer than direction."""
+    places = (fruits - pose[:3, 3]) @ pose[:3, :3]
+    inside = (
+        (places[:, 2] > 0.5) & (np.abs(places[:, 0]) < 0.7 * places[:, 2]) & (np.abs(places[:, 1]) < 0.5 * places[:, 2])
+    )
+    places = places[inside & (rng.uniform(size=len(places)) < 0.8)]
+    sigmas = np.array([0.003, 0.003, 0.008])
+    covariances = np.tile(np.diag(sigmas**2), (len(places), 1, 1))
+    return FruitCloud(positions=places + sigmas * rng.normal(size=places.shape), covariances=covariances)
+
+
+def facing(x_m: float, beyond: bool = False) -> np.ndarray:
+    """A camera 1.5 m from the row; beyond it, it looks back."""
+    pose = np.eye(4)
+    pose[:3, 3] = [x_m, 0.0, 1.5 if beyond else -1.5]
+    if beyond:
+        pose[:3, :3] = np.diag([-1.0, 1.0, -1.0])
+    return pose
+
+
+def wobbling(rng: np.random.Generator, poses: list[np.ndarray]) -> np.ndarray:
+    return np.array([pose @ exp(np.array([0.02] * 3 + [0.01] * 3) * rng.normal(size=6)) for pose in poses])
+
+
+def walked(seed: int, true: list[np.ndarray], length_m: float) -> tuple[FruitWay, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    fruits, poses = drawn_row(rng, length_m), wobbling(rng, true)
+    return way_by_fruits([seen(rng, fruits, pose) for pose in poses], threads=1), poses
+
+
+def errors_of(way: FruitWay, true: np.ndarray) -> np.ndarray:
+    """Of each pose in the frame of the first."""
+    return np.array(
+        [
+            log(np.linalg.inv(found) @ pose)
+            for found, pose in zip(way.session_from_camera, np.linalg.inv(true[0]) @ true, strict=True)
+        ]
+    )
+
+
+def test_a_way_there_and_back_is_closed() -> None:
+    there = [0.25 * step for step in range(14)]
+    way, true = walked(3, [facing(x_m) for x_m in (*there, *(x_m + 0.1 for x_m in there[::-1]))], 3.4)
+    assert not way.parts.any(), "one part"
+    assert way.loops
+    assert way.refused_loops == 0
+    errors = errors_of(way, true)
+    assert np.linalg.norm(errors[-1, :3]) < 0.02
+    assert np.linalg.norm(errors[13, :3]) < 0.06
+    squared = [
+        error @ np.linalg.solve(spread, error) for error, spread in zip(errors[1:], way.covariances[1:], strict=True)
+    ]
+    assert np.median(squared) < 2 * 6
+    assert way.session_from_camera[0].tolist() == np.eye(4).tolist()
+
+
+def test_a_row_is_known_again_from_its_other_side() -> None:
+    """There on one side, then from the other without having seen how the camera got there: odometry tells it poorly."""
+    rng = np.random.default_rng(5)
+    fruits = drawn_row(rng, 3.0)
+    sides = [facing(0.25 * step) for step in range(12)], [facing(0.25 * step, beyond=True) for step in range(12)]
+    true = wobbling(rng, [*sides[0], *sides[1]])
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    # Around the end of the row: a metre and 30 degrees of doubt.
+    round_the_end = Motions(
+        first=np.array([11]),
+        second=np.array([12]),
+        first_from_second=(np.linalg.inv(true[11]) @ true[12] @ exp(np.array([0.6, 0.1, -0.5, 0.0, 0.3, 0.0])))[None],
+        information=np.diag([1.0, 1.0, 1.0, 4.0, 4.0, 4.0])[None],
+    )
+    way = way_by_fruits(clouds, round_the_end, threads=1)
+    assert any(loop.first < 12 <= loop.second for loop in way.loops)
+    assert np.linalg.norm(errors_of(way, true)[:, :3], axis=1).max() < 0.06
+
+
+def test_two_parts_are_joined_by_what_several_of_their_frames_saw() -> None:
+    rng = np.random.default_rng(8)
+    fruits = drawn_row(rng, 3.0)
+    true = wobbling(rng, [facing(0.25 * step) for step in range(10)])
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    both = []
+    for rows in (slice(0, 5), slice(5, 10)):
+        links = chained(Constellations(clouds[rows], threads=1))
+        start = np.linalg.inv(true[rows][0]) @ true[rows]
+        both.append(FruitGraph(clouds[rows], Motions.none(), start).link(links))
+    join = joined(*both, Constellations(clouds, threads=1))
+    assert join is not None
+    assert (join.first, join.second) == (4, 0)
+    assert np.linalg.norm(log(np.linalg.inv(join.first_from_second) @ np.linalg.inv(true[4]) @ true[5])[:3]) < 0.03
+    # Sightings that are said to be of one fruit lie at one place.
+    for (frame, row), (other, other_row) in join.pairs:
+        places = [
+            pose[:3, :3] @ cloud.positions[at] + pose[:3, 3]
+            for pose, cloud, at in ((true[frame], clouds[frame], row), (true[5 + other], clouds[5 + other], other_row))
+        ]
+        assert np.linalg.norm(places[0] - places[1]) < 0.1
+    assert len(join.pairs) > 10
+
+
+def world(rng: np.random.Generator, seen_from_first: np.ndarray) -> np.ndarray:
+    """The poses in a frame with z up, in which the row runs north-east."""
+    upright = np.eye(4)
+    upright[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix() @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    upright[:3, 3] = [1200.0, -340.0, 80.0]
+    return upright @ seen_from_first
+
+
+def test_a_way_hangs_on_gnss_and_verticals() -> None:
+    """Places to 2 cm at every third frame, one of them a reflection; verticals to half a degree."""
+    rng = np.random.default_rng(4)
+    fruits, poses = drawn_row(rng, 4.0), wobbling(rng, [facing(0.25 * step) for step in range(16)])
+    true = world(rng, poses)
+    at = np.arange(0, 16, 3)
+    positions = true[at, :3, 3] + rng.normal(0, 0.02, (len(at), 3))
+    positions[2] += [0.0, 2.0, 1.0]
+    sigma_rad = np.radians(0.5)
+    ups = true[:, 2, :3] + rng.normal(0, sigma_rad, (16, 3))
+    spreads = np.tile(0.02**2 * np.eye(3), (len(at), 1, 1))
+    anchors = Anchors(at, positions, spreads, np.arange(16), ups, sigma_rad)
+    way = way_by_fruits([seen(rng, fruits, pose) for pose in poses], anchors=anchors, threads=1)
+    left = np.array([log(one) for one in np.linalg.inv(way.session_from_camera) @ true])
+    assert np.linalg.norm(left[:, :3], axis=1).max() < 0.06
+    assert np.degrees(np.linalg.norm(left[:, 3:], axis=1)).max() < 1.0
+    squared = [error @ np.linalg.solve(spread, error) for error, spread in zip(left, way.covariances, strict=True)]
+    assert 0.5 < np.mean(squared) < 15.0
+
+
+def test_verticals_alone_level_a_way() -> None:
+    rng = np.random.default_rng(6)
+    fruits, poses = drawn_row(rng, 2.5), wobbling(rng, [facing(0.25 * step) for step in range(8)])
+    true = world(rng, poses)
+    anchors = Anchors.of_verticals(np.arange(8), true[:, 2, :3], 0.001)
+    way = way_by_fruits([seen(rng, fruits, pose) for pose in poses], anchors=anchors, threads=1)
+    np.testing.assert_allclose(way.session_from_camera[:, 2, :3], true[:, 2, :3], atol=0.01)
+
+
+def test_anchors_of_a_wrong_shape_are_told() -> None:
+    with pytest.raises(PomonaError, match="anchors: found shapes"):
+        Anchors.of_places(np.arange(2), np.zeros((3, 3)), np.zeros((2, 3, 3)))
+    with pytest.raises(PomonaError, match="anchors: found a vertical without a direction"):
+        Anchors.of_verticals(np.arange(1), np.zeros((1, 3)))
+
+
+def test_frames_of_other_fruits_are_another_part() -> None:
+    rng = np.random.default_rng(2)
+    one, other = drawn_row(rng, 2.0), drawn_row(rng, 2.0)
+    drive = [facing(0.2 * step) for step in range(6)]
+    clouds = [seen(rng, one, pose) for pose in drive] + [seen(rng, other, pose) for pose in drive]
+    way = way_by_fruits(clouds, threads=1)
+    assert way.parts.tolist() == [0] * 6 + [1] * 6
+    assert not way.loops
+    assert repr(way).startswith("FruitWay(12 frames in 2 parts")
+
+
+def test_frames_without_fruits_hang_together_with_none() -> None:
+    empty = FruitCloud(positions=np.zeros((0, 3)), covariances=np.zeros((0, 3, 3)))
+    way = way_by_fruits([empty, empty, empty])
+    assert way.parts.tolist() == [0, 1, 2]
+    assert len(way_by_fruits([])) == 0
+    with pytest.raises(PomonaError, match="frame 1 has no covariances"):
+        way_by_fruits([empty, FruitCloud(np.eye(3))])
+
+
+def test_a_fruit_is_once_in_a_frame() -> None:
+    frames = np.array([0, 0, 1, 2])
+    fruits = joined_fruits(np.arange(4), frames, [(0, 2), (2, 3), (1, 3)])
+    # The last pair would make both fruits of frame 0 one.
+    assert fruits.tolist() == [0, 1, 0, 0]
+
+
+def test_scan_with_slam(pomona: Pomona, tmp_path: Path) -> None:
+    """The first 14 frames, 1.7 m, of a shipped row: poses by its fruits and pictures, the same again on another run."""
+    command = ("scan", ROW / "row.mp4", "--calibration", ROW / "calibration.json", "--detections", ROW / "boxes.csv")
+    flags = ("--retrack", "--slam", "--no-crops", "--to", "13", "--date", "2024-08-09")
+    code, out, err = pomona(*command, *flags, "-o", tmp_path / "row.gpkg", "--json")
+    assert code == 0, err
+    assert json.loads(out)["n_frames"] == 14
+    true = "\n".join((ROW / "poses_tum.txt").read_text().splitlines()[:15])
+    (tmp_path / "true.tum").write_text(true + "\n")
+    judge = ("evaluate", "trajectory", tmp_path / "row.gpkg", tmp_path / "true.tum", "--in-order", "--json")
+    figures = json.loads(pomona(*judge)[1])
+    assert figures["poses"] == 14
+    assert figures["absolute"]["translation_m"]["rmse"] < 0.004
+    assert figures["absolute"]["rotation_deg"]["rmse"] < 0.15
+
+
+def test_a_scan_with_slam_that_is_stopped_has_what_was_looked_at() -> None:
+    recording = open_recording(ROW / "row.mp4", calibration=ROW / "calibration.json")
+    asked = iter([False] * 6 + [True] * 20)
+    told: list[tuple[int, int, int]] = []
+    survey = pomona_scan(
+        recording,
+        detections=ROW / "boxes.csv",
+        slam=True,
+        retrack=True,
+        crops=False,
+        progress=lambda *done: told.append(done),
+        stop=lambda: next(asked),
+    )
+    assert survey.stopped == 6
+    assert survey.trajectory.frames.tolist() == list(range(7))
+    assert [done for done, _, _ in told] == [*range(1, 8), *range(49, 56)]
+
+
+def test_a_recording_whose_frames_share_nothing_is_told(tmp_path: Path) -> None:
+    recording = open_recording(make_recording(tmp_path / "R", (0.0, 0.1, 0.2)))
+    with pytest.raises(
+        PomonaError, match="found 3 frames that show no fruits in common, expected 5 or more in each two"
+    ):
+        pomona_scan(recording, slam=True)
