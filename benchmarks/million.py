@@ -1,11 +1,11 @@
-"""Where in a thousand fruits, and in a million: time to make an index, to open and to ask it, memory, answers.
+"""Where in a thousand fruits, and in a million: time to make an index, to open and to ask it; memory, answers.
 
-Orchards as drawn_orchard.py draws them; every visit misses 30 % of the fruits, has 5 % false ones, and lies 2 cm off the
-other. Asked are compact indices: visits of five trees and frames of 40 fruits with no idea where they are, as many from
-rows that are not in the map; half of all with the vertical known to 2 degrees. Right is a pose within 5 degrees and 0.3 m.
-Every size is a process of its own with two threads; CPU time is of both together. Resident is what the process holds
-after the answers, less what it held before it opened the index and with it the caller's cloud. Writes million.csv,
-million.md and million.png.
+Orchards as drawn_orchard.py draws them; every visit misses 30 % of the fruits, has 5 % false ones, and lies 2 cm off
+the other. Asked are compact indices: visits of five trees and frames of 40 fruits with no idea where they are, as many
+from rows that are not in the map; half of all with the vertical known to 2 degrees. Right is a pose within 5 degrees
+and 0.3 m. Every size is a process of its own with two threads; CPU time is of both together. Resident is what the
+process holds after the answers, less what it held before it opened the index and with it the caller's cloud. Writes
+million.csv, million.md and million.png.
 """
 
 import argparse

@@ -123,8 +123,8 @@ class Index:
         Threads of the search, from 1, of which no more than there are cores are used; None takes all. The answer does
         not depend on it.
     compact
-        Keep only constellations of rare shape: less than a tenth of the memory, and an index that can be saved. A map of
-        more than 300,000 fruits has no other. By the verified method, metric.
+        Keep only constellations of rare shape: a tenth of the memory, and an index that can be saved. A map of more
+        than 300,000 fruits has no other. By the verified method, metric.
 
     Raises
     ------

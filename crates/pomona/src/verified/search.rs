@@ -137,7 +137,7 @@ fn candidates_of(
 /// Reach of the code search in standard deviations of one axis.
 ///
 /// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
-pub(super) const RADIUS: f64 = 2.5;
+const RADIUS: f64 = 2.5;
 
 /// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many
 /// times.

@@ -5,6 +5,7 @@
 //! columns must agree, and no number out of a column is trusted as a row.
 
 use super::columns::{Bytes, Column};
+use super::ground::n_buckets;
 use super::shapes::{LANES, NUMBERS};
 use super::{CompactMap, Facts, MOST};
 use crate::cloud::FruitCloud;
@@ -109,7 +110,7 @@ impl CompactMap {
             && self.rows.get().iter().all(|&row| (row as usize) < self.facts.given)
             && self.points.get().len() == fruits
             && self.density.get().len() == fruits
-            && self.buckets.get().len() == fruits.next_power_of_two() + 1
+            && self.buckets.get().len() == n_buckets(fruits) + 1
             && self.companions.get().len() == fruits * self.facts.each
             && starts.len() == cells + 1
             && starts.is_sorted()

@@ -13,10 +13,26 @@ pub(super) struct Ground<'a> {
     inverse_cell: f64,
 }
 
+/// Buckets for so many fruits: four cells in five are empty, and blocks of them share a place.
+pub(super) fn n_buckets(fruits: usize) -> usize {
+    (4 * fruits).next_power_of_two().max(1 << (3 * BLOCK))
+}
+
+/// Cells along the edge of a block, as a power of two. What is near in space is near in memory: most of the time goes into
+/// waiting for it.
+const BLOCK: u32 = 2;
+
+/// The bucket of a cell: the place of its block, and its own in there.
+#[inline]
+fn bucket_of(cell: CellKey, n_buckets: usize) -> usize {
+    let block = hash(cell.map(|x| x >> BLOCK), (n_buckets >> (3 * BLOCK)) as u64 - 1);
+    cell.iter().fold(block, |at, x| at << BLOCK | (x & ((1 << BLOCK) - 1)) as usize)
+}
+
 /// The order of the fruits by bucket, and the first of each bucket; cells have the edge of one spacing.
 pub(super) fn by_bucket(positions: &[Point3<f64>], spacing: f64) -> (Vec<usize>, Vec<u32>) {
-    let n_buckets = positions.len().next_power_of_two();
-    let bucket = |row: usize| hash(cell_of(&positions[row].coords, 1.0 / spacing), n_buckets as u64 - 1);
+    let n_buckets = n_buckets(positions.len());
+    let bucket = |row: usize| bucket_of(cell_of(&positions[row].coords, 1.0 / spacing), n_buckets);
     let mut order: Vec<(u32, u32)> = (0..positions.len()).map(|row| (bucket(row) as u32, row as u32)).collect();
     order.sort_unstable();
     let mut starts = vec![0u32; n_buckets + 1];
@@ -42,8 +58,7 @@ impl<'a> Ground<'a> {
     /// Calls `visit` for every fruit of a cell, and for others.
     #[inline]
     fn in_cell(&self, cell: CellKey, mut visit: impl FnMut(u32, Vector3<f64>)) {
-        let Some(mask) = self.buckets.len().checked_sub(2) else { return };
-        let bucket = hash(cell, mask as u64);
+        let bucket = bucket_of(cell, self.buckets.len() - 1);
         let range = self.buckets[bucket] as usize..self.buckets[bucket + 1] as usize;
         for (row, point) in range.clone().zip(self.points.get(range).unwrap_or_default()) {
             visit(row as u32, double(point));

@@ -18,11 +18,10 @@ use crate::verified::search::{Contender, Effort, REACH, Starts, by_evidence, dis
 use crate::verified::size::Diameters;
 use nalgebra::Vector3;
 
-/// Candidates that each round of the search meets, more or less.
-const BUDGETS: [f32; 3] = [2e4, 3e5, 3e6];
+/// Rounds of the search: candidates that each meets, more or less, and contenders that are looked at closely after it.
+const ROUNDS: [(f32, usize); 3] = [(5e4, 32), (2e5, 64), (1e6, 256)];
 
-/// Contenders that are looked at closely, and of these those that are verified as a whole.
-const CLOSELY: usize = 48;
+/// Contenders that are verified as a whole.
 const WHOLE: usize = 12;
 
 /// Contenders that are remembered from round to round.
@@ -92,7 +91,7 @@ impl Case<'_> {
         let (mut rest, mut effort) = (&looks[..], Effort::default());
         let mut contenders = Vec::new();
         let mut answer = Match::without_answer(Verdict::NoMatch, Vec::new());
-        for budget in BUDGETS {
+        for (budget, closely) in ROUNDS {
             let (now, later) = rest.split_at(within_budget(rest, budget));
             rest = later;
             if now.is_empty() {
@@ -103,7 +102,7 @@ impl Case<'_> {
             contenders.extend(more);
             contenders.sort_unstable_by(by_evidence);
             contenders.truncate(REMEMBERED);
-            answer = self.judged(contenders.clone(), effort);
+            answer = self.judged(contenders.clone(), closely, effort);
             if answer.verdict != Verdict::NoMatch {
                 break;
             }
@@ -112,8 +111,8 @@ impl Case<'_> {
     }
 
     /// The answer that the contenders give, most evidence first.
-    fn judged(&self, mut contenders: Vec<Contender>, effort: Effort) -> Match {
-        let best = distinct(self.landscape, self.index.facts.spacing, &mut contenders, CLOSELY);
+    fn judged(&self, mut contenders: Vec<Contender>, closely: usize, effort: Effort) -> Match {
+        let best = distinct(self.landscape, self.index.facts.spacing, &mut contenders, closely);
         let mut whole = self.looked_at(&best);
         let whole = distinct(self.landscape, self.index.facts.spacing, &mut whole, WHOLE);
         let rows = self.rows_around(&whole, f64::INFINITY);

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Seeds that a map keeps, a fruit, on average; a map of fewer fruits than `FEW` as many as one of so many.
-pub(super) const KEPT: usize = 32;
+pub(super) const KEPT: usize = 48;
 const FEW: usize = 100_000;
 
 /// Cells of the space of shapes, a fruit.
