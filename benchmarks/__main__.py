@@ -22,6 +22,7 @@ NAMES = (
     "growth",
     "seasons",
     "mapscale",
+    "million",
     "clouds",
     "odometry",
     "slam",

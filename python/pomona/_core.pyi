@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from os import PathLike
 from typing import Protocol, Self, TypedDict, final
 
 import numpy as np
@@ -89,6 +90,13 @@ class Match:
 @final
 class MapIndex:
     def __new__(cls, map: _Arrays, *, method: str, scale: str, config: str, threads: int | None = None) -> MapIndex: ...
+    @staticmethod
+    def compact(map: _Arrays, *, config: str, threads: int | None = None) -> MapIndex: ...
+    @staticmethod
+    def opened(path: str | PathLike[str], map: _Arrays, *, config: str, threads: int | None = None) -> MapIndex: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+    @property
+    def is_compact(self) -> bool: ...
     def search(
         self,
         query: _Arrays,

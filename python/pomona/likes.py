@@ -24,6 +24,7 @@ __all__ = [
     "EXPORTS",
     "FARM_PLAN",
     "GROWN",
+    "INDEX",
     "KEPT",
     "MCAP_MARK",
     "MERGED",
@@ -85,6 +86,9 @@ MCAP_MARK = "fruits written by pomona"
 
 REPORT_MARK = b"<!-- season report written by pomona -->"
 """In the first lines of the reports that are written here."""
+
+INDEX_MARK = b"POMONAix"
+"""How the index of a map begins."""
 
 DRAWN = re.compile(r"(query|map|truth)(?P<seed>|_[0-9]+)\.(csv|json)")
 """Names of the files of drawn visits."""
@@ -250,6 +254,10 @@ def _is_report(path: Path) -> bool:
     return REPORT_MARK in _head(path)
 
 
+def _is_index(path: Path) -> bool:
+    return _head(path).startswith(INDEX_MARK)
+
+
 def _has_drawn_boxes(folder: Path) -> bool:
     return all(path.name.endswith(BOXES_DRAWN) for path in folder.iterdir())
 
@@ -349,6 +357,7 @@ VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
 CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
 THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
 REPORT = Like("a report of a season", _is_report)
+INDEX = Like("the index of a map", _is_index)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 BY_DATE = Like("a folder of observations by date", _has_dates, is_folder=True)
 FARM_PLAN = Like("a plan of a farm", lambda path: b"[recordings]" in _head(path))

@@ -1,12 +1,18 @@
 //! The facade: an index of a map, its answers, the settings.
 
 use crate::cloud::Arrays;
+use memmap2::Mmap;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
+use pomona::verified::compact::Bytes;
 use pomona::{Config, MapIndex, Match, Method, Scale, Similarity, Verdict};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Settings and their defaults as JSON.
 #[pyfunction]
@@ -124,16 +130,46 @@ impl PyMapIndex {
     ) -> PyResult<Self> {
         let method: Method = parse("method", method)?;
         let scale: Scale = parse("scale", scale)?;
-        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-        let pool = threads.map(pool_of).transpose()?;
+        let config = config_of(config)?;
         let cloud = map.to_cloud()?;
-        let build = || MapIndex::new(&cloud, method, scale, config);
-        let built = py.detach(|| match &pool {
-            Some(pool) => pool.install(build),
-            None => build(),
-        });
-        let index = built.map_err(wrong)?;
-        Ok(Self { index, pool })
+        Self::made(py, threads, || MapIndex::new(&cloud, method, scale, config))
+    }
+
+    /// An index as of a large map, whatever its size.
+    #[staticmethod]
+    #[pyo3(signature = (map, *, config, threads=None))]
+    fn compact(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+        let config = config_of(config)?;
+        let cloud = map.to_cloud()?;
+        Self::made(py, threads, || MapIndex::compact(&cloud, config))
+    }
+
+    /// The index of `map` in a file, which is mapped into memory.
+    #[staticmethod]
+    #[pyo3(signature = (path, map, *, config, threads=None))]
+    fn opened(py: Python<'_>, path: PathBuf, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+        let config = config_of(config)?;
+        let bytes: Bytes = Arc::new(mapped(&path)?);
+        let cloud = map.to_cloud()?;
+        Self::made(py, threads, || MapIndex::opened(&bytes, &cloud, config))
+    }
+
+    /// Writes a compact index into a file.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let pieces = self.index.pieces().map_err(wrong)?;
+        py.detach(|| {
+            let mut file = File::create(path)?;
+            for piece in pieces {
+                file.write_all(&piece)?;
+            }
+            file.sync_all()
+        })
+        .map_err(PyErr::from)
+    }
+
+    #[getter]
+    fn is_compact(&self) -> bool {
+        self.index.is_compact()
     }
 
     #[pyo3(signature = (query, *, noise_m=None, up=None, per_frame=false))]
@@ -170,6 +206,36 @@ impl PyMapIndex {
         let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
         py.detach(|| self.index.pairs_under(&cloud, &pose, noise_m)).map(PyMatch).map_err(wrong)
     }
+}
+
+impl PyMapIndex {
+    fn made(
+        py: Python<'_>,
+        threads: Option<usize>,
+        make: impl FnOnce() -> pomona::Result<MapIndex> + Send,
+    ) -> PyResult<Self> {
+        let pool = threads.map(pool_of).transpose()?;
+        let made = py.detach(|| match &pool {
+            Some(pool) => pool.install(make),
+            None => make(),
+        });
+        Ok(Self { index: made.map_err(wrong)?, pool })
+    }
+}
+
+fn config_of(text: &str) -> PyResult<Config> {
+    serde_json::from_str(text).map_err(|error| wrong(format!("configuration: {error}")))
+}
+
+/// A file as bytes that are read as they are needed.
+#[expect(
+    unsafe_code,
+    reason = "nobody can promise that no other program writes into the file meanwhile; Pomona replaces it whole"
+)]
+fn mapped(path: &Path) -> PyResult<Mmap> {
+    let file = File::open(path)?;
+    // SAFETY: a file that Pomona writes appears whole under its name and is never written into again.
+    Ok(unsafe { Mmap::map(&file) }?)
 }
 
 /// Threads of their own, at most as many as the machine has cores: more would only wait for each other.

@@ -86,6 +86,31 @@ impl Conditioned {
         }
     }
 
+    /// The same of a cloud that was conditioned before: its `rows`, about `middle`; the scale is metric.
+    pub(crate) fn again(cloud: &FruitCloud, rows: Vec<usize>, middle: Vector3<f64>, spacing: f64) -> Self {
+        let first_of: Vec<usize> = (0..cloud.len()).collect();
+        let unit = 1.0;
+        Self { cloud: moved(cloud, &rows, &first_of, &middle, unit), given: cloud.len(), rows, middle, unit, spacing }
+    }
+
+    /// Puts its fruits into another order.
+    pub(crate) fn reorder(&mut self, order: &[usize]) {
+        self.cloud = self.cloud.select(order);
+        self.rows = order.iter().map(|&at| self.rows[at]).collect();
+    }
+
+    pub(crate) fn rows(&self) -> &[usize] {
+        &self.rows
+    }
+
+    pub(crate) fn middle(&self) -> Vector3<f64> {
+        self.middle
+    }
+
+    pub(crate) fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
     /// Copies, strays and what crowds: they take no part.
     pub(crate) fn left_out(&self) -> usize {
         self.given - self.rows.len()

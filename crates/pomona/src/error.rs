@@ -47,6 +47,11 @@ pub enum Error {
         /// Fruits at most.
         most: usize,
     },
+    /// An index that was kept cannot be used with this map.
+    Index {
+        /// What was found and what was expected.
+        reason: String,
+    },
     /// The settings make more constellations of the fruits than memory should hold.
     TooManyConstellations {
         /// Whose fruits: the map's or the query's.
@@ -108,6 +113,7 @@ impl fmt::Display for Error {
             Self::TooManyFruits { found, most } => {
                 write!(f, "found {found} fruits in one cloud, the verified method expects at most {most}")
             }
+            Self::Index { reason } => write!(f, "{reason}"),
             Self::TooManyConstellations { whose, fruits, found, most } => write!(
                 f,
                 "constellation.n: the {fruits} fruits of the {whose} give up to {found} constellations, \

@@ -6,6 +6,7 @@ use crate::conditioning::Conditioned;
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
+use crate::verified::compact::{self, Bytes, CompactMap};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +53,7 @@ enum PreparedMap {
     TooFew,
     Paper(Box<crate::paper::PaperMap>),
     Verified(Box<crate::verified::VerifiedMap>),
+    Compact(Box<CompactMap>),
 }
 
 impl MapIndex {
@@ -62,15 +64,72 @@ impl MapIndex {
     pub fn new(map: &FruitCloud, method: Method, scale: Scale, config: Config) -> Result<Self> {
         map.validate()?;
         config.validate()?;
+        let given = map;
         let map = Conditioned::new(map, scale);
         let fruits = &map.cloud;
         let prepared = match method {
-            Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => return Err(too_many(fruits.len())),
+            Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => {
+                return match scale {
+                    Scale::Metric => Self::compacted(given, map, config),
+                    Scale::Free => Err(too_many(fruits.len(), crate::verified::MAX_FRUITS)),
+                };
+            }
             Method::Verified => PreparedMap::Verified(Box::new(crate::verified::VerifiedMap::new(fruits, scale))),
             Method::Paper if fruits.len() < config.constellation.k => PreparedMap::TooFew,
             Method::Paper => PreparedMap::Paper(Box::new(crate::paper::PaperMap::new(&fruits.positions, &config)?)),
         };
         Ok(Self { map, config, method, scale, prepared })
+    }
+
+    /// Prepares `map` as a large one, whatever its size: by the verified method, metric, in a tenth of the memory, and such
+    /// that it can be kept ([`Self::pieces`]).
+    ///
+    /// # Errors
+    /// A cloud or a setting that is wrong.
+    pub fn compact(map: &FruitCloud, config: Config) -> Result<Self> {
+        map.validate()?;
+        config.validate()?;
+        Self::compacted(map, Conditioned::new(map, Scale::Metric), config)
+    }
+
+    fn compacted(given: &FruitCloud, map: Conditioned, config: Config) -> Result<Self> {
+        if map.cloud.len() > compact::MOST {
+            return Err(too_many(map.cloud.len(), compact::MOST));
+        }
+        let (index, map) = CompactMap::new(given, map);
+        let prepared = PreparedMap::Compact(Box::new(index));
+        Ok(Self { map, config, method: Method::Verified, scale: Scale::Metric, prepared })
+    }
+
+    /// The compact index of `map` that was kept as `bytes`; they are read as they are needed.
+    ///
+    /// # Errors
+    /// Bytes that are no index of this map, of another version, or damaged; a setting that is wrong.
+    pub fn opened(bytes: &Bytes, map: &FruitCloud, config: Config) -> Result<Self> {
+        map.validate()?;
+        config.validate()?;
+        let index = CompactMap::opened(bytes, map)?;
+        let facts = index.facts();
+        let rows = index.rows().iter().map(|&row| row as usize).collect();
+        let map = Conditioned::again(map, rows, facts.middle, facts.sampled_spacing);
+        let prepared = PreparedMap::Compact(Box::new(index));
+        Ok(Self { map, config, method: Method::Verified, scale: Scale::Metric, prepared })
+    }
+
+    /// A compact index as the pieces of a file, in order.
+    ///
+    /// # Errors
+    /// The index is not compact.
+    pub fn pieces(&self) -> Result<impl Iterator<Item = Vec<u8>> + '_> {
+        match &self.prepared {
+            PreparedMap::Compact(index) => Ok(index.pieces()),
+            _ => Err(Error::Index { reason: "expected a compact index: others are not kept".to_owned() }),
+        }
+    }
+
+    /// Whether the index is compact.
+    pub fn is_compact(&self) -> bool {
+        matches!(self.prepared, PreparedMap::Compact(_))
     }
 
     /// Finds `query` in the map.
@@ -104,7 +163,9 @@ impl MapIndex {
     fn found(&self, query: &Conditioned, request: &Request) -> Result<Match> {
         let fruits = &query.cloud;
         match &self.prepared {
-            PreparedMap::Verified(_) if fruits.len() > crate::verified::MAX_FRUITS => Err(too_many(fruits.len())),
+            PreparedMap::Verified(_) | PreparedMap::Compact(_) if fruits.len() > crate::verified::MAX_FRUITS => {
+                Err(too_many(fruits.len(), crate::verified::MAX_FRUITS))
+            }
             _ if !self.map.is_comparable(query) => Ok(Match::without_answer(Verdict::NoMatch, Vec::new())),
             PreparedMap::Paper(map) if fruits.len() >= self.config.constellation.k => {
                 map.search(fruits, request, &self.config)
@@ -115,6 +176,9 @@ impl MapIndex {
             }
             PreparedMap::Verified(prepared) => {
                 Ok(crate::verified::search(prepared, &self.map.cloud, fruits, request, &self.config.verified))
+            }
+            PreparedMap::Compact(index) => {
+                Ok(compact::search(index, &self.map.cloud, fruits, request, &self.config.verified))
             }
         }
     }
@@ -140,21 +204,25 @@ impl MapIndex {
         query.validate()?;
         let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: false };
         request.validate()?;
-        let PreparedMap::Verified(prepared) = &self.prepared else {
-            let reason = "pairs under a known pose need an index of the verified method".to_owned();
-            return Err(Error::Request { name: "method", reason });
-        };
         let query = Conditioned::new(query, self.scale);
         let pose = self.map.conditioned_pose(&query, pose);
         let request = Request { noise_m: self.map.noise(noise_m)?, ..request };
         let config = &self.config.verified;
-        let found = crate::verified::pairs_under(prepared, &self.map.cloud, &query.cloud, &pose, &request, config);
+        let (map, fruits) = (&self.map.cloud, &query.cloud);
+        let found = match &self.prepared {
+            PreparedMap::Verified(map_) => crate::verified::pairs_under(map_, map, fruits, &pose, &request, config),
+            PreparedMap::Compact(index) => compact::pairs_under(index, map, fruits, &pose, &request, config),
+            PreparedMap::Paper(_) | PreparedMap::TooFew => {
+                let reason = "pairs under a known pose need an index of the verified method".to_owned();
+                return Err(Error::Request { name: "method", reason });
+            }
+        };
         Ok(self.restored(&query, found))
     }
 }
 
-fn too_many(found: usize) -> Error {
-    Error::TooManyFruits { found, most: crate::verified::MAX_FRUITS }
+fn too_many(found: usize, most: usize) -> Error {
+    Error::TooManyFruits { found, most }
 }
 
 impl Request {
@@ -194,7 +262,7 @@ mod tests {
     fn more_fruits_than_the_verified_method_holds_are_no_wrong_setting() {
         let place = |row: usize| Point3::new((row % 1000) as f64, (row / 1000) as f64, 0.0);
         let many = FruitCloud::from_positions((0..=MAX_FRUITS).map(place).collect());
-        let refused = MapIndex::new(&many, Method::Verified, Scale::Metric, Config::default());
+        let refused = MapIndex::new(&many, Method::Verified, Scale::Free, Config::default());
         assert_eq!(refused.err(), Some(Error::TooManyFruits { found: MAX_FRUITS + 1, most: MAX_FRUITS }));
     }
 

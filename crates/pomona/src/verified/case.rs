@@ -27,14 +27,30 @@ pub(crate) struct VerifiedMap {
     pub(super) landscape: Landscape,
     seeds: SeedIndex,
     scale: Scale,
+    /// Fruits of the map that this is, or is a part of.
+    fruits: usize,
 }
 
 impl VerifiedMap {
     pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
         let landscape = Landscape::new(map);
         let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
-        Self { landscape, seeds, scale }
+        Self { landscape, seeds, scale, fruits: map.len() }
     }
+
+    /// What is cut out of a map of so many fruits and of this spacing, for poses that are proposed.
+    pub(super) fn part(cloud: &FruitCloud, spacing: f64, fruits: usize) -> Self {
+        let landscape = Landscape::part(cloud, spacing);
+        Self { landscape, seeds: SeedIndex::empty(), scale: Scale::Metric, fruits }
+    }
+}
+
+/// What is assumed of two visits, the map of this spacing, until they are compared.
+pub(super) fn model_of(spacing: f64, scale: Scale, request: &Request) -> Model {
+    // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
+    let common = SEED_SIGMA * spacing;
+    let sigma = request.noise_m.unwrap_or(common).max(common);
+    Model { sigma: sigma.min(2.0 * common), detection: DETECTION, scale, vertical: request.up.map(Vertical::new) }
 }
 
 /// An overlap with the region it was found from.
@@ -65,6 +81,8 @@ impl<'a> Finding<'a> {
 pub(super) struct Search<'a> {
     pub(super) query: &'a Landscape,
     pub(super) map: &'a Landscape,
+    /// Fruits of all of the map, where `map` is a part of it.
+    map_fruits: usize,
     pub(super) seeds: &'a SeedIndex,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
@@ -113,20 +131,12 @@ impl<'a> Search<'a> {
         request: &Request,
         config: &VerifiedConfig,
     ) -> Self {
-        let map = &prepared.landscape;
-        // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
-        let common = SEED_SIGMA * map.spacing;
-        let sigma = request.noise_m.unwrap_or(common).max(common);
         Self {
             query,
-            map,
+            map: &prepared.landscape,
+            map_fruits: prepared.fruits,
             seeds: &prepared.seeds,
-            model: Model {
-                sigma: sigma.min(2.0 * common),
-                detection: DETECTION,
-                scale: prepared.scale,
-                vertical: request.up.map(Vertical::new),
-            },
+            model: model_of(prepared.landscape.spacing, prepared.scale, request),
             config: *config,
             noise_m: request.noise_m,
             sizes,
@@ -148,7 +158,7 @@ impl<'a> Search<'a> {
     /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
     fn offered(&self) -> (f64, f64) {
         let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
-        (poses(self.query.len(), self.map.len(), self.model.scale), share)
+        (poses(self.query.len(), self.map_fruits, self.model.scale), share)
     }
 
     pub(super) fn admits(&self, pose: &Placement) -> bool {

@@ -17,12 +17,18 @@ pub(crate) type Code = [f32; NUMBERS];
 /// Codes in the order of a grid's cells.
 #[derive(Debug, Clone)]
 pub(crate) struct CodeGrid {
-    /// Axes by their number of cells; along the last, cells are next to each other.
-    axes: [Axis; NUMBERS],
-    edge: f32,
+    cells: Cells,
     /// Place of each cell's first code, one more than there are cells.
     starts: Vec<u32>,
     blocks: Vec<Block>,
+}
+
+/// The space of codes, cut into cubes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cells {
+    /// Axes by their number of cells; along the last, cells are next to each other.
+    pub(super) axes: [Axis; NUMBERS],
+    pub(super) edge: f32,
 }
 
 /// Codes that are measured at once, number by number; the last block is filled up with codes that are near nothing.
@@ -32,12 +38,12 @@ type Block = [[f32; LANES]; NUMBERS];
 const LANES: usize = 8;
 
 /// One number of the code, cut into cells.
-#[derive(Debug, Clone, Copy, Default)]
-struct Axis {
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Axis {
     /// Which number of the code.
-    number: usize,
-    low: f32,
-    cells: u32,
+    pub(super) number: usize,
+    pub(super) low: f32,
+    pub(super) cells: u32,
 }
 
 impl Axis {
@@ -60,45 +66,60 @@ impl Axis {
 /// Edges by which a value may be thought to lie in a neighbouring cell.
 const ROUNDING: f32 = 1e-3;
 
-impl CodeGrid {
-    /// The grid of the codes that the rows from 0 to `count` have, and the rows in its order.
-    pub(crate) fn new(count: usize, code: impl Fn(usize) -> Code + Sync) -> (Self, Vec<u32>) {
-        let (axes, edge) = cut(count, &code);
-        let inverse_edge = 1.0 / edge;
-        let cell = |row: usize| {
-            let code = code(row);
-            axes.iter().fold(0, |cell, axis| cell * axis.cells + axis.cell(code[axis.number], inverse_edge))
-        };
-        let cells: Vec<u32> = (0..count).into_par_iter().with_min_len(SHARE_OF_CODES).map(cell).collect();
-        let mut starts = vec![0u32; axes.iter().map(|axis| axis.cells as usize).product::<usize>() + 1];
-        for &cell in &cells {
-            starts[cell as usize] += 1;
-        }
-        let mut end = 0;
-        for start in &mut starts {
-            end += *start;
-            *start = end;
-        }
-        let mut order = vec![0u32; count];
-        // From the last to the first, so that a cell keeps the order of its codes.
-        for (row, &cell) in cells.iter().enumerate().rev() {
-            let start = &mut starts[cell as usize];
-            *start -= 1;
-            order[*start as usize] = row as u32;
-        }
-        let block = |rows: &[u32]| {
-            let mut block = [[f32::INFINITY; LANES]; NUMBERS];
-            for (lane, &row) in rows.iter().enumerate() {
-                block.iter_mut().zip(code(row as usize)).for_each(|(numbers, number)| numbers[lane] = number);
+impl Cells {
+    /// Cuts the space of `count` codes into `most` cubes at the most.
+    pub(super) fn cut(count: usize, most: f64, code: &impl Fn(usize) -> Code) -> Self {
+        let sample: Vec<Code> = (0..count).step_by(count.div_ceil(SAMPLE).max(1)).map(code).collect();
+        let extents: [(f32, f32); NUMBERS] = std::array::from_fn(|number| {
+            let mut values: Vec<f32> = sample.iter().map(|code| code[number]).collect();
+            values.sort_unstable_by(f32::total_cmp);
+            let beyond = (values.len() as f64 * BEYOND) as usize;
+            let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
+            (at(beyond), at(values.len().saturating_sub(1 + beyond)))
+        });
+        let widest = extents.iter().fold(f32::MIN_POSITIVE, |widest, (low, high)| widest.max(high - low));
+        let cells = |(low, high): (f32, f32), edge: f32| ((high - low) / edge).ceil().max(1.0) as u32;
+        let mut edge = widest;
+        loop {
+            let finer = 0.9 * edge;
+            let all: f64 = extents.iter().map(|&extent| f64::from(cells(extent, finer))).product();
+            if all > most || finer < FINEST * widest {
+                break;
             }
-            block
-        };
-        let blocks = order.par_chunks(LANES).with_min_len(SHARE_OF_CODES / LANES).map(block).collect();
-        (Self { axes, edge, starts, blocks }, order)
+            edge = finer;
+        }
+        let mut axes: [Axis; NUMBERS] =
+            std::array::from_fn(|number| Axis { number, low: extents[number].0, cells: cells(extents[number], edge) });
+        axes.sort_by_key(|axis| axis.cells);
+        Self { axes, edge }
     }
 
-    /// Calls `visit(place in the grid's order)` for every code within `radius` of `code`.
-    pub(crate) fn within(&self, code: &Code, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(u32)) {
+    /// The cell of a code.
+    #[inline]
+    pub(super) fn of(&self, code: &Code) -> u32 {
+        let inverse_edge = 1.0 / self.edge;
+        self.axes.iter().fold(0, |cell, axis| cell * axis.cells + axis.cell(code[axis.number], inverse_edge))
+    }
+
+    /// Whether the numbers, out of a file, are those of cells.
+    pub(super) fn is_sound(&self) -> bool {
+        let mut numbers = self.axes.map(|axis| axis.number);
+        numbers.sort_unstable();
+        let cells = self.axes.iter().try_fold(1u32, |all, axis| all.checked_mul(axis.cells));
+        numbers.iter().enumerate().all(|(at, &number)| at == number)
+            && self.axes.iter().all(|axis| axis.low.is_finite())
+            && cells.is_some_and(|cells| cells > 0)
+            && self.edge.is_normal()
+            && self.edge > 0.0
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.axes.iter().map(|axis| axis.cells as usize).product()
+    }
+
+    /// Calls `visit` for rows of cells next to each other that hold all codes within `radius` of `code`.
+    pub(super) fn near(&self, code: &Code, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Range<usize>)) {
         let limit = radius * radius;
         let inverse_edge = 1.0 / self.edge;
         runs.clear();
@@ -124,11 +145,53 @@ impl CodeGrid {
         let value = code[along.number];
         for run in runs.iter() {
             let reach = (limit - run.gap).sqrt() + ROUNDING * self.edge;
-            let cells =
+            let [first, last] =
                 [value - reach, value + reach].map(|end| run.first * along.cells + along.cell(end, inverse_edge));
-            let places = self.starts[cells[0] as usize]..self.starts[cells[1] as usize + 1];
-            self.scan(code, limit, places, &mut visit);
+            visit(first as usize..last as usize + 1);
         }
+    }
+}
+
+impl CodeGrid {
+    /// The grid of the codes that the rows from 0 to `count` have, and the rows in its order.
+    pub(crate) fn new(count: usize, code: impl Fn(usize) -> Code + Sync) -> (Self, Vec<u32>) {
+        let cut = Cells::cut(count, CELLS * count as f64, &code);
+        let cell = |row: usize| cut.of(&code(row));
+        let cells: Vec<u32> = (0..count).into_par_iter().with_min_len(SHARE_OF_CODES).map(cell).collect();
+        let mut starts = vec![0u32; cut.len() + 1];
+        for &cell in &cells {
+            starts[cell as usize] += 1;
+        }
+        let mut end = 0;
+        for start in &mut starts {
+            end += *start;
+            *start = end;
+        }
+        let mut order = vec![0u32; count];
+        // From the last to the first, so that a cell keeps the order of its codes.
+        for (row, &cell) in cells.iter().enumerate().rev() {
+            let start = &mut starts[cell as usize];
+            *start -= 1;
+            order[*start as usize] = row as u32;
+        }
+        let block = |rows: &[u32]| {
+            let mut block = [[f32::INFINITY; LANES]; NUMBERS];
+            for (lane, &row) in rows.iter().enumerate() {
+                block.iter_mut().zip(code(row as usize)).for_each(|(numbers, number)| numbers[lane] = number);
+            }
+            block
+        };
+        let blocks = order.par_chunks(LANES).with_min_len(SHARE_OF_CODES / LANES).map(block).collect();
+        (Self { cells: cut, starts, blocks }, order)
+    }
+
+    /// Calls `visit(place in the grid's order)` for every code within `radius` of `code`.
+    pub(crate) fn within(&self, code: &Code, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(u32)) {
+        let limit = radius * radius;
+        self.cells.near(code, radius, runs, |cells| {
+            let places = self.starts[cells.start]..self.starts[cells.end];
+            self.scan(code, limit, places, &mut visit);
+        });
     }
 
     /// Visits those of a row of codes that are within the limit.
@@ -173,33 +236,6 @@ const SAMPLE: usize = 1024;
 
 /// Share of the sample beyond either end of an axis: a few large seeds shall not make the cells of all others coarse.
 const BEYOND: f64 = 0.02;
-
-/// Cuts the axes into cubes.
-fn cut(count: usize, code: &impl Fn(usize) -> Code) -> ([Axis; NUMBERS], f32) {
-    let sample: Vec<Code> = (0..count).step_by(count.div_ceil(SAMPLE).max(1)).map(code).collect();
-    let extents: [(f32, f32); NUMBERS] = std::array::from_fn(|number| {
-        let mut values: Vec<f32> = sample.iter().map(|code| code[number]).collect();
-        values.sort_unstable_by(f32::total_cmp);
-        let beyond = (values.len() as f64 * BEYOND) as usize;
-        let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
-        (at(beyond), at(values.len().saturating_sub(1 + beyond)))
-    });
-    let widest = extents.iter().fold(f32::MIN_POSITIVE, |widest, (low, high)| widest.max(high - low));
-    let cells = |(low, high): (f32, f32), edge: f32| ((high - low) / edge).ceil().max(1.0) as u32;
-    let mut edge = widest;
-    loop {
-        let finer = 0.9 * edge;
-        let all: f64 = extents.iter().map(|&extent| f64::from(cells(extent, finer))).product();
-        if all > CELLS * count as f64 || finer < FINEST * widest {
-            break;
-        }
-        edge = finer;
-    }
-    let mut axes: [Axis; NUMBERS] =
-        std::array::from_fn(|number| Axis { number, low: extents[number].0, cells: cells(extents[number], edge) });
-    axes.sort_by_key(|axis| axis.cells);
-    (axes, edge)
-}
 
 /// Width of a cell over the widest axis, at the least: single precision tells no finer ones apart.
 const FINEST: f32 = 1e-3;

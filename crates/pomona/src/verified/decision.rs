@@ -8,7 +8,7 @@ use super::growth::{grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::placement::Placement;
-use super::search::{Contender, Starts, of_some_fruits, round};
+use super::search::{Contender, Effort, Starts, of_some_fruits, refined, round};
 use super::seeds::{self, Seed};
 use super::size::Diameters;
 use crate::answer::{Match, Verdict};
@@ -17,9 +17,9 @@ use crate::geometry::Similarity;
 use crate::matching::Request;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
-const MIN_FRUITS: usize = 5;
+pub(super) const MIN_FRUITS: usize = 5;
 
-/// Fruits of one cloud at the most: the map's seeds take some 10 kB a fruit.
+/// Fruits of a map at the most whose seeds are all kept: some 7 kB a fruit; and of a query.
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
@@ -65,7 +65,11 @@ pub(crate) fn search(
     let landscape = Landscape::new(query);
     let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
     let search = Search::new(prepared, &landscape, sizes, request, config);
-    let (mut findings, mut stages) = search.run();
+    answer_of(&search, search.run())
+}
+
+/// The answer to what a search has found.
+pub(super) fn answer_of<'a>(search: &Search<'a>, (mut findings, mut stages): (Findings<'a>, Stages)) -> Match {
     if findings.accepted.first().is_some_and(|best| search.fits_better_mirrored(best)) {
         stages.push(("mirrored", 1.0));
         findings.accepted.clear();
@@ -125,6 +129,26 @@ impl<'a> Search<'a> {
         }
         if findings.accepted.is_empty() {
             findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
+        }
+        findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        let stages = self.stages(&log, findings.accepted.len());
+        (findings, stages)
+    }
+
+    /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
+    pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> (Findings<'a>, Stages) {
+        let mut log = Log { effort, ..Log::new(self.threshold()) };
+        let mut findings = Findings::default();
+        let hypotheses = refined(self.query, self.map, contenders, &self.model, Starts::Straight);
+        log.refined = hypotheses.len();
+        for some in hypotheses.chunks(GROWN) {
+            log.grown += self.grow_distinct(some, &mut findings.accepted);
+        }
+        self.sift(&mut findings, &mut log);
+        if findings.accepted.is_empty() {
+            findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
+        } else {
+            self.doubt(&mut findings, &[], &mut log);
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let stages = self.stages(&log, findings.accepted.len());

@@ -52,6 +52,15 @@ pub(crate) struct Landscape {
 
 impl Landscape {
     pub(crate) fn new(cloud: &FruitCloud) -> Self {
+        Self::with_spacing(cloud, spacing_of)
+    }
+
+    /// A part that is cut out of a cloud of this spacing: at its rim fruits have fewer neighbours than they had.
+    pub(super) fn part(cloud: &FruitCloud, spacing: f64) -> Self {
+        Self::with_spacing(cloud, |_, _| spacing)
+    }
+
+    fn with_spacing(cloud: &FruitCloud, spacing: impl Fn(&[Vector3<f64>], &Neighbours) -> f64) -> Self {
         let count = cloud.len().max(1) as f64;
         let mut rows: Vec<u32> = (0..cloud.len() as u32).collect();
         rows.sort_by(|&a, &b| {
@@ -63,18 +72,8 @@ impl Landscape {
         let single: Vec<_> = points.iter().map(single).collect();
         let tree = Tree::new(&single);
         let neighbours = Neighbours::new(&single, &tree);
-        let mut sixth: Vec<f64> = (0..points.len())
-            .filter_map(|row| {
-                let near = neighbours.of(row);
-                near.get(5).or(near.last()).map(|&other| (points[other as usize] - points[row]).norm())
-            })
-            .collect();
-        // Fruits on one spot have no spacing; cells must not become finer than the coordinates.
-        let extent = points.iter().fold(0.0f64, |far, p| far.max(p.amax()));
-        let spacing = median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE);
-        // Six neighbours within the spacing: their density, were fruits spread evenly.
-        let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
-        let floor = 0.1 * typical;
+        let spacing = spacing(&points, &neighbours);
+        let floor = floor_of(spacing);
         let ((kinship, density, crowding, companions), (grid, vicinities, support)) = rayon::join(
             || {
                 (
@@ -188,6 +187,26 @@ impl Nearest<'_> {
             self.row = Some(row);
         }
     }
+}
+
+/// Typical distance to the sixth-nearest fruit.
+pub(super) fn spacing_of(points: &[Vector3<f64>], neighbours: &Neighbours) -> f64 {
+    let mut sixth: Vec<f64> = (0..points.len())
+        .filter_map(|row| {
+            let near = neighbours.of(row);
+            near.get(5).or(near.last()).map(|&other| (points[other as usize] - points[row]).norm())
+        })
+        .collect();
+    // Fruits on one spot have no spacing; cells must not become finer than the coordinates.
+    let extent = points.iter().fold(0.0f64, |far, p| far.max(p.amax()));
+    median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE)
+}
+
+/// Fruits per cubic metre that chance puts anywhere, at the least.
+pub(super) fn floor_of(spacing: f64) -> f64 {
+    // Six neighbours within the spacing: their density, were fruits spread evenly.
+    let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
+    0.1 * typical
 }
 
 pub(crate) fn median(values: &mut [f64]) -> f64 {

@@ -17,6 +17,7 @@ mod beliefs;
 mod case;
 mod chance;
 mod codes;
+pub mod compact;
 mod conclusion;
 mod cut;
 mod decision;

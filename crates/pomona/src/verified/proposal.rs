@@ -3,14 +3,48 @@
 use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
 use super::placement::Placement;
-use super::seeds::{Quad, STARS, frame};
+use super::seeds::{Quad, STARS, frame_of};
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+/// What a proposal asks of a map.
+pub(crate) trait Terrain {
+    /// Where a fruit is.
+    fn place(&self, row: u32) -> Vector3<f64>;
+    /// The nearest fruit within `gate`, with its squared distance.
+    fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)>;
+    /// Fruits per cubic metre that chance puts at a fruit.
+    fn density(&self, row: u32) -> f64;
+    /// Probability that the map would have shown a fruit at `place`.
+    fn support(&self, place: &Vector3<f64>) -> f64;
+}
+
+impl Terrain for Landscape {
+    #[inline]
+    fn place(&self, row: u32) -> Vector3<f64> {
+        self.points[row as usize]
+    }
+
+    #[inline]
+    fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)> {
+        self.nearest(place, gate)
+    }
+
+    #[inline]
+    fn density(&self, row: u32) -> f64 {
+        self.density[row as usize]
+    }
+
+    #[inline]
+    fn support(&self, place: &Vector3<f64>) -> f64 {
+        self.support(place)
+    }
+}
+
 /// A seed of the query with all that its candidates have in common.
-pub(crate) struct Proposer<'a> {
+pub(crate) struct Proposer<'a, M> {
     query: &'a Landscape,
-    map: &'a Landscape,
+    map: &'a M,
     model: &'a Model,
     quad: Quad,
     /// The fruit of the seed nearest to the centroid: its neighbours are those of the seed.
@@ -26,18 +60,18 @@ pub(crate) struct Proposer<'a> {
     inverse_inertia: Matrix3<f64>,
 }
 
-/// The fruits of a seed about their centroid, in the frame of the seed, whose axes are the rows.
-fn in_frame(points: &[Vector3<f64>], quad: &Quad, to_frame: &Matrix3<f64>) -> (Vector3<f64>, [Vector3<f64>; STARS]) {
-    let fruits = quad.map(|row| points[row as usize]);
+/// The fruits of a seed: their centroid, and where they are about it in the frame of the seed, whose axes are the rows.
+fn in_frame(fruits: [Vector3<f64>; STARS], to_frame: &Matrix3<f64>) -> (Vector3<f64>, [Vector3<f64>; STARS]) {
     let centroid = fruits.iter().sum::<Vector3<f64>>() / STARS as f64;
     (centroid, fruits.map(|p| to_frame * (p - centroid)))
 }
 
-impl<'a> Proposer<'a> {
+impl<'a, M: Terrain> Proposer<'a, M> {
     /// `None` where the seed is degenerate.
-    pub(crate) fn new(query: &'a Landscape, map: &'a Landscape, model: &'a Model, quad: Quad) -> Option<Self> {
-        let to_frame = Matrix3::from_columns(&frame(&query.points, &quad)?).transpose();
-        let (centroid, fruits) = in_frame(&query.points, &quad, &to_frame);
+    pub(crate) fn new(query: &'a Landscape, map: &'a M, model: &'a Model, quad: Quad) -> Option<Self> {
+        let fruits = quad.map(|row| query.points[row as usize]);
+        let to_frame = Matrix3::from_columns(&frame_of(&fruits)?).transpose();
+        let (centroid, fruits) = in_frame(fruits, &to_frame);
         let moments = fruits.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose());
         let off_centre = |&i: &usize| fruits[i].norm_squared();
         let middle = (0..STARS).min_by(|a, b| off_centre(a).total_cmp(&off_centre(b))).map(|i| quad[i])?;
@@ -52,8 +86,9 @@ impl<'a> Proposer<'a> {
     /// the rest (see [`Placement`]'s step): the inertia is the same for all candidates.
     #[inline]
     pub(crate) fn fit(&self, target: &Quad) -> Option<(Placement, f64)> {
-        let axes = Matrix3::from_columns(&frame(&self.map.points, target)?);
-        let (centroid, fruits) = in_frame(&self.map.points, target, &axes.transpose());
+        let fruits = target.map(|row| self.map.place(row));
+        let axes = Matrix3::from_columns(&frame_of(&fruits)?);
+        let (centroid, fruits) = in_frame(fruits, &axes.transpose());
         let both = || self.fruits.iter().zip(&fruits);
         let torque = both().fold(Vector3::zeros(), |sum, (here, there)| sum + here.cross(there));
         let turn = Rotation3::new(self.inverse_inertia * torque).into_inner();
@@ -114,7 +149,7 @@ impl<'a> Proposer<'a> {
         let variance = self.model.sigma * self.model.sigma * (1.0 + self.looseness(&p));
         let place = pose.apply(&p);
         match self.map.nearest(&place, GATE * variance.sqrt()) {
-            Some((partner, d2)) => self.model.met(d2, variance, self.map.density[partner as usize]),
+            Some((partner, d2)) => self.model.met(d2, variance, self.map.density(partner)),
             None => self.model.missed(self.map.support(&place)),
         }
     }

@@ -16,7 +16,18 @@ pub(crate) struct Contender {
     pub(crate) log_odds: f64,
     pub(crate) place: Vector3<f64>,
     /// Rows of both seeds: an order for equal evidence.
-    key: (Quad, Quad),
+    pub(super) key: (Quad, Quad),
+}
+
+impl From<&Hypothesis> for Contender {
+    fn from(found: &Hypothesis) -> Self {
+        Self { pose: found.pose, log_odds: found.log_odds, place: found.place, key: Default::default() }
+    }
+}
+
+/// Most evidence first.
+pub(super) fn by_evidence(a: &Contender, b: &Contender) -> std::cmp::Ordering {
+    b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key))
 }
 
 /// What a round cost.
@@ -169,8 +180,8 @@ pub(crate) fn round(
         .collect();
     let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
     let mut candidates: Vec<Contender> = parts.into_iter().flat_map(|part| part.0).collect();
-    candidates.sort_unstable_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key)));
-    let best = distinct(query, map, &mut candidates, keep);
+    candidates.sort_unstable_by(by_evidence);
+    let best = distinct(query, map.spacing, &mut candidates, keep);
     (refined(query, map, &best, model, starts), candidates, effort)
 }
 
@@ -178,8 +189,13 @@ pub(crate) fn round(
 const SHARE_OF_SEEDS: usize = 32;
 
 /// Takes the best `keep` candidates out of those given best first, one of each pose.
-fn distinct(query: &Landscape, map: &Landscape, candidates: &mut Vec<Contender>, keep: usize) -> Vec<Contender> {
-    let (near, same) = (query.spacing, SAME_PLACE * map.spacing);
+pub(super) fn distinct(
+    query: &Landscape,
+    map_spacing: f64,
+    candidates: &mut Vec<Contender>,
+    keep: usize,
+) -> Vec<Contender> {
+    let (near, same) = (query.spacing, SAME_PLACE * map_spacing);
     let mut kept: Vec<Contender> = Vec::new();
     candidates.retain(|candidate| {
         let place = candidate.place;

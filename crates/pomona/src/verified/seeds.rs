@@ -64,9 +64,15 @@ fn oriented(points: &[Vector3<f64>], [a, b, c, d]: Quad) -> Quad {
 /// Unit axes of a seed: along AB, towards C, and their cross product. `None` for near-collinear seeds.
 #[inline]
 pub(crate) fn frame(points: &[Vector3<f64>], quad: &Quad) -> Option<[Vector3<f64>; 3]> {
-    let origin = points[quad[0] as usize];
-    let ab = points[quad[1] as usize] - origin;
-    let ac = points[quad[2] as usize] - origin;
+    frame_of(&quad.map(|row| points[row as usize]))
+}
+
+/// The same of its fruits.
+#[inline]
+pub(super) fn frame_of(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 3]> {
+    let [origin, ..] = *fruits;
+    let ab = fruits[1] - origin;
+    let ac = fruits[2] - origin;
     let length = ab.norm();
     let e1 = ab / length;
     let across = ac - e1 * ac.dot(&e1);
@@ -137,7 +143,7 @@ pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
         .with_min_len(SHARE_OF_ROWS)
-        .flat_map_iter(|row| sets_of(landscape, row as u32))
+        .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), row as u32))
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
         .collect()
@@ -157,9 +163,11 @@ pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
 }
 
 /// The sets of a fruit and three companions that no fruit before it forms too, each in ascending order.
-fn sets_of(landscape: &Landscape, row: u32) -> Vec<[u32; STARS]> {
+///
+/// `neighbours` gives the nearest others of a fruit, nearest first.
+pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], row: u32) -> Vec<[u32; STARS]> {
     let companions = |row: u32| {
-        let near = landscape.neighbours(row as usize);
+        let near = neighbours(row as usize);
         &near[..near.len().min(COMPANIONS)]
     };
     let near = companions(row);
@@ -213,6 +221,11 @@ impl SeedIndex {
         let (codes, order) = CodeGrid::new(seeds.len(), |row| code(&seeds[row]));
         let quads = order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| seeds[row as usize].0).collect();
         Self { quads, codes }
+    }
+
+    /// Of no seeds.
+    pub(super) fn empty() -> Self {
+        Self { quads: Vec::new(), codes: CodeGrid::new(0, |_| Code::default()).0 }
     }
 }
 
@@ -279,7 +292,7 @@ mod tests {
         }
         expected.sort_unstable();
         expected.dedup();
-        let mut found: Vec<_> = (0..60).flat_map(|row| sets_of(&landscape, row)).collect();
+        let mut found: Vec<_> = (0..60).flat_map(|row| sets_of(&|row| landscape.neighbours(row), row)).collect();
         found.sort_unstable();
         assert_eq!(found, expected);
     }

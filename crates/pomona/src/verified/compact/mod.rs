@@ -1,0 +1,92 @@
+//! Maps of a million fruits: fewer seeds, in fewer bytes, that only say where to look.
+//!
+//! The index of a smaller map keeps every seed with a code in single precision, and all that verification asks of every
+//! fruit: 7 kB each. Most of that is never used in a large map. A shape that thousands of places show says nothing about
+//! the place, and only few places are ever looked at closely. So here
+//!
+//! 1. the map keeps the seeds of rare shape, some [`making::KEPT`] a fruit, and which shapes are common (`making`);
+//! 2. a query looks up its own seeds, those of the rarest shape first, with all labelings that noise could have made, until it
+//!    has met as many candidates as a budget allows (`proposing`);
+//! 3. the map around the best candidates is cut out, and what is cut out is verified as a small map is, against what chance
+//!    reaches in the whole one (`judging`).
+//!
+//! The index is a few columns of numbers (`columns`), in memory or in a file that is mapped (`format`). It only proposes:
+//! places, covariances and diameters that decide are the caller's.
+
+mod columns;
+mod format;
+mod ground;
+mod judging;
+mod making;
+mod proposing;
+mod shapes;
+#[cfg(test)]
+mod tests;
+
+pub use columns::Bytes;
+pub(crate) use format::fingerprint;
+pub(crate) use judging::{pairs_under, search};
+
+use super::codes::Cells;
+use columns::Column;
+use nalgebra::Vector3;
+
+/// Fruits of a map at the most: rows have 32 bits, and so have seeds.
+pub(crate) const MOST: usize = 10_000_000;
+
+/// The index of a large map. Fruits are numbered in the order of the buckets of `ground`.
+#[derive(Debug)]
+pub(crate) struct CompactMap {
+    facts: Facts,
+    /// The caller's row of each fruit.
+    rows: Column<u32>,
+    /// About the middle of the map, metres.
+    points: Column<[f32; 3]>,
+    /// Fruits per cubic metre that chance puts at each fruit.
+    density: Column<f32>,
+    /// Number of each bucket's first fruit, one more than there are buckets.
+    buckets: Column<u32>,
+    /// The nearest others of each fruit, [`Facts::each`] of them.
+    companions: Column<u32>,
+    /// Number of each cell's first seed, one more than there are cells of shapes.
+    starts: Column<u32>,
+    /// A bit for each cell of shapes: whether it is so common that its seeds are not kept.
+    common: Column<u32>,
+    /// Shapes in blocks of [`shapes::LANES`], number by number.
+    codes: Column<u8>,
+    /// The fruit that each seed belongs to.
+    anchors: Column<u32>,
+    /// Four bits for each fruit of a seed: 0 is the anchor, else which of its companions.
+    labels: Column<u16>,
+}
+
+/// The numbers of an index that are no column.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Facts {
+    /// Fruits of the caller's cloud, and a sum over their places.
+    pub(crate) given: usize,
+    pub(crate) fingerprint: u64,
+    /// The origin in the caller's frame, metres.
+    pub(crate) middle: Vector3<f64>,
+    /// Spacing of the conditioned cloud, metres.
+    pub(crate) sampled_spacing: f64,
+    /// Median distance to the sixth-nearest fruit, metres.
+    pub(crate) spacing: f64,
+    /// Metres of one step of a stored shape.
+    step: f64,
+    /// Companions of each fruit.
+    each: usize,
+    /// The space of shapes, in steps.
+    cells: Cells,
+}
+
+impl CompactMap {
+    pub(crate) fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    /// The caller's row of each fruit.
+    pub(crate) fn rows(&self) -> &[u32] {
+        self.rows.get()
+    }
+}
