@@ -1,60 +1,89 @@
 """How often unrelated clouds are answered, beside the rate that was asked for.
 
-For every planting without a common fruit, frames among them, and for some `verified.false_alarm_rate`: the pairs that
-are `Found`. Writes false_alarms.csv and false_alarms.md. A run replaces the cells that it ran and keeps the others.
+Pairs without a common fruit of every planting, and frames among them, at some `verified.false_alarm_rate`: how many
+are `Found`, how many `Ambiguous`. Writes false_alarms.csv and false_alarms.md after every few pairs. A run goes on
+where the last one stopped; `--anew` forgets what earlier builds did in the cells that it runs.
 """
 
 import argparse
 import sys
+import time
 
 import pomona
 from benchmarks.results import markdown, read_rows, write_rows, write_text
 from pomona.synth.clouds import CELLS, scene_pair
 
 UNRELATED = [name for name, cell in CELLS.items() if cell.shared == 0]
-RATES = (3e-4, 0.01, 0.05, 0.2, 0.5)
-SEEDS = 50
+NOMINAL = 3e-4
+PAIRS = 300
+MORE = {"noov": 1000}
+"""Pairs of a cell by default, where they are not `PAIRS`."""
+AT_ONCE = 25
+"""Pairs after which the tables are written."""
 INTRODUCTION = """# False alarms
 
-Pairs of clouds without a common fruit that were `Found`, of the pairs drawn (`pomona synth clouds CELL`), at each
-`verified.false_alarm_rate`.
+Pairs of clouds without a common fruit (`pomona synth clouds CELL`) at a `verified.false_alarm_rate`: how many were
+drawn, how many were `Found`, and how many were `Ambiguous`.
 
 """
 
+Key = tuple[str, float]
+
 
 def main(arguments: list[str]) -> None:
+    options = _options(arguments)
+    asked = [(cell, rate) for rate in options.rates for cell in options.cells]
+    counts = read_counts()
+    for key in asked if options.anew else ():
+        counts.pop(key, None)
+    for cell, rate in asked:
+        pairs = options.pairs or MORE.get(cell, PAIRS)
+        while (first := counts.get((cell, rate), {}).get("pairs", 0)) < pairs:
+            if time.process_time() > options.cpu_s:
+                sys.stderr.write(f"false_alarms: {options.cpu_s:g} s are spent, the next run goes on from here\n")
+                return
+            seeds = range(first, min(first + AT_ONCE, pairs))
+            counts[cell, rate] = counted(cell, rate, seeds, counts.get((cell, rate)))
+            write(counts)
+        sys.stderr.write(f"false_alarms: {cell} at {rate:g} done\n")
+
+
+def _options(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks false_alarms", description=__doc__)
     parser.add_argument("--cells", nargs="+", choices=UNRELATED, default=UNRELATED, metavar="CELL")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="pairs a cell")
-    options = parser.parse_args(arguments)
-    rows = []
-    for cell in options.cells:
-        rows.extend({"cell": cell, "rate": rate, "pairs": options.seeds, "found": 0} for rate in RATES)
-        for seed in range(options.seeds):
-            for row in rows[-len(RATES) :]:
-                row["found"] += found(cell, seed, row["rate"])
-        sys.stderr.write(f"false_alarms: {cell} done\n")
-    kept = [row for row in read_rows("false_alarms.csv") if row["cell"] not in options.cells]
-    merged = sorted([*kept, *rows], key=lambda row: UNRELATED.index(str(row["cell"])))
-    write_rows("false_alarms.csv", merged)
-    write_text("false_alarms.md", report(read_rows("false_alarms.csv")))
+    parser.add_argument("--rates", nargs="+", type=float, default=[NOMINAL], metavar="RATE")
+    parser.add_argument("--pairs", type=int, help=f"of a cell; default {PAIRS}, of noov {MORE['noov']}")
+    parser.add_argument("--cpu-s", type=float, default=float("inf"), help="CPU seconds after which it stops")
+    parser.add_argument("--anew", action="store_true", help="count from the first pair")
+    return parser.parse_args(arguments)
 
 
-def found(cell: str, seed: int, rate: float) -> bool:
+def counted(cell: str, rate: float, seeds: range, before: dict[str, int] | None) -> dict[str, int]:
+    """Add the verdicts of more pairs to those counted before."""
+    counts = dict(before or {"pairs": 0, "found": 0, "ambiguous": 0})
+    for seed in seeds:
+        verdict = str(status(cell, seed, rate))
+        counts["pairs"] += 1
+        counts["found"] += verdict == "Found"
+        counts["ambiguous"] += verdict == "Ambiguous"
+    return counts
+
+
+def status(cell: str, seed: int, rate: float) -> pomona.Verdict:
     pair = scene_pair(cell, seed)
     config = {"verified": {"false_alarm_rate": rate}}
-    match = pomona.match(pair.query, pair.map, scale=pair.cell.scale, up=pair.up, config=config, threads=1)
-    return match.status == "Found"
+    return pomona.match(pair.query, pair.map, scale=pair.cell.scale, up=pair.up, config=config, threads=1).status
 
 
-def report(rows: list[dict[str, str]]) -> str:
-    cells = dict.fromkeys(row["cell"] for row in rows)
-    table = [
-        (
-            cell,
-            next(row["pairs"] for row in rows if row["cell"] == cell),
-            *(row["found"] for row in rows if row["cell"] == cell),
-        )
-        for cell in cells
-    ]
-    return INTRODUCTION + markdown(("cell", "pairs", *(f"{rate:g}" for rate in RATES)), table)
+def read_counts() -> dict[Key, dict[str, int]]:
+    return {
+        (row["cell"], float(row["rate"])): {name: int(row[name]) for name in ("pairs", "found", "ambiguous")}
+        for row in read_rows("false_alarms.csv")
+    }
+
+
+def write(counts: dict[Key, dict[str, int]]) -> None:
+    order = sorted(counts, key=lambda key: (key[1], UNRELATED.index(key[0])))
+    write_rows("false_alarms.csv", [{"cell": key[0], "rate": key[1], **counts[key]} for key in order])
+    table = [(cell, f"{rate:g}", *map(str, counts[cell, rate].values())) for cell, rate in order]
+    write_text("false_alarms.md", INTRODUCTION + markdown(("cell", "rate", "pairs", "found", "ambiguous"), table))

@@ -4,7 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from benchmarks import cells, cells_report, kinect, results, season
+from benchmarks import cells, cells_report, false_alarms, kinect, results, season
 from benchmarks.disturb import dropped, moved, with_false_points
 from benchmarks.oracle import GATE_CHI2, assign_in_gate, gated_pairs, oracle_pairs
 from benchmarks.pose import pose_error
@@ -147,3 +147,32 @@ def test_season_lifts_apples_to_where_boxes_of_their_size_lie(tmp_path) -> None:
 
 def test_markdown_tables_line_up() -> None:
     assert results.markdown(("a", "P"), [("base", "0.9")]) == "| a    |   P |\n| :--- | --: |\n| base | 0.9 |\n"
+
+
+def test_false_alarms_go_on_where_the_last_run_stopped(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+
+    def answered(cell: str, seed: int, rate: float) -> str:
+        drawn.append((cell, seed, rate))
+        return "Ambiguous" if seed == 0 else "NoMatch"
+
+    monkeypatch.setattr(results, "FOLDER", tmp_path)
+    monkeypatch.setattr(false_alarms, "status", answered)
+    monkeypatch.setattr(false_alarms, "AT_ONCE", 2)
+    false_alarms.main(["--cells", "noov", "--cpu-s", "0"])
+    assert drawn == []
+    false_alarms.main(["--cells", "noov", "vine-noov", "--pairs", "3"])
+    false_alarms.main(["--cells", "noov", "--pairs", "5"])
+    assert sorted(drawn) == [("noov", seed, 3e-4) for seed in range(5)] + [
+        ("vine-noov", seed, 3e-4) for seed in range(3)
+    ]
+    assert results.read_rows("false_alarms.csv")[0] == {
+        "cell": "noov",
+        "rate": "0.0003",
+        "pairs": "5",
+        "found": "0",
+        "ambiguous": "1",
+    }
+    false_alarms.main(["--cells", "vine-noov", "--pairs", "1", "--anew"])
+    assert drawn[-1] == ("vine-noov", 0, 3e-4)
+    assert "vine-noov" in (tmp_path / "false_alarms.md").read_text(encoding="utf-8")

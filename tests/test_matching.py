@@ -65,6 +65,31 @@ def test_a_frame_that_stands_out_of_all_other_poses_is_found(seed: int) -> None:
     assert stages["threshold_nats"] < stages["best_nats"] < 42.0
 
 
+def dozen(seed: int) -> list[FruitCloud]:
+    """Two visits to twelve fruits of a flat tree: ten of them each and a false one, 2 cm of noise."""
+    random = np.random.default_rng(seed)
+    low, high = (-0.5, -0.4, 0.0), (0.5, 0.4, 0.12)
+    tree = random.uniform(low, high, (12, 3))
+    visits = []
+    for side, turn in (("q", TURN), ("m", np.eye(3))):
+        kept = random.permutation(12)[:10]
+        fruits = np.r_[tree[kept] + random.normal(0.0, 0.02, (10, 3)), random.uniform(low, high, (1, 3))]
+        visits.append(FruitCloud(fruits @ turn.T, ids=(*map(str, kept), side)))
+    return visits
+
+
+def test_a_dozen_fruits_are_found_as_often_as_they_can_be_told() -> None:
+    """Few fruits lie flat by chance; so do the best wrong poses, which share fruits with the right one."""
+    answered = 0
+    for query, map in (dozen(seed) for seed in range(40)):
+        match = pomona.match(query, map)
+        if match.status == "Found":
+            answered += 1
+            right = sum(query.ids[i] == map.ids[j] for i, j in match.pairs)
+            assert 2 * right > len(match.pairs)
+    assert answered >= 17
+
+
 def test_the_false_alarm_rate_is_the_share_of_unrelated_frames_that_are_answered() -> None:
     pairs = [scene_pair("frame25-noov", seed) for seed in range(24)]
 

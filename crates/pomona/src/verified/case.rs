@@ -18,7 +18,7 @@ use crate::matching::Request;
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
 pub(crate) const SEED_SIGMA: f64 = 0.075;
 
-/// Share of the evidence needed that must be left when every fruit is predicted without its own partner.
+/// Share of the evidence needed that a pose must have both as it grew and once it is settled.
 pub(super) const SETTLED: f64 = 0.8;
 
 /// A map made ready for many queries.
@@ -165,17 +165,17 @@ impl<'a> Search<'a> {
         self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
-    /// Whether a finding has enough evidence, as it grew and once it is settled.
-    ///
-    /// `kept` is the share of the evidence needed that must be left when every fruit is predicted without its own partner.
+    /// Whether a finding has enough evidence: as it grew or once it is settled, every fruit predicted without its own partner,
+    /// and the other of the two at least `kept` of it.
     pub(super) fn holds(&self, finding: &mut Finding, kept: f64, log: &mut Log) -> bool {
-        if finding.overlap.log_odds <= log.threshold {
+        let (grown, least) = (finding.overlap.log_odds, kept * log.threshold);
+        if grown <= least {
             return false;
         }
-        let evidence = self.settle(finding);
-        log.settled = log.settled.max(evidence);
-        log.settled_threshold = kept * log.threshold;
-        evidence > log.settled_threshold
+        let settled = self.settle(finding);
+        log.settled = log.settled.max(settled);
+        log.settled_threshold = least;
+        settled > least && grown.max(settled) > log.threshold
     }
 
     /// Looks closely at a finding, over all that it reaches; returns its evidence.

@@ -19,6 +19,9 @@ const SAME: f64 = 0.4;
 /// No other pose may have this share of the best evidence.
 const RIVAL: f64 = 0.5;
 
+/// A pose that puts more than this share of the overlap elsewhere is another.
+const MOST: f64 = 0.5;
+
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
 const BENT: f64 = 0.05;
 
@@ -150,18 +153,26 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether another optimum has nearly as much evidence, and puts most fruits of the overlap elsewhere.
+    /// Whether another optimum has nearly as much evidence elsewhere.
+    ///
+    /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere.
     pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
-        other.log_odds > self.pattern().max(RIVAL * best.log_odds) && self.apart(best, other)
+        let elsewhere = self.elsewhere(best, other);
+        elsewhere > MOST && elsewhere * other.log_odds > self.pattern().max(RIVAL * best.log_odds)
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.
     pub(super) fn apart(&self, best: &Overlap, other: &Overlap) -> bool {
+        self.elsewhere(best, other) > MOST
+    }
+
+    /// Share of the fruits of the overlap that another optimum puts elsewhere.
+    fn elsewhere(&self, best: &Overlap, other: &Overlap) -> f64 {
         let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
             at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
         };
         let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
-        2 * apart.iter().filter(|&&apart| apart).count() > apart.len()
+        apart.iter().filter(|&&apart| apart).count() as f64 / apart.len().max(1) as f64
     }
 }
