@@ -10,7 +10,7 @@ from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.session import Session
 from pomona.orchard.settling import SettledPart, Settlement, settle, settlement_of
-from pomona.orchard.tree_tables import follow_trees
+from pomona.orchard.tree_tables import follow_trees, trees_of
 from pomona.orchard.writing import (
     Placement,
     insert_crops,
@@ -62,11 +62,13 @@ def join(connection: sqlite3.Connection, together: Evidence, newcomers: Mapping[
     for part in parts:
         _insert_matches(connection, part.evidence, added)
     settlement = replace(settlement, parts=parts)
+    trees_before = trees_of(connection, settlement.before)
     settle(connection, settlement)
     own = [part.fruit_ids_of(number) for part, number in map(settlement.part_with, sorted(added))]
     write_growth(connection, (one for ids in own for one in ids.tolist()), settlement.changes)
-    follow_trees(connection)
-    update_layers(connection)
+    touched = settlement.before | settlement.after
+    follow_trees(connection, touched, trees_before)
+    update_layers(connection, touched)
     return settlement
 
 
