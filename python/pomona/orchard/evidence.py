@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
@@ -72,6 +72,21 @@ class Evidence:
             first, second = sorted((own, other + (other >= own)))
             pairs.append(replace(match, first=first, second=second))
         return Evidence(visits, pairs)
+
+    @classmethod
+    def of_parts(cls, parts: Sequence[Evidence], across: Iterable[tuple[int, int, VisitPair]]) -> Evidence:
+        """Put parts together; `across` are matches between them, each after the sessions that it is of."""
+        visits = sorted((visit for part in parts for visit in part.visits), key=lambda one: one.seen.key)
+        numbers = {visit.session_id: number for number, visit in enumerate(visits)}
+        inside = [
+            (part.visits[pair.first].session_id, part.visits[pair.second].session_id, pair)
+            for part in parts
+            for pair in part.pairs
+        ]
+        pairs = [
+            replace(pair, first=numbers[first], second=numbers[second]) for first, second, pair in (*inside, *across)
+        ]
+        return cls(visits, pairs)
 
     def without_session(self, session_id: int) -> Evidence:
         """Return it with one visit less."""
