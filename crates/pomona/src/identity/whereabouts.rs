@@ -44,13 +44,8 @@ const GATE: f64 = 0.3;
 const REACH: f64 = 3.0;
 const GROWS: f64 = 1.6;
 
-/// Poses that are grown of those asked at once.
+/// Poses that are grown.
 const GROWN: usize = 32;
-
-/// Anchors that are asked before their poses are grown, and the share of the visit that must meet the map under one of
-/// these to ask no others: chance meets one in six, so a place that half of the visit agrees with is the place.
-const AT_ONCE: usize = 128;
-const ENOUGH: f64 = 0.5;
 
 /// Anchors that are worth a thread of their own.
 const SHARE_OF_ANCHORS: usize = 32;
@@ -71,12 +66,33 @@ pub struct Whereabouts {
 pub fn whereabouts(map: &FruitCloud, visit: &FruitCloud) -> Result<Option<Whereabouts>> {
     map.validate()?;
     visit.validate()?;
-    let [map, visit] = [map, visit].map(|cloud| Conditioned::new(cloud, Scale::Metric));
-    if [&map, &visit].iter().any(|side| side.cloud.len() <= COMPANIONS) {
+    let visit = Conditioned::new(visit, Scale::Metric);
+    if [map, &visit.cloud].iter().any(|cloud| cloud.len() <= COMPANIONS) {
         return Ok(None);
     }
-    let best = Search::new(&map.cloud, &visit.cloud).best();
-    Ok(best.map(|found| Whereabouts { map_from_visit: map.restored_pose(&visit, &found.map_from_visit), ..found }))
+    // A map is large and asks little of its fruits: what is there twice or lies astray only makes guesses that fail.
+    let middle = median_place(&map.positions);
+    let places: Vec<_> = map.positions.iter().map(|place| place - middle).collect();
+    let search = Search::new(&places, &visit.cloud);
+    let mut guesses = search.guesses();
+    guesses.sort_by(|a, b| b.n_met.cmp(&a.n_met).then(a.anchor.cmp(&b.anchor)));
+    guesses.truncate(GROWN);
+    let grown = guesses.par_iter().filter_map(|guess| search.grown(guess)).collect::<Vec<_>>();
+    // The first of equal ones, whatever the threads.
+    let best = grown.into_iter().reduce(|best, next| if next.n_met > best.n_met { next } else { best });
+    let outward = Similarity { translation: middle, ..Similarity::identity() };
+    Ok(best.map(|found| Whereabouts {
+        map_from_visit: outward.compose(&found.map_from_visit).compose(&visit.outward().inverse()),
+        ..found
+    }))
+}
+
+/// The median of each coordinate, which no stray moves: single precision is for what is near it.
+fn median_place(places: &[Point3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let mut along: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+        *along.select_nth_unstable_by(places.len() / 2, f64::total_cmp).1
+    })
 }
 
 /// A pose from one seed.
@@ -96,45 +112,21 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(map: &'a FruitCloud, visit: &FruitCloud) -> Self {
-        let points: Vec<_> = map.positions.iter().map(|point| single(&point.coords)).collect();
+    fn new(map: &'a [Point3<f64>], visit: &FruitCloud) -> Self {
+        let points: Vec<_> = map.iter().map(|point| single(&point.coords)).collect();
         let visit = Landscape::new(visit);
         let sigma = SEED_SIGMA * visit.spacing;
         let seeds = SeedIndex::new(&visit, Scale::Metric, 6.0 * sigma);
-        Self { map: &map.positions, tree: Tree::new(&points), visit, seeds, sigma }
+        Self { map, tree: Tree::new(&points), visit, seeds, sigma }
     }
 
-    /// The pose that most of the map meets the visit under, of the first anchors that tell one.
-    fn best(&self) -> Option<Whereabouts> {
-        let mut best: Option<Whereabouts> = None;
-        for anchors in self.anchors().chunks(AT_ONCE) {
-            let grown: Vec<_> = self.guesses(anchors).par_iter().filter_map(|guess| self.grown(guess)).collect();
-            // The first of equal ones, whatever the threads.
-            best = best.into_iter().chain(grown).reduce(|best, next| if next.n_met > best.n_met { next } else { best });
-            if best.as_ref().is_some_and(|found| found.n_met as f64 >= ENOUGH * self.visit.len() as f64) {
-                break;
-            }
-        }
-        best
-    }
-
-    /// Fruits all over the map, shuffled: any few of them are spread as all are.
-    fn anchors(&self) -> Vec<u32> {
+    /// Poses of the seeds of anchors all over the map.
+    fn guesses(&self) -> Vec<Guess> {
         let wanted = (ANCHORS_EACH * self.map.len() / self.visit.len()).clamp(ANCHORS_EACH, ANCHORS);
         let stride = self.map.len().div_ceil(wanted) as u64;
-        let mut anchors: Vec<u32> =
+        let anchors: Vec<u32> =
             (0..self.map.len() as u32).filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride)).collect();
-        anchors.sort_by_key(|&row| shuffled(u64::from(row)));
-        anchors
-    }
-
-    /// The poses of the seeds of anchors that agree best with what is around them.
-    fn guesses(&self, anchors: &[u32]) -> Vec<Guess> {
-        let at_anchors = anchors.par_iter().with_min_len(SHARE_OF_ANCHORS);
-        let mut guesses: Vec<_> = at_anchors.flat_map_iter(|&anchor| self.guesses_at(anchor)).collect();
-        guesses.sort_by(|a, b| b.n_met.cmp(&a.n_met).then(a.anchor.cmp(&b.anchor)));
-        guesses.truncate(GROWN);
-        guesses
+        anchors.par_iter().with_min_len(SHARE_OF_ANCHORS).flat_map_iter(|&anchor| self.guesses_at(anchor)).collect()
     }
 
     fn guesses_at(&self, anchor: u32) -> Vec<Guess> {
