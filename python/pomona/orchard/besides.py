@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pomona.earth import Anchor
 from pomona.orchard.earth_layers import stored_anchor
@@ -50,7 +51,7 @@ class Besides:
     tree_of: Mapping[int, tuple[int, float]]
     anchor: Anchor | None
     fit: tuple[str, int, float] | None
-    control_points: Sequence[tuple[object, ...]]
+    control_points: Sequence[tuple[Any, ...]]
     history: Sequence[tuple[str, str, Change]]
 
 
