@@ -27,7 +27,7 @@ def view(
 ) -> None:
     """Show a map in the browser: the row in 3D, every fruit and its growth, what to decide. Ctrl-C ends it.
 
-    Only this machine can look, and nothing is written; with --host others who have the address that is printed, with its
+    Only this machine can look, and nothing is written; with --host all who have the address that is printed, with its
     token. When a visit is added the page shows it after a reload.
     """
     from pomona.cli.page_wishes import page_wishes
