@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
-from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
+from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude, frames_of_visits
+from pomona.orchard.pairs_in_place import pairs_in_place, unmatched
 from pomona.orchard.parts import components
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import cameras_in_map
@@ -127,7 +128,11 @@ class Evidence:
         known = np.array([visit.map_from_session for visit in self.visits])
         newest_last = [(visit.session_id < 1, abs(visit.session_id)) for visit in self.visits]
         keepers = sorted(range(len(self.visits)), key=newest_last.__getitem__)
-        return conclude([visit.seen for visit in self.visits], self.pairs, known, keepers)
+        seen = [visit.seen for visit in self.visits]
+        pairs = list(self.pairs)
+        if asked := unmatched(seen, pairs):
+            pairs += pairs_in_place(seen, asked, frames_of_visits(seen, self.pairs, known, keepers))
+        return conclude(seen, pairs, known, keepers)
 
 
 def read_evidence(connection: sqlite3.Connection, session_ids: Sequence[int]) -> Evidence:
