@@ -11,6 +11,7 @@ from pomona.cloud import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.measured import MeasuredFruits
 from pomona.synth.living import LivingRow, grow
+from pomona.synth.living.fruit_curves import ONSET_DAYS
 from pomona.synth.living.fruit_lives import ALIVE
 from pomona.synth.seasons import SeasonPlan
 
@@ -18,6 +19,28 @@ MEASURED_SHARE = 0.6
 SCALE_SIGMAS = (0.02, 0.03)
 OWN_CHANCE = 0.5
 """Of being seen on a visit, against what leaves do to a fruit on all of them."""
+
+
+YEARS = (0.15, 10.0)
+"""How much years differ: spread of the logarithm of the rate of growth, and days by which its onset comes late."""
+
+
+@dataclass(frozen=True)
+class Year:
+    """A year's weather, as a clock by which fruits grow: faster than usual, and later by so many days."""
+
+    faster: float = 1.0
+    late_days: float = 0.0
+
+    @classmethod
+    def draw(cls, seed: int) -> "Year":
+        """Return the year of a seed."""
+        rng = np.random.Generator(np.random.PCG64([seed, 61]))
+        return cls(float(np.exp(YEARS[0] * rng.normal())), float(YEARS[1] * rng.normal()))
+
+    def clock(self, days: float) -> float:
+        """Days after bloom of the usual year on which fruits are as large."""
+        return ONSET_DAYS + self.faster * (days - ONSET_DAYS - self.late_days)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +53,11 @@ class DrawnSizes:
     true_rates: NDArray[np.float64]
 
 
-def draw_sizes(plan: SeasonPlan, seed: int) -> DrawnSizes:
+def draw_sizes(plan: SeasonPlan, seed: int, year: Year = Year()) -> DrawnSizes:
     row, rng = grow(plan.design, seed), np.random.Generator(np.random.PCG64([seed, 60]))
     days = np.array([row.days_after_bloom(day) for day in plan.days])
     measured = days[days <= days[0] + MEASURED_SHARE * (days[-1] - days[0])]
-    sizes_mm = np.stack([row.crop.curves.diameters_m(day) for day in measured], axis=1) * 1000.0
+    sizes_mm = np.stack([row.crop.curves.diameters_m(year.clock(day)) for day in measured], axis=1) * 1000.0
     alive = np.stack([row.crop.lives.states(day) == ALIVE for day in measured], axis=1)
     shown = rng.normal(size=(len(row.crop), 1)) + OWN_CHANCE * rng.normal(size=sizes_mm.shape)
     seen = alive & (shown > np.quantile(shown, plan.hidden_share))
@@ -44,7 +67,7 @@ def draw_sizes(plan: SeasonPlan, seed: int) -> DrawnSizes:
     scales = np.exp(rng.uniform(*SCALE_SIGMAS) * rng.normal(size=len(measured)))
     noisy_mm = np.maximum(sizes_mm * scales + rng.normal(0.0, 1000.0 * plan.size_noise_m, sizes_mm.shape), 5.0)
     trees = np.concatenate([row.crop.trees, row.crop.trees[rows[false]]])
-    true_mm, rates = truth(row, measured[-1], days[-1])
+    true_mm, rates = truth(row, measured[-1], days[-1], year)
     nothing = np.full(len(false), np.nan)
     return in_order(plan, trees, noisy_mm, np.append(true_mm, nothing), np.append(rates, nothing))
 
@@ -56,11 +79,11 @@ def single(sizes_mm: NDArray[np.float64], rows: NDArray[np.int64], columns: NDAr
     return found
 
 
-def truth(row: LivingRow, now: float, harvest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def truth(row: LivingRow, now: float, harvest: float, year: Year) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sizes at the harvest of fruits that hang then, mm, and rates now of those that hang now."""
     curves, lives = row.crop.curves, row.crop.lives
-    sizes_mm = np.where(lives.states(harvest) == ALIVE, 1000.0 * curves.diameters_m(harvest), np.nan)
-    rates = 1000.0 * (curves.diameters_m(now + 0.5) - curves.diameters_m(now - 0.5))
+    sizes_mm = np.where(lives.states(harvest) == ALIVE, 1000.0 * curves.diameters_m(year.clock(harvest)), np.nan)
+    rates = 1000.0 * (curves.diameters_m(year.clock(now + 0.5)) - curves.diameters_m(year.clock(now - 0.5)))
     return sizes_mm, np.where(lives.states(now) == ALIVE, rates, np.nan)
 
 

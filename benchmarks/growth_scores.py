@@ -32,7 +32,7 @@ def covers(found: SeasonGrowth, number: int, true_mm: NDArray[np.float64]) -> bo
     return bool(low <= true_mm[found.blocks[number].members].mean() <= high)
 
 
-def line(name: str, rows: list[dict[str, object]]) -> tuple[str, ...]:
+def line(rows: list[dict[str, object]]) -> tuple[str, ...]:
     def column(key: str) -> NDArray[np.float64]:
         return np.array([row[key] for row in rows], dtype=float)
 
@@ -43,7 +43,6 @@ def line(name: str, rows: list[dict[str, object]]) -> tuple[str, ...]:
         column("trees_covered").sum() / column("n_trees").sum(),
     )
     return (
-        name,
         str(len(rows)),
         f"{np.median(column('rate_error_mm_per_day')):.3f}",
         f"{biases.mean():+.2f}",

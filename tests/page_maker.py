@@ -22,7 +22,7 @@ def served(orchard: Path, *flags: str) -> Iterator[str]:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
-            assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\n", line), line
+            assert re.fullmatch(r"http://[\d.]+:\d+/(\?token=[\w-]+)?\n", line), line
             yield line.strip()
         finally:
             process.terminate()

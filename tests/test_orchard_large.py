@@ -1,14 +1,29 @@
 """What a large map costs: a session is looked for where it seems to lie, and only its part is read and written."""
 
+import json
+import sqlite3
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pomona import FruitCloud
-from pomona.orchard import OrchardMap, Session, add_session, joining, problems, recognising
+from pomona import FruitCloud, geopackage
+from pomona.orchard import (
+    OrchardMap,
+    Session,
+    add_session,
+    earth_layers,
+    joining,
+    problems,
+    recognising,
+    remove_session,
+    tree_tables,
+)
 from pomona.orchard.evidence import Evidence
+from pomona.orchard.writing import update_layers
+from pomona.store import rows
+from pomona.store.opening import writing
 from pomona.synth.clouds import scene_pair
 
 N_ROWS = 4
@@ -76,6 +91,58 @@ def test_only_the_part_of_the_session_is_read_and_written(orchard: Path, monkeyp
     still = [label for label in before.labels if str(label).startswith(("0 ", "2 "))]
     told = dict(zip(before.labels, before.fruit_ids.tolist(), strict=True))
     assert {label: now[label] for label in still} == {label: told[label] for label in still}
+
+
+def with_trees_on_earth(path: Path) -> None:
+    """Make each row one tree, and say where on Earth the map lies."""
+    with writing(path, "map") as (connection, _):
+        for session_id in range(1, N_ROWS + 1):
+            where = geopackage.points([[float(session_id), 0.0, 0.0]])[0]
+            connection.execute("INSERT INTO rows (id, name, number) VALUES (?, ?, ?)", (session_id,) * 3)
+            connection.execute("INSERT INTO trees (id, geom, row_id) VALUES (?, ?, ?)", (session_id, where, session_id))
+        connection.execute("UPDATE fruits SET tree_id = last_session_id, tree_probability = 1.0")
+        connection.execute(
+            """INSERT INTO georeference (enu_from_map, longitude_deg, latitude_deg, height_m, source, n_points, rms_m)
+            VALUES (?, 9.0, 47.0, 400.0, 'points', 3, 0.01)""",
+            (json.dumps(np.eye(4).tolist()),),
+        )
+        update_layers(connection)
+
+
+def test_trees_and_places_on_earth_follow_the_part_alone(orchard: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_trees_on_earth(orchard)
+    n_before = len(OrchardMap(orchard).fruits())
+    read: list[int] = []
+    told = rows.columns_of
+
+    def columns_of(connection: sqlite3.Connection, table: str, *asked: object) -> list[list[object]]:
+        columns = told(connection, table, *asked)  # type: ignore[arg-type]
+        read.append(len(columns[0]) if table == "fruits" else 0)
+        return columns
+
+    for room in (earth_layers, tree_tables):
+        monkeypatch.setattr(room, "columns_of", columns_of)
+    monkeypatch.setattr(recognising, "LARGE", 100)
+    assert add_session(orchard, visit(2, "2024-07-15")).n_matched > 100
+    assert add_session(orchard, visit(1, "2024-07-16")).n_matched > 100
+    assert remove_session(orchard, "1 2024-07-16") is not None
+    monkeypatch.undo()
+    n_fruits = len(OrchardMap(orchard).fruits())
+    assert 0 < max(read) < 0.5 * n_fruits
+    with writing(orchard, "map") as (connection, _):
+        alone = connection.execute("SELECT count(*) FROM fruits WHERE tree_id IS NULL").fetchone()
+        wrong = connection.execute(
+            "SELECT id FROM trees WHERE n_fruits IS NOT (SELECT count(*) FROM fruits WHERE tree_id = trees.id)"
+        ).fetchall()
+        before = connection.total_changes
+        earth_layers.write_earth_layers(connection)
+        assert connection.total_changes == before
+    # Fruits that came hang on the trees of those around them.
+    assert n_fruits > n_before + 20
+    assert alone == (0,)
+    # The rows at the ends were never counted.
+    assert wrong == [(1,), (4,)]
+    assert problems(orchard) == []
 
 
 def test_one_fruit_s_series_and_one_moment(orchard: Path) -> None:

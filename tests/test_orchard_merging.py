@@ -1,5 +1,6 @@
 """Two maps into one: as if all sessions had been added to the first; no input is ever lost."""
 
+import json
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pomona import FruitCloud, PomonaError
+from pomona import FruitCloud, PomonaError, geopackage
 from pomona.cli import main
 from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, problems
+from pomona.orchard.writing import update_layers
+from pomona.store.opening import snapshot, writing
 from pomona.synth.clouds import scene_pair
 
 DATES = ("2024-06-01", "2024-06-29", "2024-07-27", "2024-08-24", "2024-09-07")
@@ -192,3 +195,119 @@ def test_what_cannot_be_merged_is_said_in_a_line(
     assert run(monkeypatch, "check", path) == 0
     with sqlite3.connect(path) as connection:
         assert connection.execute("SELECT count(*) FROM sessions").fetchone() == (3,)
+
+
+def with_trees(path: Path, n_trees: int = 2) -> Path:
+    """Part the fruits by where they hang into trees of one row that is called as people call it."""
+    with writing(path, "map") as (connection, _):
+        ids, geoms = zip(*connection.execute("SELECT id, geom FROM fruits ORDER BY id"), strict=True)
+        places = geopackage.points_of(geoms)
+        along = places @ np.linalg.svd(places - places.mean(axis=0))[2][0]
+        of_fruit = np.searchsorted(np.quantile(along, np.linspace(0, 1, n_trees + 1)[1:-1]), along)
+        connection.execute("INSERT INTO rows (id, name, number, source) VALUES (1, 'row 1', 1, 'found')")
+        for tree in range(n_trees):
+            foot = geopackage.points(places[of_fruit == tree].mean(axis=0)[None])[0]
+            cells = (tree + 1, foot, f"1-{tree + 1}", tree + 1)
+            connection.execute(
+                "INSERT INTO trees (id, geom, name, row_id, number, source) VALUES (?, ?, ?, 1, ?, 'found')", cells
+            )
+        connection.executemany(
+            "UPDATE fruits SET tree_id = ?, tree_probability = 1.0 WHERE id = ?",
+            zip((of_fruit + 1).tolist(), ids, strict=True),
+        )
+        update_layers(connection)
+    return path
+
+
+def on_earth(path: Path, longitude_deg: float) -> Path:
+    with writing(path, "map") as (connection, _):
+        place = (json.dumps(np.eye(4).tolist()), longitude_deg)
+        connection.execute(
+            """INSERT INTO georeference (enu_from_map, longitude_deg, latitude_deg, height_m, source, n_points, rms_m)
+            VALUES (?, ?, 47.0, 400.0, 'points', 2, 0.01)""",
+            place,
+        )
+        cells = (geopackage.points([[1.0, 2.0, 3.0]])[0], longitude_deg)
+        connection.execute(
+            """INSERT INTO control_points (geom, name, longitude_deg, latitude_deg, east_off_m, north_off_m)
+            VALUES (?, 'post', ?, 47.0, 0.0, 0.0)""",
+            cells,
+        )
+        update_layers(connection)
+    return path
+
+
+def asked(path: Path, question: str) -> list[tuple[object, ...]]:
+    with snapshot(path) as (connection, _):
+        return connection.execute(question).fetchall()
+
+
+def fruit_places(path: Path, table: str) -> dict[str, np.ndarray]:
+    """Where each sight's fruit lies, by the sight's name."""
+    rows = asked(
+        path,
+        f"""SELECT label, f.geom FROM observations JOIN sessions s ON s.id = session_id
+        JOIN {table} f ON f.id = fruit_id AND s.id = (SELECT last_session_id FROM fruits WHERE id = fruit_id)""",
+    )
+    return dict(zip((label for label, _ in rows), geopackage.points_of([geom for _, geom in rows]), strict=True))
+
+
+def test_trees_and_the_place_on_earth_come_along(visits: list[Session], tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    other = on_earth(with_trees(grown(tmp_path / "theirs.gpkg", visits[2:])), 9.0)
+    merged = merge_maps(path, other)
+    assert merged.left_out == ()
+    assert problems(path) == []
+    assert asked(path, "SELECT name, number FROM trees ORDER BY id") == [("1-1", 1), ("1-2", 2)]
+    (without,) = asked(path, "SELECT count(*) FROM fruits WHERE tree_id IS NULL")[0]
+    assert without < 0.1 * len(OrchardMap(path).fruits())
+    assert asked(path, "SELECT sum(n_fruits) FROM trees") == asked(path, "SELECT count(tree_id) FROM fruits")
+    # Who hung together hangs together.
+    hung, hangs = (
+        dict(asked(one, "SELECT label, tree_id FROM observations JOIN fruits ON fruits.id = fruit_id"))
+        for one in (other, path)
+    )
+    same = [hung[label] == hangs[label] for label in hung]
+    assert np.mean(same) > 0.97
+    there, here = (fruit_places(one, "fruits_wgs84") for one in (other, path))
+    common = sorted(there.keys() & here.keys())
+    assert len(common) > 100
+    off_deg = np.array([here[label] - there[label] for label in common])[:, :2]
+    assert np.abs(off_deg).max() < 0.05 / 75_000.0
+
+
+def test_what_the_map_has_its_own_of_is_left_out_and_told(visits: list[Session], tmp_path: Path) -> None:
+    path = on_earth(with_trees(grown(tmp_path / "ours.gpkg", visits[:3])), 9.0)
+    other = on_earth(with_trees(grown(tmp_path / "theirs.gpkg", visits[3:])), 9.1)
+    before = asked(path, "SELECT id, geom, name FROM trees"), asked(path, "SELECT * FROM georeference")
+    merged = merge_maps(path, other)
+    assert merged.is_merged
+    row, place = merged.left_out
+    assert row == "row 1 with 2 trees: the map has trees there"
+    assert place.startswith("its place on Earth, ")
+    assert (asked(path, "SELECT id, geom, name FROM trees"), asked(path, "SELECT * FROM georeference")) == before
+
+
+def test_history_comes_along_by_ids_that_nobody_else_gets(visits: list[Session], tmp_path: Path) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    other = grown(tmp_path / "theirs.gpkg", visits[2:])
+    known = int((OrchardMap(other).fruits().ids or ())[0])
+    with writing(other, "map") as (connection, _):
+        connection.execute("DELETE FROM changes")
+        connection.execute(
+            """INSERT INTO changes (cause, session, event, from_fruit_id, to_fruit_id, n_observations)
+            VALUES ('added', ?, 'joined', 9999, ?, 2), ('added', ?, 'joined', 9998, ?, 1)""",
+            (visits[2].name, known, "of long ago", known),
+        )
+    ours_before = [int(name) for name in OrchardMap(path).fruits().ids or ()]
+    merged = merge_maps(path, other)
+    told = [(session, one) for _, session, one in OrchardMap(path).changes() if one.from_fruit_id > max(ours_before)]
+    told = [(session, one) for session, one in told if session in (visits[2].name, "of long ago")]
+    assert [session for session, _ in told] == [visits[2].name, "of long ago"]
+    assert {one.to_fruit_id for _, one in told} == {merged.fruit_ids[known]}
+    lost = {one.from_fruit_id for _, one in told}
+    assert len(lost) == 2
+    assert lost.isdisjoint({*ours_before, *merged.fruit_ids.values()})
+    added = add_session(path, replace(visit(scene_pair("base", seed=9).map, 4), name="x"), new_part=True)
+    assert min(added.fruit_ids) > max(lost)
+    assert problems(path) == []

@@ -120,6 +120,48 @@ def test_others_cannot_reach_it(address: str) -> None:
         assert other.connect_ex(("127.0.0.2", port)) != 0, "it listens on 127.0.0.1 alone"
 
 
+def let_in(url: str) -> tuple[str, str]:
+    """Follow the address that was printed as a browser does; return where it leads and the cookie."""
+    there = urlsplit(url)
+    status, headers, body = ask(url, f"/?{there.query}")
+    assert (status, body) == (303, b"")
+    assert {"HttpOnly", "SameSite=lax"} <= set(headers["set-cookie"].split("; "))
+    return headers["location"], headers["set-cookie"].partition(";")[0]
+
+
+def test_other_machines_need_the_token(orchard: Path) -> None:
+    with served(orchard, "--host", "0.0.0.0") as url:
+        assert urlsplit(url).query.startswith("token=")
+        where, cookie = let_in(url)
+        assert where == "/"
+        for path in ("/", "/page.js", "/page.css", "/season.json"):
+            assert ask(url, path, Cookie=cookie)[0] == 200
+            for status, _, body in (
+                ask(url, path),
+                ask(url, f"{path}?token="),
+                ask(url, f"{path}?token=%ff%fe", Cookie=cookie),
+                ask(url, path, Cookie=f"{cookie}x"),
+            ):
+                assert (status, body[:6]) == (403, b"token:")
+        # A name that somebody points to this machine does not help who knows the token.
+        assert ask(url, "/season.json", Cookie=cookie, Host="orchard.example")[0] == 403
+        assert ask(url, f"//evil.example/?{urlsplit(url).query}")[1]["location"] == "/evil.example/"
+
+
+def test_a_token_of_one_s_own(pomona: Pomona, orchard: Path) -> None:
+    wanted = "my-own-token_2024-08"
+    with served(orchard, "--token", wanted) as url:
+        assert urlsplit(url).query == f"token={wanted}"
+        assert ask(url, "/season.json")[0] == 403
+        assert ask(url, "/season.json", Cookie=let_in(url)[1])[0] == 200
+    for wrong in ("short", "a token with spaces in it", ""):
+        code, _, told = pomona("view", orchard, "--port", 0, "--token", wrong)
+        assert code == 2
+        assert told == (
+            f"pomona: --token: found {len(wrong)} characters, expected 16 to 200 of a letter, a digit, '-' or '_'\n"
+        )
+
+
 def test_pictures_are_served_and_a_new_visit_is_told(tmp_path: Path) -> None:
     path = grow_row(tmp_path / "orchard.gpkg", (50,), n_trees=1).path
     with served(path) as address:

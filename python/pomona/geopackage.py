@@ -8,9 +8,11 @@ Source: OGC 12-128r17, GeoPackage Encoding Standard 1.3; annexes F.1-F.3 for the
 
 from __future__ import annotations
 
+import math
 import sqlite3
 import struct
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from urllib.parse import quote
 
@@ -271,20 +273,25 @@ def are_points(blobs: Sequence[bytes]) -> bool:
     return bool(ours.all() and np.isfinite(decoded["xyz"]).all())
 
 
+@lru_cache(maxsize=1)
 def _bounds(geometry: object) -> tuple[float, float, float, float] | tuple[None, None, None, None]:
-    """Return min x, max x, min y, max y of a point or line as this module writes it; None for anything else."""
-    xy = _plan(geometry) if isinstance(geometry, bytes) else np.empty((0, 2))
-    if not len(xy) or not np.isfinite(xy).all():
+    """Return min x, max x, min y, max y of a point or line as this module writes it; None for anything else.
+
+    A trigger asks five times for each geometry.
+    """
+    xs, ys = _plan(geometry) if isinstance(geometry, bytes) else ((), ())
+    if not xs or not all(map(math.isfinite, (*xs, *ys))):
         return None, None, None, None
-    (min_x, min_y), (max_x, max_y) = xy.min(axis=0).tolist(), xy.max(axis=0).tolist()
-    return min_x, max_x, min_y, max_y
+    return min(xs), max(xs), min(ys), max(ys)
 
 
-def _plan(blob: bytes) -> NDArray[np.float64]:
-    """Return x and y of a point or line, (V, 2); none of anything else."""
+def _plan(blob: bytes) -> tuple[Sequence[float], Sequence[float]]:
+    """Return the x and the y of a point or line, V each; none of anything else."""
     head = blob[:4] + blob[8:13]
     if head == POINT_HEAD and len(blob) == POINT_Z.itemsize:
-        return np.array([struct.unpack_from("<2d", blob, POINT_Z.itemsize - 24)])
+        x, y = struct.unpack_from("<2d", blob, POINT_Z.itemsize - 24)
+        return (x,), (y,)
     if head == LINE_HEAD and len(blob) > LINE_HEAD_BYTES and (len(blob) - LINE_HEAD_BYTES) % 24 == 0:
-        return np.frombuffer(blob, "<f8", offset=LINE_HEAD_BYTES).reshape(-1, 3)[:, :2]
-    return np.empty((0, 2))
+        x, y, _ = np.frombuffer(blob, "<f8", offset=LINE_HEAD_BYTES).reshape(-1, 3).T.tolist()
+        return x, y
+    return (), ()

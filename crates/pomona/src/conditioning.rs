@@ -173,7 +173,7 @@ impl Conditioned {
     }
 
     /// Takes conditioned places into the caller's frame.
-    fn outward(&self) -> Similarity {
+    pub(crate) fn outward(&self) -> Similarity {
         Similarity { rotation: nalgebra::Rotation3::identity(), translation: self.middle, scale: self.unit }
     }
 }

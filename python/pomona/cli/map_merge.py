@@ -34,7 +34,8 @@ def map_merge(
 ) -> None:
     """Join two maps that overlap: all sessions of OTHER come to ORCHARD.
 
-    The result is that of adding each session. Fruits of ORCHARD keep their ids, those of OTHER get ids of ORCHARD. Exit
+    The result is that of adding each session. Fruits of ORCHARD keep their ids, those of OTHER get ids of ORCHARD.
+    Trees, the place on Earth and the history of OTHER come too; what ORCHARD has its own of is left out and told. Exit
     code 0: merged. 1: OTHER was not found in ORCHARD, and nothing is written. 2: wrong input.
     """
     from pomona.cli.progress import working
@@ -65,6 +66,7 @@ def _merged_as_json(other: Path, merged: Merged) -> dict[str, Any]:
         "n_known": merged.n_known,
         "fruit_ids": merged.fruit_ids,
         "changes": [asdict(change) for change in merged.changes],
+        "left_out": list(merged.left_out),
     }
 
 
@@ -76,4 +78,4 @@ def _merged_as_lines(other: Path, merged: Merged) -> list[str]:
     told = (
         f"{other}: sessions that came: {n_came}, in both: {n_shared}; {merged.n_known} of {n_fruits} fruits were known"
     )
-    return [told, *map(change_as_text, merged.changes)]
+    return [told, *map(change_as_text, merged.changes), *(f"left out: {what}" for what in merged.left_out)]

@@ -1,6 +1,7 @@
 """One identity for each fruit over all visits: `conclusion.py` tells the story; equations in `docs/identities.md`."""
 
+from pomona.identity.common_frame import frames_of_visits
 from pomona.identity.conclusion import Conclusion, conclude
 from pomona.identity.visits import SeenVisit, VisitPair
 
-__all__ = ["Conclusion", "SeenVisit", "VisitPair", "conclude"]
+__all__ = ["Conclusion", "SeenVisit", "VisitPair", "conclude", "frames_of_visits"]

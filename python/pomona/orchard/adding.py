@@ -6,7 +6,6 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,12 @@ from pomona.atomic import NoLinksError, new_file
 from pomona.errors import PomonaError
 from pomona.identity import VisitPair
 from pomona.orchard.added import Added
-from pomona.orchard.evidence import Evidence, new_visit, read_evidence
+from pomona.orchard.evidence import Evidence, new_visit
 from pomona.orchard.joining import Newcomer, join
-from pomona.orchard.parts import parts_with
-from pomona.orchard.recognising import Recognised, matches_with_visits, recognised, seen_last_by
+from pomona.orchard.recognising import recognised
 from pomona.orchard.removing import take_out
 from pomona.orchard.replacing import NotFoundError, holds, there_already
+from pomona.orchard.seen_parts import SeenPart, matches_with_parts, seen_parts
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, write_changes
 from pomona.orchard.writing import Placement
@@ -30,9 +29,6 @@ from pomona.store.failures import WrongContentError
 from pomona.store.numbering import last_ids
 from pomona.store.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.store.rows import columns_of
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Added", "add_session", "add_sessions", "require_new"]
 
@@ -188,12 +184,14 @@ def _add(
         require_new(connection, session, session.content_sha256)
         settings = settings or Settings.load(None, {})
         found = recognised(connection, session.cloud, settings)
-        if found.is_found:
-            added = _add_where_found(connection, session, found, settings)
+        parts = seen_parts(connection, session.cloud, found, settings)
+        if parts:
+            added = _add_where_found(connection, session, parts, settings)
         elif new_part:
             added = _join(connection, session, Evidence((), ()), {}, map_from_session=_beside(connection, session))
         else:
             added = Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, None)
+        found = parts[0].found if parts else found
         added = replace(added, match=found.match, known=found.known)
         if replacing and not added.is_added:
             raise NotFoundError(added)
@@ -206,12 +204,13 @@ def _start(connection: sqlite3.Connection, session: Session) -> Added:
     return _join(connection, session, Evidence((), ()), {})
 
 
-def _add_where_found(connection: sqlite3.Connection, session: Session, found: Recognised, settings: Settings) -> Added:
+def _add_where_found(
+    connection: sqlite3.Connection, session: Session, parts: Sequence[SeenPart], settings: Settings
+) -> Added:
     """Add the session to the parts of the map that have fruits which it saw."""
-    evidence = read_evidence(connection, parts_with(connection, seen_last_by(connection, found)))
-    matches = matches_with_visits(evidence, new_visit(session), found, settings)
-    placement = Placement(settings, found.match.log_odds, found.match.noise_m)
-    return _join(connection, session, evidence, matches, placement)
+    evidence, matches = matches_with_parts(parts, new_visit(session), settings)
+    first = parts[0].found.match
+    return _join(connection, session, evidence, matches, Placement(settings, first.log_odds, first.noise_m))
 
 
 def _beside(connection: sqlite3.Connection, session: Session) -> NDArray[np.float64]:

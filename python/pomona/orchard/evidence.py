@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
-from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
+from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude, frames_of_visits
+from pomona.orchard.pairs_in_place import pairs_in_place, unmatched
 from pomona.orchard.parts import components
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import cameras_in_map
@@ -73,6 +74,21 @@ class Evidence:
             pairs.append(replace(match, first=first, second=second))
         return Evidence(visits, pairs)
 
+    @classmethod
+    def of_parts(cls, parts: Sequence[Evidence], across: Iterable[tuple[int, int, VisitPair]]) -> Evidence:
+        """Put parts together; `across` are matches between them, each after the sessions that it is of."""
+        visits = sorted((visit for part in parts for visit in part.visits), key=lambda one: one.seen.key)
+        numbers = {visit.session_id: number for number, visit in enumerate(visits)}
+        inside = [
+            (part.visits[pair.first].session_id, part.visits[pair.second].session_id, pair)
+            for part in parts
+            for pair in part.pairs
+        ]
+        pairs = [
+            replace(pair, first=numbers[first], second=numbers[second]) for first, second, pair in (*inside, *across)
+        ]
+        return cls(visits, pairs)
+
     def without_session(self, session_id: int) -> Evidence:
         """Return it with one visit less."""
         gone = self.number_of(session_id)
@@ -112,7 +128,11 @@ class Evidence:
         known = np.array([visit.map_from_session for visit in self.visits])
         newest_last = [(visit.session_id < 1, abs(visit.session_id)) for visit in self.visits]
         keepers = sorted(range(len(self.visits)), key=newest_last.__getitem__)
-        return conclude([visit.seen for visit in self.visits], self.pairs, known, keepers)
+        seen = [visit.seen for visit in self.visits]
+        pairs = list(self.pairs)
+        if asked := unmatched(seen, pairs):
+            pairs += pairs_in_place(seen, asked, frames_of_visits(seen, self.pairs, known, keepers))
+        return conclude(seen, pairs, known, keepers)
 
 
 def read_evidence(connection: sqlite3.Connection, session_ids: Sequence[int]) -> Evidence:

@@ -10,7 +10,7 @@ from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.session import Session
 from pomona.orchard.settling import SettledPart, Settlement, settle, settlement_of
-from pomona.orchard.tree_tables import follow_trees
+from pomona.orchard.tree_tables import follow_trees, trees_of
 from pomona.orchard.writing import (
     Placement,
     insert_crops,
@@ -19,6 +19,7 @@ from pomona.orchard.writing import (
     insert_session,
     update_layers,
 )
+from pomona.store.rows import columns_of, one_of
 
 __all__ = ["Newcomer", "join"]
 
@@ -60,13 +61,15 @@ def join(connection: sqlite3.Connection, together: Evidence, newcomers: Mapping[
     parts = [_with_known(part, known) for part in settlement.parts]
     added = {visit.session_id for visit in known.values()}
     for part in parts:
-        _insert_matches(connection, part.evidence, added)
+        _insert_matches(connection, part.evidence)
     settlement = replace(settlement, parts=parts)
+    trees_before = trees_of(connection, settlement.before)
     settle(connection, settlement)
     own = [part.fruit_ids_of(number) for part, number in map(settlement.part_with, sorted(added))]
     write_growth(connection, (one for ids in own for one in ids.tolist()), settlement.changes)
-    follow_trees(connection)
-    update_layers(connection)
+    touched = settlement.before | settlement.after
+    follow_trees(connection, touched, trees_before)
+    update_layers(connection, touched)
     return settlement
 
 
@@ -92,10 +95,13 @@ def _with_known(part: SettledPart, known: Mapping[int, KnownVisit]) -> SettledPa
     return replace(part, evidence=replace(part.evidence, visits=visits))
 
 
-def _insert_matches(connection: sqlite3.Connection, evidence: Evidence, added: set[int]) -> None:
-    """Note how the sessions that came match one another and those that were there."""
+def _insert_matches(connection: sqlite3.Connection, evidence: Evidence) -> None:
+    """Note how sessions match one another, where the map does not know it yet."""
+    names = ("first_session_id", "second_session_id")
+    own = one_of("first_session_id", (visit.session_id for visit in evidence.visits))
+    known = set(zip(*columns_of(connection, "matches", names, own), strict=True))
     for pair in evidence.pairs:
         one, other = evidence.visits[pair.first], evidence.visits[pair.second]
-        if not added.isdisjoint((one.session_id, other.session_id)):
+        if (one.session_id, other.session_id) not in known:
             ids = (one.session_id, other.session_id), (one.observation_ids, other.observation_ids)
             insert_matches(connection, pair, *ids)

@@ -19,6 +19,7 @@ from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.identity import VisitPair
 from pomona.orchard.adding import require_new
+from pomona.orchard.carrying import carry_anchor, carry_history, carry_trees
 from pomona.orchard.evidence import Evidence, KnownVisit, read_evidence
 from pomona.orchard.fruit_ids import Change
 from pomona.orchard.joining import Newcomer, join
@@ -32,7 +33,8 @@ from pomona.orchard.recognising import (
     seen_last_by,
 )
 from pomona.orchard.settling import Settlement, write_changes
-from pomona.orchard.writing import Placement
+from pomona.orchard.tree_tables import follow_trees
+from pomona.orchard.writing import Placement, update_layers
 from pomona.settings import Settings
 from pomona.store.numbering import last_ids
 from pomona.store.opening import TIMEOUT_S, Waiting, snapshot, writing
@@ -62,6 +64,8 @@ class Merged:
         Fruits of the other map that this one had.
     changes : tuple of Change
         Observations that were in the map and now are of another fruit.
+    left_out : tuple of str
+        What the other map knew of trees and its place on Earth, and this one keeps as it had it.
     """
 
     match: Match | None
@@ -71,6 +75,7 @@ class Merged:
     fruit_ids: Mapping[int, int] = field(default_factory=dict)
     n_known: int = 0
     changes: tuple[Change, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 def merge_maps(
@@ -85,7 +90,8 @@ def merge_maps(
     """Add all sessions of another map to a map, as if each had been added to it.
 
     The other map is only read. Fruits of the map keep their ids; those of the other get ids of the map, and the layer
-    `changes` keeps which. When the two do not overlap nothing is written. All of it happens in one transaction.
+    `changes` keeps which. Trees, the place on Earth and the history of the other come too, where the map does not have
+    its own. When the two do not overlap nothing is written. All of it happens in one transaction.
 
     Parameters
     ----------
@@ -143,7 +149,8 @@ def _merge(connection: sqlite3.Connection, theirs: OtherMap, settings: Settings)
         return Merged(found.match, is_merged=False)
     touched = shared.values() if found is None else seen_last_by(connection, found)
     evidence = read_evidence(connection, parts_with(connection, touched))
-    together = _together(evidence, theirs, shared, found, settings)
+    map_from_other = _pose(evidence, theirs, shared, found)
+    together = _together(evidence, theirs, shared, found, map_from_other, settings)
     placement = None if found is None else Placement(settings, found.match.log_odds, found.match.noise_m)
     newcomers = {
         -number: Newcomer(theirs.sessions[number], placement, theirs.contents[number])
@@ -152,10 +159,26 @@ def _merge(connection: sqlite3.Connection, theirs: OtherMap, settings: Settings)
     settlement = join(connection, together, newcomers)
     before = set(evidence.fruit_ids.tolist())
     became = _became(settlement, theirs, before)
+    merged = _told(None if found is None else found.match, theirs, shared, before, became)
+    carry_history(connection, theirs.besides, merged.fruit_ids, merged.shared)
     write_changes(connection, "added", theirs.name, settlement.changes)
     write_changes(connection, "merged", theirs.name, became)
-    merged = _told(None if found is None else found.match, theirs, shared, before, became)
-    return replace(merged, changes=tuple(settlement.changes))
+    left_out = _carried(connection, theirs, map_from_other, merged.fruit_ids)
+    return replace(merged, changes=tuple(settlement.changes), left_out=left_out)
+
+
+def _carried(
+    connection: sqlite3.Connection, theirs: OtherMap, map_from_other: NDArray[np.float64], fruit_ids: Mapping[int, int]
+) -> tuple[str, ...]:
+    """Write what the other map knows of trees and its place on Earth, and what follows; return what was left out."""
+    left_out = (
+        *carry_trees(connection, theirs.besides, map_from_other, fruit_ids),
+        *carry_anchor(connection, theirs.besides, map_from_other),
+    )
+    (all_fruits,) = columns_of(connection, "fruits", ("id",))
+    follow_trees(connection, all_fruits, ())
+    update_layers(connection)
+    return left_out
 
 
 def _together(
@@ -163,10 +186,10 @@ def _together(
     theirs: OtherMap,
     shared: Mapping[int, int],
     found: Recognised | None,
+    map_from_other: NDArray[np.float64],
     settings: Settings,
 ) -> Evidence:
     """Return what all sessions of both maps say: of ours, of theirs, and of one of each."""
-    map_from_other = _pose(evidence, theirs, shared, found)
     coming = {
         number: _laid(theirs.evidence.visits[number], -number, map_from_other) for number in theirs.all_but(shared)
     }

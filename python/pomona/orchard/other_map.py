@@ -11,6 +11,7 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
+from pomona.orchard.besides import Besides, read_besides
 from pomona.orchard.evidence import Evidence, KnownVisit, read_evidence
 from pomona.orchard.recognising import last_sights, worth_recognising
 from pomona.orchard.session import Session
@@ -36,12 +37,15 @@ class OtherMap:
         Each in its own frame, in the order of the evidence's visits.
     fruits : FruitCloud
         Those that may still hang.
+    besides : Besides
+        What it knows besides its sessions.
     """
 
     name: str
     evidence: Evidence
     sessions: list[Session]
     fruits: FruitCloud
+    besides: Besides
 
     @property
     def contents(self) -> list[str]:
@@ -72,7 +76,8 @@ def read_other(path: Path) -> OtherMap:
         (session_ids,) = columns_of(connection, "sessions", ("id",))
         evidence = read_evidence(connection, session_ids)
         sessions = [_session(connection, visit) for visit in evidence.visits]
-        return OtherMap(path.stem, evidence, sessions, worth_recognising(fruits_in_map(connection, FruitCloud)))
+        fruits = worth_recognising(fruits_in_map(connection, FruitCloud))
+        return OtherMap(path.stem, evidence, sessions, fruits, read_besides(connection))
 
 
 def _session(connection: sqlite3.Connection, visit: KnownVisit) -> Session:

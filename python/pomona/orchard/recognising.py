@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections import defaultdict
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pomona.matching import Match
 
 __all__ = [
+    "MARGIN_M",
     "Recognised",
     "last_sights",
     "matches_between",
@@ -71,18 +72,22 @@ class Recognised:
         return np.array(self.known.ids, np.int64)
 
 
-def recognised(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings) -> Recognised:
-    """Look for a session in the map.
+def recognised(
+    connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings, among: Collection[int] | None = None
+) -> Recognised:
+    """Look for a session in the map, or among the fruits that some sessions of it saw last.
 
     In a large one among the fruits where it seems to lie; among all of them where it is not found there.
     """
-    nearby = _nearby(connection, cloud, settings)
+    asked = "" if among is None else one_of("last_session_id", among)
+    nearby = _nearby(connection, cloud, settings, asked)
     if nearby:
         known = worth_recognising(fruits_in_map(connection, FruitCloud, nearby))
         found = Recognised(settings.match(cloud, known), known)
         if found.is_found:
             return found
-    known = worth_recognising(fruits_in_map(connection, FruitCloud))
+    ids = columns_of(connection, "fruits", ("id",), asked)[0] if asked else None
+    known = worth_recognising(fruits_in_map(connection, FruitCloud, ids))
     if not len(known):
         raise WrongContentError("has sessions and no fruits, expected at least one")
     return Recognised(settings.match(cloud, known), known)
@@ -95,14 +100,14 @@ def worth_recognising(fruits: FruitCloud) -> FruitCloud:
     return fruits.select(may_hang) if may_hang.any() else fruits
 
 
-def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings) -> list[int]:
-    """Return the fruits of a large map among which a session seems to lie; none where nothing tells."""
+def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings, asked: str) -> list[int]:
+    """Return those of the fruits asked for, of a large map, among which a session seems to lie; or none."""
     from scipy.spatial import cKDTree
 
     (n_fruits,) = connection.execute("SELECT count(*) FROM fruits").fetchone()
     if n_fruits < LARGE or settings.call["scale"] != "metric":
         return []
-    ids, geoms = columns_of(connection, "fruits", ("id", "geom"))
+    ids, geoms = columns_of(connection, "fruits", ("id", "geom"), asked)
     places = geopackage.points_of(geoms)
     guess = _core.whereabouts(places, np.ascontiguousarray(cloud.positions))
     if guess is None:
@@ -122,7 +127,7 @@ def seen_last_by(connection: sqlite3.Connection, found: Recognised) -> set[int]:
 
 
 def matches_with_visits(
-    evidence: Evidence, visit: KnownVisit, found: Recognised, settings: Settings
+    evidence: Evidence, visit: KnownVisit, found: Recognised, settings: Settings, rows: NDArray[np.int64]
 ) -> dict[int, VisitPair]:
     """Return how a visit matches each other one in which it was found, by the number of that one.
 
@@ -138,11 +143,13 @@ def matches_with_visits(
         How it was found there.
     settings
         Of the match.
+    rows
+        Those of the visit that were looked for there.
     """
     assert found.match.map_from_query is not None
     matches = matches_between(evidence, visit, found.match.map_from_query, settings)
-    rows = [(0, row) for row in range(len(visit.cloud))]
-    return matches or matches_through_fruits(evidence, found, [visit], rows).get(0, {})
+    sights = [(0, row) for row in rows.tolist()]
+    return matches or matches_through_fruits(evidence, found, [visit], sights).get(0, {})
 
 
 def matches_between(

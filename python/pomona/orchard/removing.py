@@ -11,7 +11,7 @@ from pomona.orchard.fruit_ids import Change
 from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.parts import parts_with
 from pomona.orchard.settling import FruitRow, fruit_rows, settle, settlement_of, write_changes
-from pomona.orchard.tree_tables import follow_trees
+from pomona.orchard.tree_tables import follow_trees, trees_of
 from pomona.orchard.writing import update_layers
 from pomona.store.failures import WrongContentError
 from pomona.store.opening import TIMEOUT_S, Waiting, writing
@@ -114,6 +114,7 @@ def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: 
     rest = evidence.without_session(session_id)
     (n_sessions,) = connection.execute("SELECT count(*) FROM sessions").fetchone()
     before = _fruits(connection, set(evidence.fruit_ids.tolist()))
+    trees_before = trees_of(connection, before)
     if not dry:
         for part in PARTS:
             connection.execute(part, {"session": session_id})
@@ -122,8 +123,9 @@ def _remove(connection: sqlite3.Connection, name: str, session_id: int, *, dry: 
         connection.executemany("DELETE FROM fruits WHERE id = ?", ((one,) for one in before.keys() - after.keys()))
         connection.execute("DELETE FROM sessions WHERE id = ?", (session_id,))
         write_growth(connection, going.fruit_ids.tolist(), changes)
-        follow_trees(connection)
-        update_layers(connection)
+        touched = before.keys() | after.keys()
+        follow_trees(connection, touched, trees_before)
+        update_layers(connection, touched)
     n_changed = sum(_place_and_state(row) != before[fruit_id] for fruit_id, row in after.items() if fruit_id in before)
     return Removed(
         n_observations=len(going.cloud),

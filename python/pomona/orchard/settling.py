@@ -70,6 +70,11 @@ class Settlement:
     before: set[int]
     changes: list[Change]
 
+    @property
+    def after(self) -> set[int]:
+        """Ids that their sights have now."""
+        return {fruit_id for part in self.parts for fruit_id in part.ids.tolist()}
+
     def part_with(self, session_id: int) -> tuple[SettledPart, int]:
         """Return the part of a session, and its number there."""
         part = next(one for one in self.parts if any(v.session_id == session_id for v in one.evidence.visits))

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.store.rows import columns_of
+from pomona.store.rows import columns_of, one_of
 from pomona.tree_rows import Planting
 
-__all__ = ["DRAWN", "FOUND", "GIVEN", "StoredTree", "bear", "follow_trees", "stored_trees", "write_row", "write_tree"]
+__all__ = [
+    "DRAWN",
+    "FOUND",
+    "GIVEN",
+    "StoredTree",
+    "bear",
+    "follow_trees",
+    "stored_trees",
+    "trees_of",
+    "write_row",
+    "write_tree",
+]
 
 DRAWN, FOUND, GIVEN = "drawn", "found", "given"
 """Where a tree comes from: people in QGIS (null in the file), the fruits, a table."""
@@ -124,21 +135,60 @@ def bear(
     )
 
 
-def follow_trees(connection: sqlite3.Connection) -> None:
-    """Give fruits that are new the tree of their neighbours, and count again; without trees there is nothing to do."""
+def trees_of(connection: sqlite3.Connection, fruit_ids: Iterable[int]) -> set[int]:
+    """Return the trees on which some of these fruits hang."""
+    (tree_ids,) = columns_of(connection, "fruits", ("tree_id",), one_of("fruits.id", sorted(fruit_ids)))
+    return set(tree_ids) - {None}
+
+
+def follow_trees(connection: sqlite3.Connection, fruit_ids: Collection[int], trees_before: Collection[int]) -> None:
+    """Give those of some fruits that have no tree that of their neighbours, and count again; nothing without trees.
+
+    Parameters
+    ----------
+    connection
+        The map.
+    fruit_ids
+        Fruits to which something came or from which something went.
+    trees_before
+        Those on which they hung before.
+    """
+    (a_tree,) = connection.execute("SELECT max(tree_id) FROM fruits").fetchone()
+    if a_tree is None:
+        return
+    ids, geoms, tree_ids = columns_of(
+        connection, "fruits", ("id", "geom", "tree_id"), one_of("fruits.id", sorted(fruit_ids))
+    )
+    new = [row for row, tree_id in enumerate(tree_ids) if tree_id is None]
+    if new:
+        _follow_neighbours(connection, np.array(ids, np.int64)[new], geopackage.points_of([geoms[row] for row in new]))
+    counted = trees_of(connection, fruit_ids) | set(trees_before)
+    connection.executemany(
+        "UPDATE trees SET n_fruits = (SELECT count(*) FROM fruits WHERE tree_id = trees.id) WHERE id = ?",
+        ((tree_id,) for tree_id in sorted(counted)),
+    )
+
+
+def _follow_neighbours(
+    connection: sqlite3.Connection, fruit_ids: NDArray[np.int64], positions: NDArray[np.float64]
+) -> None:
+    """Hang fruits on the tree of most of what hangs near them."""
     from scipy.spatial import KDTree
 
-    if connection.execute("SELECT 1 FROM fruits WHERE tree_id NOTNULL").fetchone() is None:
+    (low_x, low_y, _), (high_x, high_y, _) = positions.min(axis=0) - NEAR_M, positions.max(axis=0) + NEAR_M
+    around = f"""WHERE tree_id NOTNULL AND fruits.id IN (SELECT id FROM rtree_fruits_geom
+        WHERE maxx >= {low_x:.9g} AND minx <= {high_x:.9g} AND maxy >= {low_y:.9g} AND miny <= {high_y:.9g})
+        ORDER BY fruits.id"""
+    geoms, tree_ids = columns_of(connection, "fruits", ("geom", "tree_id"), around)
+    if not geoms:
         return
-    ids, geoms, tree_ids = columns_of(connection, "fruits", ("id", "geom", "tree_id"))
-    positions, fruit_ids = geopackage.points_of(geoms), np.array(ids, np.int64)
-    trees = np.array([tree_id or 0 for tree_id in tree_ids], np.int64)
-    has, new = np.flatnonzero(trees), np.flatnonzero(trees == 0)
-    k = min(NEIGHBOURS, len(has))
-    distances, nearest = KDTree(positions[has]).query(positions[new], k=np.arange(1, k + 1))
-    votes = np.where(distances <= NEAR_M, trees[has][nearest], 0)
+    trees = np.array([*tree_ids, 0], np.int64)
+    # What is farther is told by the row after the last.
+    _, nearest = KDTree(geopackage.points_of(geoms)).query(
+        positions, k=np.arange(1, NEIGHBOURS + 1), distance_upper_bound=NEAR_M
+    )
+    votes = trees[nearest]
     same = (votes[:, :, None] == votes[:, None, :]).sum(axis=2) * (votes > 0)
     best = same.argmax(axis=1)
-    rows = np.arange(len(new))
-    bear(connection, fruit_ids[new], votes[rows, best], same[rows, best] / k)
-    connection.execute("UPDATE trees SET n_fruits = (SELECT count(*) FROM fruits WHERE tree_id = trees.id)")
+    rows = np.arange(len(fruit_ids))
+    bear(connection, fruit_ids, votes[rows, best], same[rows, best] / NEIGHBOURS)

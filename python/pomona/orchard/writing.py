@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -229,9 +229,12 @@ def covariance_cells(cloud: FruitCloud) -> NDArray[np.float64]:
     return cloud.covariances.reshape(len(cloud), 9)[:, [0, 4, 8, 1, 2, 5]]
 
 
-def update_layers(connection: sqlite3.Connection) -> None:
-    """Bring extents and times up to date; the time is the newest visit's: the same input gives the same file."""
-    write_earth_layers(connection)
+def update_layers(connection: sqlite3.Connection, fruit_ids: Collection[int] | None = None) -> None:
+    """Bring places on Earth, extents and times up to date, where only some fruits changed of these alone.
+
+    The time is the newest visit's: the same input gives the same file.
+    """
+    write_earth_layers(connection, fruit_ids)
     (newest,) = connection.execute("SELECT max(date) FROM sessions").fetchone()
     day, _, time = newest.partition("T")
     for name in ("pomona_format", *(layer[0] for layer in (*schema.LAYERS, *schema.VIEWS))):

@@ -140,10 +140,12 @@ def _are_pictures(blobs: Sequence[bytes]) -> bool:
 
 
 def _are_pairs(value: object) -> bool:
-    """Tell whether these are rows of two ids and a probability."""
-    return isinstance(value, list) and all(
-        isinstance(row, list) and list(map(type, row)) == [int, int, float] and 0.0 <= row[2] <= 1.0 for row in value
-    )
+    """Tell whether these are rows of two ids and a probability; a map has millions, so a column at a time."""
+    if not isinstance(value, list) or set(map(type, value)) - {list} or set(map(len, value)) - {3}:
+        return False
+    *ids, probabilities = zip(*value, strict=True) if value else ([], [], [0.0])
+    are_ids = all(set(map(type, column)) <= {int} for column in ids)
+    return are_ids and set(map(type, probabilities)) == {float} and 0.0 <= min(probabilities) <= max(probabilities) <= 1
 
 
 def _texts_by_name(value: object) -> bool:

@@ -90,11 +90,10 @@ def fruits_in_map(
     if fruit_ids is not None:
         listed = ", ".join(map(str, fruit_ids))
         which, at_last = one_of("fruits.id", fruit_ids), AT_LAST.format(f" AND f.id IN ({listed})")
-    names = ("id", "geom", "diameter_m", "state", "last_seen", "last_session_id", "n_sessions", "n_missed")
-    ids, geoms, diameters_m, states, last_seen, last_session_ids, n_sessions, n_missed = columns_of(
-        connection, "fruits", names, which
+    names = ("id", "geom", "diameter_m", "state", "last_seen", "last_session_id", "n_sessions", "n_missed", "tree_id")
+    ids, geoms, diameters_m, states, last_seen, last_session_ids, n_sessions, n_missed, of_fruits, *probabilities = (
+        columns_of(connection, "fruits", (*names, *PROBABILITIES), which)
     )
-    probabilities = columns_of(connection, "fruits", PROBABILITIES, which)
     seen_ids, *cells = columns_of(connection, "observations", ("fruit_id", *COVARIANCE), at_last)
     _require_seen(ids, last_session_ids, seen_ids)
     with content("fruits"):
@@ -109,14 +108,13 @@ def fruits_in_map(
                 "n_sessions": tuple(map(str, n_sessions)),
                 "n_missed": tuple(map(str, n_missed)),
                 **{name: _shares(cells) for name, cells in zip(PROBABILITIES, probabilities, strict=True)},
-                **_trees(connection),
+                **_trees(connection, of_fruits),
             },
         )
 
 
-def _trees(connection: sqlite3.Connection) -> dict[str, tuple[str, ...]]:
-    """Return the column `tree`, blank for the fruits of none; nothing where the map has told no trees."""
-    (of_fruits,) = columns_of(connection, "fruits", ("tree_id",))
+def _trees(connection: sqlite3.Connection, of_fruits: Sequence[int | None]) -> dict[str, tuple[str, ...]]:
+    """Return the column `tree`, blank for the fruits of none; nothing where the map has told these no trees."""
     if not any(of_fruits):
         return {}
     names = dict(zip(*columns_of(connection, "trees", ("id", "name")), strict=True))

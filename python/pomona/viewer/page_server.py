@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pomona.errors import PomonaError
 from pomona.viewer.built_page import built_page
 from pomona.viewer.season_page import Wishes, season_document
+from pomona.viewer.token import cookie_name, is_known
 from pomona.viewer.told_crops import CropShelf
 from pomona.viewer.visitors import why_refused
 
@@ -60,8 +61,8 @@ class _ServedSeason:
             return self._now
 
 
-def page_app(path: Path, wishes: Wishes) -> FastAPI:
-    """Make the application that serves one map.
+def page_app(path: Path, wishes: Wishes, token: str | None = None) -> FastAPI:
+    """Make the application that serves one map, to all who know the token where there is one.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def page_app(path: Path, wishes: Wishes) -> FastAPI:
 
     for address in ("/crops/{fruit}", "/crops/{fruit}/{visit}"):
         app.add_api_route(address, crop, methods=["GET", "HEAD"])
-    app.middleware("http")(_guarded)
+    app.middleware("http")(_guard(token))
     return app
 
 
@@ -103,12 +104,33 @@ def _constant(response: Response) -> Callable[[], Response]:
     return lambda: response
 
 
-async def _guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
+def _guard(token: str | None) -> Callable[[Request, Callable[[Request], Awaitable[Response]]], Awaitable[Response]]:
     from fastapi import Response
 
-    refused = why_refused(request.headers)
-    response = await answer(request) if refused is None else Response(refused, 403, media_type="text/plain")
-    response.headers.update(HEADERS)
+    async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
+        refused = why_refused(request.headers)
+        told = request.query_params.get("token")
+        if refused is None and token is not None and not is_known(token, told, request.cookies):
+            refused = "token: expected the one in the address that `pomona view` has printed"
+        if refused is not None:
+            response = Response(refused, 403, media_type="text/plain")
+        elif token is not None and told is not None:
+            response = _let_in(token, request.url.path)
+        else:
+            response = await answer(request)
+        response.headers.update(HEADERS)
+        return response
+
+    return guarded
+
+
+def _let_in(token: str, path: str) -> Response:
+    """Keep the token in the browser, and take it out of the address, which people pass on and photograph."""
+    from fastapi import Response
+
+    # An address with two slashes in front would lead to another machine.
+    response = Response(status_code=303, headers={"Location": f"/{path.lstrip('/')}"})
+    response.set_cookie(cookie_name(token), token, httponly=True, samesite="lax")
     return response
 
 

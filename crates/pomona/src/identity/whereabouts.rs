@@ -66,18 +66,33 @@ pub struct Whereabouts {
 pub fn whereabouts(map: &FruitCloud, visit: &FruitCloud) -> Result<Option<Whereabouts>> {
     map.validate()?;
     visit.validate()?;
-    let [map, visit] = [map, visit].map(|cloud| Conditioned::new(cloud, Scale::Metric));
-    if [&map, &visit].iter().any(|side| side.cloud.len() <= COMPANIONS) {
+    let visit = Conditioned::new(visit, Scale::Metric);
+    if [map, &visit.cloud].iter().any(|cloud| cloud.len() <= COMPANIONS) {
         return Ok(None);
     }
-    let search = Search::new(&map.cloud, &visit.cloud);
+    // A map is large and asks little of its fruits: what is there twice or lies astray only makes guesses that fail.
+    let middle = median_place(&map.positions);
+    let places: Vec<_> = map.positions.iter().map(|place| place - middle).collect();
+    let search = Search::new(&places, &visit.cloud);
     let mut guesses = search.guesses();
     guesses.sort_by(|a, b| b.n_met.cmp(&a.n_met).then(a.anchor.cmp(&b.anchor)));
     guesses.truncate(GROWN);
     let grown = guesses.par_iter().filter_map(|guess| search.grown(guess)).collect::<Vec<_>>();
     // The first of equal ones, whatever the threads.
     let best = grown.into_iter().reduce(|best, next| if next.n_met > best.n_met { next } else { best });
-    Ok(best.map(|found| Whereabouts { map_from_visit: map.restored_pose(&visit, &found.map_from_visit), ..found }))
+    let outward = Similarity { translation: middle, ..Similarity::identity() };
+    Ok(best.map(|found| Whereabouts {
+        map_from_visit: outward.compose(&found.map_from_visit).compose(&visit.outward().inverse()),
+        ..found
+    }))
+}
+
+/// The median of each coordinate, which no stray moves: single precision is for what is near it.
+fn median_place(places: &[Point3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let mut along: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+        *along.select_nth_unstable_by(places.len() / 2, f64::total_cmp).1
+    })
 }
 
 /// A pose from one seed.
@@ -97,12 +112,12 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(map: &'a FruitCloud, visit: &FruitCloud) -> Self {
-        let points: Vec<_> = map.positions.iter().map(|point| single(&point.coords)).collect();
+    fn new(map: &'a [Point3<f64>], visit: &FruitCloud) -> Self {
+        let points: Vec<_> = map.iter().map(|point| single(&point.coords)).collect();
         let visit = Landscape::new(visit);
         let sigma = SEED_SIGMA * visit.spacing;
         let seeds = SeedIndex::new(&visit, Scale::Metric, 6.0 * sigma);
-        Self { map: &map.positions, tree: Tree::new(&points), visit, seeds, sigma }
+        Self { map, tree: Tree::new(&points), visit, seeds, sigma }
     }
 
     /// Poses of the seeds of anchors all over the map.

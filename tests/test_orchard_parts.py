@@ -1,0 +1,121 @@
+"""Parts of a map that know nothing of each other, and the visit that saw both."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pomona import FruitCloud
+from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session, seen_parts
+from pomona.orchard.adding import _beside, _join
+from pomona.orchard.evidence import Evidence
+from pomona.orchard.parts import parts_of_map
+from pomona.store.opening import snapshot, writing
+from pomona.synth.clouds import scene_pair
+
+DATES = ("2024-06-01", "2024-06-15", "2024-06-29", "2024-07-13")
+
+
+def visit(number: int, low: float, high: float) -> Session:
+    """Four of five fruits of a stretch of the row, 1 cm off, in a frame of their own."""
+    rng = np.random.default_rng(number)
+    row = scene_pair("base", seed=3).map
+    along = row.positions @ np.linalg.svd(row.positions - row.positions.mean(axis=0))[2][0]
+    from_m, to_m = np.quantile(along, (low, high))
+    seen = np.flatnonzero((from_m <= along) & (along <= to_m) & (rng.random(len(row)) < 0.8))
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    cloud = FruitCloud(
+        row.positions[seen] + rng.normal(0, 0.01, (len(seen), 3)),
+        ids=tuple(f"{number}.{fruit}" for fruit in seen.tolist()),
+    )
+    return Session(DATES[number], DATES[number], "test", cloud.transformed(frame))
+
+
+@pytest.fixture(scope="module")
+def visits() -> list[Session]:
+    """The left, the right, all of the row, and the left again."""
+    return [visit(0, 0.0, 0.45), visit(1, 0.55, 1.0), visit(2, 0.0, 1.0), visit(3, 0.0, 0.45)]
+
+
+@pytest.fixture(scope="module")
+def most_and_little() -> list[Session]:
+    """Most of the row, the rest of it, and all of it: found where most of it is."""
+    return [visit(0, 0.0, 0.76), visit(1, 0.78, 1.0), visit(2, 0.0, 1.0)]
+
+
+def two_parts(path: Path, visits: list[Session]) -> Path:
+    add_session(path, visits[0])
+    assert not add_session(path, visits[1]).is_added
+    assert add_session(path, visits[1], new_part=True).is_added
+    return path
+
+
+def n_parts(path: Path) -> int:
+    with snapshot(path) as (connection, _):
+        return len(parts_of_map(connection))
+
+
+def who_is_who(path: Path) -> set[frozenset[str]]:
+    seen = OrchardMap(path).observations()
+    sights: dict[int, set[str]] = {}
+    for fruit, label in zip(seen.fruit_ids.tolist(), seen.labels, strict=True):
+        sights.setdefault(fruit, set()).add(str(label))
+    return set(map(frozenset, sights.values()))
+
+
+def test_a_visit_that_saw_two_parts_makes_one_of_them(visits: list[Session], tmp_path: Path) -> None:
+    path = two_parts(tmp_path / "orchard.gpkg", visits)
+    assert n_parts(path) == 2
+    added = add_session(path, visits[2])
+    assert n_parts(path) == 1
+    assert added.n_matched > 0.65 * len(visits[2].cloud)
+    assert problems(path) == []
+    # As if it had come before them.
+    other = tmp_path / "other.gpkg"
+    for number in (2, 1, 0):
+        assert add_session(other, visits[number]).is_added
+    assert who_is_who(path) == who_is_who(other)
+
+
+def test_what_one_visit_joined_comes_apart_without_it(visits: list[Session], tmp_path: Path) -> None:
+    path = two_parts(tmp_path / "orchard.gpkg", visits)
+    before = who_is_who(path)
+    add_session(path, visits[2])
+    assert remove_session(path, visits[2].name) is not None
+    assert n_parts(path) == 2
+    assert who_is_who(path) == before
+    assert problems(path) == []
+
+
+def test_what_lies_beyond_the_part_where_a_visit_was_found_is_looked_for(
+    most_and_little: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = two_parts(tmp_path / "orchard.gpkg", most_and_little)
+    asked: list[int] = []
+    looked_for = seen_parts.recognised
+
+    def recognised(connection: object, cloud: FruitCloud, *rest: object) -> object:
+        asked.append(len(cloud))
+        return looked_for(connection, cloud, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(seen_parts, "recognised", recognised)
+    assert add_session(path, visit(3, 0.1, 0.6)).is_added
+    assert asked == []
+    assert add_session(path, most_and_little[2]).is_added
+    (n_beyond,) = asked
+    assert 0 < n_beyond < 0.5 * len(most_and_little[2].cloud)
+    assert n_parts(path) == 1
+    assert problems(path) == []
+
+
+def test_what_two_parts_tell_alike_joins_none(tmp_path: Path) -> None:
+    path = tmp_path / "orchard.gpkg"
+    add_session(path, visit(0, 0.0, 1.0))
+    twin = replace(visit(1, 0.0, 1.0), name="twin")
+    with writing(path, "map") as (connection, _):
+        _join(connection, twin, Evidence((), ()), {}, map_from_session=_beside(connection, twin))
+    assert n_parts(path) == 2
+    assert not add_session(path, visit(2, 0.0, 1.0)).is_added
