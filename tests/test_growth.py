@@ -264,6 +264,14 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
     assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
 
 
+def test_what_is_likelier_no_fruit_counts_in_no_block(grown: SeasonGrowth) -> None:
+    states = ("missed",) * 60 + ("new",) * 30
+    chances = ("0.31",) * 40 + ("0.62",) * 20 + ("0.31",) * 30
+    cloud = replace(grown.fruits.cloud, extras={"state": states, "fruit_probability": chances})
+    found = blocks_of(replace(grown.fruits, cloud=cloud))[0]
+    assert found.members.tolist() == [False] * 40 + [True] * 50
+
+
 def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:
     row = grow_row(tmp_path / "twice.gpkg", days=(50, 65), scales=(1.0, 1.0))
     again = OrchardMap(row.path).fruits()
