@@ -198,6 +198,8 @@ def test_json_says_the_same(pomona: Pomona, row: GrownRow, tmp_path: Path) -> No
             ["--harvest", "2024-07-01"],
             "found 2024-07-01, expected the last visit's day or later: 2024-07-29",
         ),
+        (["--harvest", "2025-02-20"], "found 2025-02-20, expected a day of the same season, at most 200 days after"),
+        (["--harvest", "9999-12-31"], "found 9999-12-31, expected a day of the same season"),
         (["--harvest", "soon"], "--harvest: found 'soon', expected a day"),
         (["--classes", "70,60"], "--classes: found '70,60', expected rising limits in mm"),
         (["--classes", "-5,60"], "expected rising limits"),
