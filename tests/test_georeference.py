@@ -165,6 +165,26 @@ def test_a_vertical_that_is_told_holds(orchard: Path) -> None:
     )
 
 
+def test_without_cameras_nobody_tells_the_vertical(tmp_path: Path) -> None:
+    """A table of fruits with z up was laid on its side."""
+    rng = np.random.default_rng(4)
+    upright = np.column_stack([rng.uniform(0, 6, 50), rng.uniform(-1, 1, 50), rng.uniform(0.5, 2.5, 50)])
+    path = tmp_path / "o.gpkg"
+    add_session(path, Session("may", "2024-05-01", "drawn", FruitCloud(upright)))
+    posts = np.array([[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
+    points = points_file(path, posts[:2], heights=False)
+    before = path.read_bytes()
+    refused = run("map", "georeference", path, "--points", points, "--epsg", ZONE)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    assert "found no cameras in the map, which would tell the vertical, expected --up X,Y,Z" in refused.stderr
+    assert path.read_bytes() == before
+    assert run("map", "georeference", path, "--points", points, "--epsg", ZONE, "--up", "0,0,1").returncode == 0
+    np.testing.assert_allclose(in_zone(path, "fruits_wgs84")[:, 2], upright[:, 2], atol=0.002)
+    all_points = points_file(path, posts)
+    assert run("map", "georeference", path, "--points", all_points, "--epsg", ZONE).returncode == 0
+    np.testing.assert_allclose(in_zone(path, "fruits_wgs84"), on_earth(upright), atol=0.003)
+
+
 def _geodetic(places_in_map: np.ndarray) -> np.ndarray:
     earth = on_earth(places_in_map)
     return np.column_stack([from_utm(ZONE, earth[:, 0], earth[:, 1]), earth[:, 2]])

@@ -198,6 +198,8 @@ def test_json_says_the_same(pomona: Pomona, row: GrownRow, tmp_path: Path) -> No
             ["--harvest", "2024-07-01"],
             "found 2024-07-01, expected the last visit's day or later: 2024-07-29",
         ),
+        (["--harvest", "2025-02-20"], "found 2025-02-20, expected a day of the same season, at most 200 days after"),
+        (["--harvest", "9999-12-31"], "found 9999-12-31, expected a day of the same season"),
         (["--harvest", "soon"], "--harvest: found 'soon', expected a day"),
         (["--classes", "70,60"], "--classes: found '70,60', expected rising limits in mm"),
         (["--classes", "-5,60"], "expected rising limits"),
@@ -270,6 +272,14 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
     assert rows == [("east", 30), ("west", 59)]
     over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
     assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
+
+
+def test_what_is_likelier_no_fruit_counts_in_no_block(grown: SeasonGrowth) -> None:
+    states = ("missed",) * 60 + ("new",) * 30
+    chances = ("0.31",) * 40 + ("0.62",) * 20 + ("0.31",) * 30
+    cloud = replace(grown.fruits.cloud, extras={"state": states, "fruit_probability": chances})
+    found = blocks_of(replace(grown.fruits, cloud=cloud))[0]
+    assert found.members.tolist() == [False] * 40 + [True] * 50
 
 
 def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:

@@ -181,6 +181,13 @@ def test_a_session_is_added_once(grown: Path, scenes: list[FruitCloud]) -> None:
     assert grown.read_bytes() == before
 
 
+def test_another_session_of_the_same_name_is_told_from_the_same_one(grown: Path, scenes: list[FruitCloud]) -> None:
+    before = grown.read_bytes()
+    with pytest.raises(PomonaError, match=r"another session is called 2024-09-01, with other fruits, expected a name"):
+        add_session(grown, visit(scenes[1].select(np.arange(60)), "2024-09-01"))
+    assert grown.read_bytes() == before
+
+
 def test_a_recording_is_added_once_whatever_was_made_of_it(tmp_path: Path, scenes: list[FruitCloud]) -> None:
     path = tmp_path / "orchard.gpkg"
     hashes = {"left/0000.png": "ab"}

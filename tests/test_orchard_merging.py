@@ -18,6 +18,8 @@ from pomona.synth.clouds import scene_pair
 
 DATES = ("2024-06-01", "2024-06-29", "2024-07-27", "2024-08-24", "2024-09-07")
 
+TAKEN = "expected a name that the map does not have: `map add --name` gives one, --replace takes the other's place"
+
 
 @pytest.fixture(scope="module")
 def row() -> FruitCloud:
@@ -182,7 +184,7 @@ def test_what_cannot_be_merged_is_said_in_a_line(
     said = [
         (path, f"{path}: is the map itself, expected another one to merge with {path}"),
         (tmp_path / "none.gpkg", f"{tmp_path / 'none.gpkg'}: is not there, expected a session or a map (.gpkg)"),
-        (named, f"{path}: session {visits[0].name} is in the map already"),
+        (named, f"{path}: another session is called {visits[0].name}, with other fruits, {TAKEN}"),
     ]
     for with_whom, line in said:
         assert run(monkeypatch, "merge", path, with_whom) == 2

@@ -4,6 +4,7 @@ import contextlib
 import csv
 import http.server
 import re
+import shutil
 import threading
 from collections.abc import Iterator
 from datetime import date
@@ -15,6 +16,7 @@ from benchmarks.page_draw import drawn_document
 
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from page_maker import chromium, served
+from pomona import geopackage
 from pomona.orchard import OrchardMap
 from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.season_page import Wishes
@@ -75,6 +77,13 @@ def shown_rows(page: Any) -> list[list[str]]:
     return [line.locator("[role=cell]").all_inner_texts() for line in page.locator(".lines .line").all()]
 
 
+def lefts_of(page: Any, role: str) -> list[float]:
+    """Where the first cells of that role begin, one for each column."""
+    n_columns = page.locator("[role=columnheader]").count()
+    boxes = [cell.bounding_box() for cell in page.locator(f"[role=table] [role={role}]").all()[:n_columns]]
+    return [round(box["x"]) for box in boxes]
+
+
 def wait_for(locator: Any, text: str) -> None:
     from playwright.sync_api import expect
 
@@ -102,6 +111,36 @@ def test_the_first_look_answers_four_questions(page: Any, row: GrownRow) -> None
     assert re.search(r"0\.\d\d mm a day", " ".join(fast.split()))
     assert re.search(r"Thin \d+ fruits", to_do)
     assert len(page.locator(".trees tbody tr").all()) == 3
+
+
+def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+    path = tmp_path / "doubted.gpkg"
+    shutil.copy(row.path, path)
+    with contextlib.closing(geopackage.connect(path)) as connection, connection:
+        connection.execute("UPDATE fruits SET state = 'missed', fruit_probability = 0.3 WHERE id <= 5")
+        connection.execute("UPDATE fruits SET state = 'missed', fruit_probability = 0.9 WHERE id BETWEEN 6 AND 8")
+    write_report(path, tmp_path / "report.html", Wishes())
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        many, _, _, to_do = (" ".join(text.split()) for text in page.locator(".answer").all_inner_texts())
+        assert f"{N - 5} fruits hang" in many
+        assert "5 seen once are likelier no fruit" in many
+        assert "3 fruits hid from the last visit" in to_do
+        page.get_by_role("tab", name="Fruits").click()
+        page.get_by_label("State").select_option("hanging")
+        assert f"{N - 5} of {N} fruits" in page.locator(".filter-bar").inner_text()
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_head_of_the_table_stands_over_its_columns(browser: Any, report: Path, width: int) -> None:
+    with opened(browser, report.as_uri(), viewport={"width": width, "height": 700}) as page:
+        page.get_by_role("tab", name="Fruits").click()
+        heads = lefts_of(page, "columnheader")
+        assert len(heads) >= 10
+        assert lefts_of(page, "cell") == heads
+        top = page.locator(".heads").bounding_box()["y"]
+        page.locator(".scroller").evaluate("all => all.scrollTo(50, all.scrollHeight)")
+        assert page.locator(".heads").bounding_box()["y"] == top
+        assert lefts_of(page, "cell") == lefts_of(page, "columnheader")
 
 
 def test_the_slider_goes_through_the_season(page: Any) -> None:

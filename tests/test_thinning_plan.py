@@ -2,13 +2,16 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from growth_maker import GrownRow, grow_row
+from pomona import geopackage
 from pomona.growth.clusters import clusters_of
 from pomona.growth.fruit_drop import drop_of
 
@@ -71,6 +74,18 @@ def test_without_a_target_none_is_thinned(pomona: Pomona, row: GrownRow) -> None
     assert code == 0
     assert [line.split()[4] for line in printed.splitlines()[2:]] == ["0", "0"]
     assert pomona("thinning", row.path, "--target", "-3")[0] == 2
+
+
+def test_fruits_of_no_tree_are_not_called_all(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    path = Path(shutil.copy(row.path, tmp_path))
+    (tmp_path / "trees.csv").write_text("name,x,y,z\nA,0,0,1\nB,1.5,0,1\n")
+    assert pomona("map", "trees", path, "--trees", tmp_path / "trees.csv")[0] == 0
+    with closing(geopackage.connect(path)) as connection, connection:
+        connection.execute("UPDATE fruits SET tree_id = NULL WHERE id <= 4")
+    code, printed, _ = pomona("thinning", path, "--target", 20)
+    assert code == 0
+    counts = {line[:14].strip(): int(line[14:22]) for line in printed.splitlines() if line[14:22].strip().isdigit()}
+    assert counts == {"A": 26, "B": 30, "no tree": 4}
 
 
 def test_of_apples_near_the_harvest_none_is_foretold_to_drop(pomona: Pomona, tmp_path: Path) -> None:

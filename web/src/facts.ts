@@ -2,6 +2,9 @@
 import type { Page } from "./page";
 import { STATES, type Season, type State } from "./told/season";
 
+const MISSED = STATES.indexOf("missed");
+const GONE = STATES.indexOf("gone");
+
 export type Action = "keep" | "thin" | "drops" | "";
 
 export interface Facts {
@@ -19,6 +22,11 @@ export interface Facts {
   readonly forecastHighMm: number;
   readonly dropProbability: number;
   readonly action: Action;
+}
+
+/** Neither gone nor, once missed, likelier no fruit at all: as `pomona growth` counts. */
+export function hangs({ state, fruitProbability }: Season, fruit: number): boolean {
+  return state[fruit] !== GONE && !(state[fruit] === MISSED && fruitProbability[fruit] <= 0.5);
 }
 
 export function factsOf({ season, target }: Page, fruit: number): Facts {
@@ -46,8 +54,9 @@ export function factsOf({ season, target }: Page, fruit: number): Facts {
 }
 
 /** What to do with a fruit when each tree shall keep so many: `pomona thinning` says in which order they go. */
-export function actionOf({ thinning, state }: Season, fruit: number, target: number | null): Action {
-  if (thinning === null || STATES[state[fruit]] === "gone") return "";
+export function actionOf(season: Season, fruit: number, target: number | null): Action {
+  const { thinning } = season;
+  if (thinning === null || !hangs(season, fruit)) return "";
   const place = thinning.place[fruit];
   if (Number.isNaN(place)) return Number.isNaN(thinning.clusterSize[fruit]) ? "" : "drops";
   return target !== null && place > target ? "thin" : "keep";

@@ -1,5 +1,5 @@
 /** Which fruits are looked at: in the table, in the row and in what is exported. */
-import { actionOf, factsOf, type Action } from "./facts";
+import { actionOf, factsOf, hangs, type Action } from "./facts";
 import type { Page } from "./page";
 import { STATES, type State } from "./told/season";
 
@@ -33,7 +33,7 @@ export function passesOf(page: Page): (fruit: number) => boolean {
   return (fruit) => {
     if (tree !== null && season.tree[fruit] !== tree) return false;
     const its = STATES[season.state[fruit]];
-    if (state === "hanging" ? its === "gone" : state !== "" && its !== state) return false;
+    if (state === "hanging" ? !hangs(season, fruit) : state !== "" && its !== state) return false;
     if (action !== "" && actionOf(season, fruit, page.target.value) !== action) return false;
     if (isSized && !isBetween(factsOf(page, fruit).sizeMm, fromMm, belowMm)) return false;
     return wanted === "" || season.ids[fruit] === wanted;

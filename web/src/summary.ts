@@ -1,5 +1,5 @@
 /** Counts of what hangs, of all and by tree. */
-import { actionOf } from "./facts";
+import { actionOf, hangs } from "./facts";
 import type { Page } from "./page";
 import type { Block } from "./told/document";
 import { STATES, type Season } from "./told/season";
@@ -8,17 +8,18 @@ import { STATES, type Season } from "./told/season";
 const THINNED_BELOW_MM = 45;
 const GONE = STATES.indexOf("gone");
 
-export function hangingRows({ n, state }: Season): number[] {
-  return Array.from({ length: n }, (_, i) => i).filter((fruit) => state[fruit] !== GONE);
+export function hangingRows(season: Season): number[] {
+  return Array.from({ length: season.n }, (_, i) => i).filter((fruit) => hangs(season, fruit));
 }
 
 /** Diameters of what hangs, by the curves where there are some, else as the last visits measured them. */
-export function sizesNow({ growth, sights, ...season }: Season): number[] {
+export function sizesNow(season: Season): number[] {
+  const { growth, sights } = season;
   const of = (fruit: number): number => {
     if (growth) return growth.medianMm[fruit * growth.times.length + growth.nVisits - 1];
     return sights.diameterMm.subarray(sights.starts[fruit], sights.starts[fruit + 1]).findLast((mm) => mm > 0) ?? NaN;
   };
-  return hangingRows({ growth, sights, ...season })
+  return hangingRows(season)
     .map(of)
     .filter((mm) => !Number.isNaN(mm));
 }
@@ -50,7 +51,7 @@ export function treeSummaries({ season, target }: Page): TreeSummary[] {
   for (let fruit = 0; fruit < season.n; fruit++) {
     const count = counts[season.tree[fruit]];
     if (season.state[fruit] === GONE) count.gone++;
-    else count.fruits++;
+    if (hangs(season, fruit)) count.fruits++;
     const action = actionOf(season, fruit, target.value);
     if (action === "drops") count.drops++;
     if (action === "thin") {

@@ -50,7 +50,12 @@ def thinning(
     say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
     for tree in trees:
         counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"
-        say(f"  {(tree['tree'] or 'all')[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
+        say(f"  {(tree['tree'] or _of_none(trees))[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
+
+
+def _of_none(trees: list[dict[str, Any]]) -> str:
+    """Name the fruits of no tree, which are all where no tree is known."""
+    return "no tree" if len(trees) > 1 else "all"
 
 
 def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:

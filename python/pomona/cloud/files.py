@@ -17,13 +17,16 @@ from pomona.errors import PomonaError, PomonaWarning
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
 
-__all__ = ["PLAUSIBLE_DIAMETER_M", "check_spacing", "read_cloud", "write_cloud"]
+__all__ = ["PLAUSIBLE_DIAMETER_M", "check_places", "read_cloud", "write_cloud"]
 
 MIN_SPACING_M = 0.005
 """Centres of two fruits cannot be nearer than a fruit is wide, and the smallest berries are 5 mm wide."""
 
 MAX_SPACING_M = 5.0
 """A fruit has a neighbour on its tree, and trees are under 5 m; fruits 6 cm apart are 60 away in mm, 6 in cm."""
+
+FARTHEST_FRUIT_M = 10_000.0
+"""From the middle of a visit: nobody films a longer row in one go, and one slip of a digit hides all else."""
 
 PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
 """From the smallest berry to the largest melon: a median outside speaks of a wrong unit."""
@@ -49,7 +52,7 @@ def read_cloud(path: Path, unit: Unit, make: type[FruitCloud]) -> FruitCloud:
     cloud = csv_file.read(path, make) if suffix == ".csv" else ply_file.read(path, make)
     cloud = _in_metres(cloud, METRES_PER_UNIT[unit])
     if unit != "free":
-        check_spacing(path, cloud.positions)
+        check_places(path, cloud.positions)
     return cloud
 
 
@@ -66,16 +69,12 @@ def write_cloud(path: Path, cloud: FruitCloud) -> None:
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv or .ply")
 
 
-def check_spacing(path: Path, positions: NDArray[np.float64]) -> None:
-    """Warn when the distances between neighbours, (N, 3) metres, cannot be those of fruits."""
-    from scipy.spatial import cKDTree
-
+def check_places(path: Path, positions: NDArray[np.float64]) -> None:
+    """Warn when places, (N, 3) metres, cannot be those of fruits: by their neighbours, or one far from all others."""
     if len(positions) < MIN_FRUITS:
         return
-    sample = positions[:: -(-len(positions) // SPACING_SAMPLE)]
-    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
-    distances_m, _ = tree.query(sample, k=[2])  # the first neighbour is the fruit itself
-    spacing_m = float(np.median(distances_m))
+    spacing_m = _spacing_m(positions)
+    reach_m = np.linalg.norm(positions - np.median(positions, axis=0), axis=1)
     if not MIN_SPACING_M <= spacing_m <= MAX_SPACING_M:
         warnings.warn(
             f"{path}: neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to "
@@ -83,6 +82,23 @@ def check_spacing(path: Path, positions: NDArray[np.float64]) -> None:
             PomonaWarning,
             stacklevel=4,
         )
+    elif reach_m.max() > FARTHEST_FRUIT_M:
+        warnings.warn(
+            f"{path}: row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at "
+            f"most {FARTHEST_FRUIT_M:g} m",
+            PomonaWarning,
+            stacklevel=4,
+        )
+
+
+def _spacing_m(positions: NDArray[np.float64]) -> float:
+    """Return the median distance of a fruit from its next."""
+    from scipy.spatial import cKDTree
+
+    sample = positions[:: -(-len(positions) // SPACING_SAMPLE)]
+    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
+    distances_m, _ = tree.query(sample, k=[2])  # the first neighbour is the fruit itself
+    return float(np.median(distances_m))
 
 
 def _in_metres(cloud: FruitCloud, metres: float) -> FruitCloud:

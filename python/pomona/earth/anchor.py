@@ -62,7 +62,7 @@ class Anchor:
 def anchored(
     positions_in_map: NDArray[np.float64],
     geodetic: NDArray[np.float64],
-    up_in_map: NDArray[np.float64],
+    up_in_map: NDArray[np.float64] | None,
     *,
     free_scale: bool = False,
 ) -> Anchor:
@@ -77,14 +77,15 @@ def anchored(
         Two or more.
     geodetic : (N, 3) float64
         The same points: longitude, latitude in degrees, height in metres; NaN where the height is not known.
-    up_in_map : (3,) float64
+    up_in_map : (3,) float64 or None
+        Where it is not known the points must tell the whole rotation.
     free_scale : bool
         Whether the map's metres may be longer or shorter than the Earth's.
 
     Raises
     ------
     PomonaError
-        When there are fewer than two points, or all lie together.
+        When there are fewer than two points, all lie together, or nothing tells the vertical.
     """
     if len(positions_in_map) < 2:
         raise PomonaError(f"found {len(positions_in_map)} known points, expected two or more")
@@ -92,22 +93,11 @@ def anchored(
     origin = geodetic.mean(axis=0)
     start = Anchor(np.eye(4), float(origin[0]), float(origin[1]), float(origin[2]) if has_heights else None)
     enu = start.east_north_up(np.nan_to_num(geodetic) if not has_heights else geodetic)
-    level = _level(up_in_map)
-    apart = float(np.linalg.svd(_centred((positions_in_map @ level.T)[:, :2]))[1][0])
-    if apart < LEAST_APART_M / np.sqrt(2.0):
-        raise PomonaError(
-            f"known points reach {apart * np.sqrt(2.0):.2g} m in plan, expected {LEAST_APART_M:g} m or more: nearer "
-            "ones tell no heading"
-        )
     if has_heights and _spread(positions_in_map) >= LEAST_SPREAD_M and _spread(enu) >= LEAST_SPREAD_M:
-        turn, before = np.eye(3), positions_in_map
-        rotation, scale = _rotation(before, enu, free_scale)
+        rotation, scale = _rotation(positions_in_map, enu, free_scale)
+        linear = scale * rotation
     else:
-        turn, before = level, positions_in_map @ level.T
-        flat, scale = _rotation(before[:, :2], enu[:, :2], free_scale)
-        rotation = np.eye(3)
-        rotation[:2, :2] = flat
-    linear = scale * rotation @ turn
+        linear = _upright(positions_in_map, enu, up_in_map, free_scale)
     enu_from_map = np.eye(4)
     enu_from_map[:3, :3] = linear
     enu_from_map[:3, 3] = (enu - positions_in_map @ linear.T).mean(axis=0)
@@ -115,6 +105,32 @@ def anchored(
         # Heights count from the height of the points in the map.
         enu_from_map[2, 3] = -(positions_in_map @ linear[2]).mean()
     return Anchor(enu_from_map, start.longitude_deg, start.latitude_deg, start.height_m)
+
+
+def _upright(
+    positions_in_map: NDArray[np.float64],
+    enu: NDArray[np.float64],
+    up_in_map: NDArray[np.float64] | None,
+    free_scale: bool,
+) -> NDArray[np.float64]:
+    """Return what turns, and scales, the map by the heading of the points, its vertical upright, (3, 3)."""
+    if up_in_map is None:
+        raise PomonaError(
+            "found no cameras in the map, which would tell the vertical, expected --up X,Y,Z, or known points with "
+            "heights that reach 2 m in two directions"
+        )
+    level = _level(up_in_map)
+    before = positions_in_map @ level.T
+    apart = float(np.linalg.svd(_centred(before[:, :2]))[1][0])
+    if apart < LEAST_APART_M / np.sqrt(2.0):
+        raise PomonaError(
+            f"known points reach {apart * np.sqrt(2.0):.2g} m in plan, expected {LEAST_APART_M:g} m or more: nearer "
+            "ones tell no heading"
+        )
+    flat, scale = _rotation(before[:, :2], enu[:, :2], free_scale)
+    rotation = np.eye(3)
+    rotation[:2, :2] = flat
+    return np.asarray(scale * rotation @ level)
 
 
 def _centred(points: NDArray[np.float64]) -> NDArray[np.float64]:

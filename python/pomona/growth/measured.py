@@ -13,6 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import BearingTrees, bearing_trees
 from pomona.orchard import Observations, OrchardMap
+from pomona.orchard.hanging import may_hang
 
 __all__ = ["MeasuredFruits", "measured_fruits", "require_two_days"]
 
@@ -61,8 +62,7 @@ class MeasuredFruits:
     @property
     def hanging(self) -> NDArray[np.bool_]:
         """Which fruits hang for all that the map knows, (N,); all, once none does: the season is looked back at."""
-        states = self.cloud.extras.get("state", ("seen",) * len(self.ids))
-        hanging = np.array([state != "gone" for state in states], dtype=bool)
+        hanging = may_hang(self.cloud)
         return hanging if hanging.any() else np.ones(len(self.ids), dtype=bool)
 
     @property

@@ -22,6 +22,9 @@ from pomona.growth.size_table import SizeTable
 
 __all__ = ["SeasonGrowth", "grow_season", "growth_of"]
 
+SEASON_DAYS = 200
+"""From bloom to the last harvest: a later day is one of another season, of which these curves know nothing."""
+
 
 @dataclass(frozen=True, eq=False)
 class SeasonGrowth:
@@ -82,7 +85,8 @@ def grow_season(
     Raises
     ------
     PomonaError
-        When the map has sizes of one day only, the harvest lies before the last visit, or a file is wrong.
+        When the map has sizes of one day only, the harvest lies before the last visit or in another season, or a file
+        is wrong.
     """
     fruits = measured_fruits(orchard)
     require_two_days(fruits)
@@ -99,6 +103,11 @@ def growth_of(
     """Tell the growth of fruits whose sizes are at hand; see `grow_season`."""
     if harvest is not None and harvest < fruits.days[-1]:
         raise PomonaError(f"--harvest: found {harvest}, expected the last visit's day or later: {fruits.days[-1]}")
+    if harvest is not None and (harvest - fruits.days[-1]).days > SEASON_DAYS:
+        raise PomonaError(
+            f"--harvest: found {harvest}, expected a day of the same season, at most {SEASON_DAYS} days after the last "
+            f"visit: {fruits.days[-1]}"
+        )
     moments, trees = fruits.moments, fruits.trees.numbers
     put_aside = odd_measurements(SizeTable.of(fruits.diameters_mm, trees, CALENDAR.times(moments)))
     kept_mm = np.where(put_aside, np.nan, fruits.diameters_mm)

@@ -265,6 +265,11 @@ def require_new(connection: sqlite3.Connection, session: Session, content: str) 
     if not columns[0]:
         raise WrongContentError("has no session, expected at least one")
     for name, content_sha256, input_hashes in zip(*columns, strict=True):
+        if name == session.name and content_sha256 != content:
+            raise WrongContentError(
+                f"another session is called {name}, with other fruits, expected a name that the map does not have: "
+                "`map add --name` gives one, --replace takes the other's place"
+            )
         if name == session.name:
             raise WrongContentError(f"session {name} is in the map already")
         if content_sha256 == content:

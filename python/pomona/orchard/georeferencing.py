@@ -77,7 +77,7 @@ def georeference(
     session : str, optional
         Whose frames or times the table tells; not needed where only one session has poses.
     up_in_map : (3,) float64, optional
-        The vertical; that of the cameras on average otherwise.
+        The vertical; that of the cameras on average otherwise, where the map has some.
     within_m : float
         A known point that is farther off is refused.
     free_scale : bool
@@ -97,7 +97,7 @@ def georeference(
         up = _up(connection) if up_in_map is None else np.asarray(up_in_map, np.float64)
         anchor = anchored(positions, table.geodetic, up, free_scale=free_scale)
         off_m = anchor.off_m(positions, table.geodetic)
-        _require_near(table, positions, anchor, off_m, within_m)
+        _require_near(table, positions, anchor, up, off_m, within_m)
         scale = float(np.cbrt(np.linalg.det(anchor.enu_from_map[:3, :3])))
         found = Georeferenced(anchor, table.names, off_m, scale)
         _write(connection, found, table, positions, named, frames)
@@ -148,12 +148,12 @@ def _way(
     return next(iter(ways.items()))
 
 
-def _up(connection: sqlite3.Connection) -> NDArray[np.float64]:
-    """Return the vertical that the cameras have on average; without cameras, the map's y is down as theirs."""
+def _up(connection: sqlite3.Connection) -> NDArray[np.float64] | None:
+    """Return the vertical that the cameras have on average; without cameras nobody tells."""
     (ids,) = columns_of(connection, "sessions", ("id",))
     ways = [way[2] for session_id in ids if (way := cameras_in_map(connection, session_id)) is not None]
     if not ways:
-        return np.array([0.0, -1.0, 0.0])
+        return None
     return np.asarray(-np.concatenate(ways)[:, :3, DOWN_IN_CAMERA].mean(axis=0))
 
 
@@ -161,6 +161,7 @@ def _require_near(
     table: ControlTable,
     positions: NDArray[np.float64],
     anchor: Anchor,
+    up_in_map: NDArray[np.float64] | None,
     off_m: NDArray[np.float64],
     within_m: float,
 ) -> None:
@@ -168,7 +169,7 @@ def _require_near(
     far = np.sqrt(np.nansum(off_m**2, axis=1))
     if far.max() <= within_m:
         return
-    row = _worst(table, positions, far)
+    row = _worst(table, positions, up_in_map, far)
     if len(far) == 2:
         enu = anchor.east_north_up(np.nan_to_num(table.geodetic))
         in_map, on_earth = (float(np.linalg.norm(points[0] - points[1])) for points in (positions, enu))
@@ -182,7 +183,12 @@ def _require_near(
     )
 
 
-def _worst(table: ControlTable, positions: NDArray[np.float64], far: NDArray[np.float64]) -> int:
+def _worst(
+    table: ControlTable,
+    positions: NDArray[np.float64],
+    up_in_map: NDArray[np.float64] | None,
+    far: NDArray[np.float64],
+) -> int:
     """Return the point without which the others agree best; of many, the farthest."""
     if not 3 <= len(far) <= 50:
         return int(np.argmax(far))
@@ -190,7 +196,7 @@ def _worst(table: ControlTable, positions: NDArray[np.float64], far: NDArray[np.
     for row in range(len(far)):
         rest = np.arange(len(far)) != row
         try:
-            anchor = anchored(positions[rest], table.geodetic[rest], np.array([0.0, -1.0, 0.0]))
+            anchor = anchored(positions[rest], table.geodetic[rest], up_in_map)
         except PomonaError:
             left.append(np.inf)
             continue

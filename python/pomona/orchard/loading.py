@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud, Unit
-from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_spacing
+from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_places
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import read_session
@@ -45,7 +45,7 @@ def load_session(path: str | Path, *, date: str | None = None, unit: Unit | None
     with _doubts_refused(is_said=unit is not None):
         session = read(path, date, unit)
         if unit is None:
-            check_spacing(path, session.cloud.positions)
+            check_places(path, session.cloud.positions)
             _check_diameters(path, session.cloud.diameters_m)
     return session
 

@@ -16,6 +16,7 @@ from pomona import _core, geopackage
 from pomona.cloud import FruitCloud
 from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, KnownVisit
+from pomona.orchard.hanging import may_hang
 from pomona.settings import Settings
 from pomona.store.failures import WrongContentError
 from pomona.store.rows import columns_of, one_of
@@ -95,9 +96,8 @@ def recognised(
 
 def worth_recognising(fruits: FruitCloud) -> FruitCloud:
     """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
-    judged = zip(fruits.extras["state"], fruits.extras["fruit_probability"], strict=True)
-    may_hang = np.array([state != "gone" and (state != "missed" or float(p or 1) > 0.5) for state, p in judged], bool)
-    return fruits.select(may_hang) if may_hang.any() else fruits
+    hanging = may_hang(fruits)
+    return fruits.select(hanging) if hanging.any() else fruits
 
 
 def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings, asked: str) -> list[int]:

@@ -3,6 +3,7 @@ import { element, replaceAll, type Child } from "../elements";
 import type { Page } from "../page";
 import { advice } from "./advice";
 import { hangingRows, sizesNow } from "../summary";
+import { STATES, type Season } from "../told/season";
 import { day, mm, number, whole } from "../words";
 
 export function answers(page: Page): HTMLElement {
@@ -22,10 +23,16 @@ const line = (text: string): HTMLElement => element("p", { class: "soft" }, text
 function howMany({ season }: Page): HTMLElement {
   const hanging = hangingRows(season);
   const named = season.trees.filter((tree) => tree.name).length;
-  const gone = season.n - hanging.length;
   const where = named > 0 ? `on ${named} trees, ${whole(hanging.length / named)} a tree` : "no single trees known";
+  return answer("How many", whole(hanging.length), "fruits hang", line(where), ...others(season, hanging.length).map(line));
+}
+
+/** What was seen and is not counted. */
+function others({ n, state }: Season, nHanging: number): string[] {
+  const gone = state.filter((one) => STATES[one] === "gone").length;
+  const doubted = n - nHanging - gone;
   const lost = gone > 0 ? gone === 1 ? "1 more was seen and is gone" : `${whole(gone)} more were seen and are gone` : "none is gone so far";
-  return answer("How many", whole(hanging.length), "fruits hang", line(where), line(lost));
+  return doubted > 0 ? [lost, `${whole(doubted)} seen once ${doubted === 1 ? "is" : "are"} likelier no fruit`] : [lost];
 }
 
 function howBig({ season }: Page): HTMLElement {

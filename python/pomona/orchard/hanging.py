@@ -1,0 +1,27 @@
+"""Which fruits of a map still hang, for all that it knows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.cloud import FruitCloud
+
+__all__ = ["may_hang"]
+
+LIKELY = 0.5
+"""Probability of being a fruit above which one that was missed is one."""
+
+
+def may_hang(fruits: FruitCloud) -> NDArray[np.bool_]:
+    """Tell the fruits, (N,), that are neither gone nor, once missed, likelier no fruit at all.
+
+    Parameters
+    ----------
+    fruits : FruitCloud
+        Of a map, with the columns ``state`` and ``fruit_probability``; what they do not say speaks for it.
+    """
+    unsaid = ("",) * len(fruits)
+    states, chances = (fruits.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
+    judged = zip(states, chances, strict=True)
+    return np.array([state != "gone" and (state != "missed" or float(p or 1) > LIKELY) for state, p in judged], bool)
