@@ -167,7 +167,11 @@ def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, sess
     assert json.loads(output.read_text())["type"] == "FeatureCollection"
     for name, flags, said in (
         ("a.geojson", ["--to", "csv"], "found suffix '.geojson' and --to csv, expected the same or one of them"),
-        ("a.dxf", [], "found suffix '.dxf', expected .csv, .ply, .geojson, .json, .shp, .parquet, or --to FORMAT"),
+        (
+            "a.dxf",
+            [],
+            "found suffix '.dxf', expected .csv, .ply, .geojson, .json, .shp, .parquet, .mcap, or --to FORMAT",
+        ),
         ("a.txt", ["--to", "shp"], "a Shapefile is five files, expected a name that ends in .shp"),
     ):
         code, out, err = pomona("export", session_file, "-o", session_file.with_name(name), *flags)

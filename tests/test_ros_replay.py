@@ -232,6 +232,15 @@ def test_nothing_is_overwritten(replayed, tmp_path):
         assert taken.read_bytes() == b"years of work"
 
 
+def test_only_an_mcap_is_called_so_and_pipes_get_one_too(replayed, tmp_path):
+    output = tmp_path / "out.bag"
+    refused(replay(replayed.bag.path, output, "--map", MAP), output, "found suffix '.bag', expected .mcap")
+    command = [sys.executable, "-m", "pomona", "ros", "replay", str(replayed.bag.path), "-", "--map", str(MAP)]
+    done = subprocess.run([*command, "--detections", str(replayed.bag.boxes)], capture_output=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == replayed.output.read_bytes()
+
+
 def test_a_replayed_bag_is_not_replayed_again(replayed, tmp_path):
     done = replay(replayed.output, tmp_path / "twice.mcap", "--map", MAP, "--detections", replayed.bag.boxes)
     refused(done, tmp_path / "twice.mcap", "replayed already", "/pomona/detections")

@@ -130,9 +130,13 @@ def require_unused(output: Path) -> None:
     Raises
     ------
     PomonaError
-        When something is there.
+        When something is there, or its name is that of another kind of file.
     """
-    if output.exists() and not is_stream(output):
+    if is_stream(output):
+        return
+    if output.suffix.lower() != ".mcap":
+        raise PomonaError(f"{output}: found suffix {output.suffix!r}, expected .mcap: that is what is written")
+    if output.exists():
         raise PomonaError(f"{output}: is there already, expected a new file: nothing is overwritten")
 
 

@@ -63,7 +63,7 @@ def odometry_message(
     """Make a `nav_msgs/Odometry` of the body in the frame of the map.
 
     The speed is the mean one since the pose before, in the body's axes; its covariance is that of two poses whose
-    errors share nothing, which is the most it can be. Where there is none before, it is `UNKNOWN_SPEED`.
+    errors share nothing, too large rather than too small. Where there is none before, it is `UNKNOWN_SPEED`.
     """
     speed, covariance = _speed(pose, before)
     twist = types("geometry_msgs/msg/Twist")(linear=vector_of(types, speed[:3]), angular=vector_of(types, speed[3:]))
