@@ -51,6 +51,9 @@ SCALE2 = 3.0
 LEAST_WEIGHT = 0.01
 """Of a pair that is surely wrong: one of none has a variance without end."""
 
+LEAST_SIGMA = 1e-6
+"""Of ln s: no camera and no map is straight to a micrometre in a metre, whatever two copies of one cloud say."""
+
 TINY = 1e-12
 
 FITS = 10
@@ -168,7 +171,7 @@ def _mean_over(bends: list[_Bend]) -> tuple[float, float]:
     steps = np.array([bend.step for bend in bends])
     mean = float(probabilities @ steps)
     variances = np.array([bend.variance for bend in bends]) + (steps - mean) ** 2
-    return mean, float(np.sqrt(probabilities @ variances))
+    return mean, max(float(np.sqrt(probabilities @ variances)), LEAST_SIGMA)
 
 
 def _columns(placed: Array) -> Array:
