@@ -2,7 +2,8 @@
 
 Pairs of fruits, m in the map and q in the model, are off by e = m - (s R q + t). Noise of each fruit is one part of e,
 the other moves what is near together: drift, sag, a reconstruction that is not straight. Cov(e) = v (D + r K), with D
-the X as independent, the residuals of a bent row give a scale that is several times surer than it is.
+the variances of the fruits and K_ij a function of |m_i - m_j| / l, rough as drift or smooth as a bend; v, r and l are
+unknown. Treated as independent, the residuals of a bent row give a scale that looks surer than it is.
 
 For each r, l and shape of a grid, turn, place and ln s are the generalised least squares, whose restricted likelihood
 (Patterson and Thompson, 1971) knows that seven numbers were fitted to the same residuals. The answer is the mean over
