@@ -132,7 +132,7 @@ def reconstructions_of(data: Path, _draws: int) -> Iterator[tuple[str, Found]]:
             _reconstructed(data / "rendered_row", dates[seed % 2], dates[1 - seed % 2], boxes, seed) for seed in (0, 1)
         ]
         for date, one in zip(dates, found, strict=True):
-            yield f"reconstruction of {date}, {boxes} boxes", [one]
+            yield f"model of {date}, {boxes} boxes", [one]
 
 
 def _reconstructed(row: Path, query: str, map_: str, boxes: str, seed: int) -> tuple[Upgrade, float]:

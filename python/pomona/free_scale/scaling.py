@@ -2,7 +2,8 @@
 
 Pairs of fruits, m in the map and q in the model, are off by e = m - (s R q + t). Noise of each fruit is one part of e,
 the other moves what is near together: drift, sag, a reconstruction that is not straight. Cov(e) = v (D + r K), with D
-the X as independent, the residuals of a bent row give a scale that is several times surer than it is.
+the variances of the fruits and K_ij a function of |m_i - m_j| / l, rough as drift or smooth as a bend; v, r and l are
+unknown. Treated as independent, the residuals of a bent row give a scale that looks surer than it is.
 
 For each r, l and shape of a grid, turn, place and ln s are the generalised least squares, whose restricted likelihood
 (Patterson and Thompson, 1971) knows that seven numbers were fitted to the same residuals. The answer is the mean over
@@ -50,6 +51,9 @@ SCALE2 = 3.0
 
 LEAST_WEIGHT = 0.01
 """Of a pair that is surely wrong: one of none has a variance without end."""
+
+LEAST_SIGMA = 1e-6
+"""Of ln s: no camera and no map is straight to a micrometre in a metre, whatever two copies of one cloud say."""
 
 TINY = 1e-12
 
@@ -168,7 +172,7 @@ def _mean_over(bends: list[_Bend]) -> tuple[float, float]:
     steps = np.array([bend.step for bend in bends])
     mean = float(probabilities @ steps)
     variances = np.array([bend.variance for bend in bends]) + (steps - mean) ** 2
-    return mean, float(np.sqrt(probabilities @ variances))
+    return mean, max(float(np.sqrt(probabilities @ variances)), LEAST_SIGMA)
 
 
 def _columns(placed: Array) -> Array:

@@ -44,7 +44,9 @@ def stored_cloud(path: Path, make: type[FruitCloud], *, in_metres: bool = True) 
             return fruits_in_map(connection, make)
         about = only_session(connection)
         if in_metres and is_scale_free(about["configuration"]):
-            raise PomonaError(f"{path}: was triangulated without a scale, expected metres: only a match with --scale free takes it")
+            raise PomonaError(
+                f"{path}: was triangulated without a scale, expected metres: only a match with --scale free takes it"
+            )
         return observed_cloud(connection, about["id"], make)
 
 
