@@ -206,8 +206,9 @@ def report(rows: list[dict[str, object]], found: dict[tuple[str, str], tuple[Arr
 
 
 NOTES = """End: error of the last pose seen from the first one, over the distance. Rms: of all poses after the rigid
-motion that fits positions and orientations best, over the distance. Segments: KITTI's measure, mean over all sub-drives
-of 1 to 6 m (rendered row) and 10 to 50 m (KITTI, whose own measure begins at 100 m). Honest: median squared error of
+motion that fits positions and orientations best, over the distance. Segments: as KITTI's measure, mean over all
+sub-drives of 1 to 6 m (rendered row) and 10 to 50 m (KITTI, whose own measure begins at 100 m); each ends at the pose
+nearest to its length, KITTI's at the first beyond, which shows a twentieth more. Honest: median squared error of
 relative motions by their information, over what it is for true information (on KITTI the truth itself is off by more
 than that). Keyframe: CPU time of the median keyframe; CPU and wall: mean over all frames. With fruits: the same poses,
 refined with the fruits in true boxes with true names, depth from stereo."""
