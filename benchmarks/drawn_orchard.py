@@ -35,13 +35,13 @@ class Query:
     seen : (N, 3) float64
         Metres.
     map_from_query : (4, 4) float64
-    up : ((3,), (3,)) float64
+    up : list of 2 lists
         The vertical in the query and in the map.
     """
 
     seen: Places
     map_from_query: NDArray[np.float64]
-    up: tuple[Places, Places]
+    up: list[list[float]]
 
 
 def drawn_rows(rng: np.random.Generator, first_row: int, n_trees: int) -> Places:
@@ -110,4 +110,6 @@ def moved(rng: np.random.Generator, seen: Places) -> Query:
     pose[:3, :3], pose[:3, 3] = turn, middle
     lean = unit_vectors(rng, (1,))[0] * np.deg2rad(rng.normal(0.0, 2.0))
     up = np.array([0.0, 0.0, 1.0])
-    return Query((rng.permutation(seen) - middle) @ turn, pose, (turn.T @ (up + np.cross(lean, up)), up))
+    return Query(
+        (rng.permutation(seen) - middle) @ turn, pose, [(turn.T @ (up + np.cross(lean, up))).tolist(), up.tolist()]
+    )

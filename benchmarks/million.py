@@ -132,7 +132,8 @@ def asked(index: Index, queries: Iterator[Query], *, up: bool) -> dict[str, obje
 
 
 def is_right(match: Match, query: Query) -> bool:
-    return bool(match) and pose_error(match.map_from_query, query.map_from_query, query.seen).success
+    pose = match.map_from_query if match else None
+    return pose is not None and pose_error(pose, query.map_from_query, query.seen).success
 
 
 def resident_mb() -> float:

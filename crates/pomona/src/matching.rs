@@ -70,7 +70,7 @@ impl MapIndex {
         let prepared = match method {
             Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => {
                 return match scale {
-                    Scale::Metric => Self::compacted(given, map, config),
+                    Scale::Metric => Self::compacted(given, map, &config),
                     Scale::Free => Err(too_many(fruits.len(), crate::verified::MAX_FRUITS)),
                 };
             }
@@ -89,16 +89,16 @@ impl MapIndex {
     pub fn compact(map: &FruitCloud, config: Config) -> Result<Self> {
         map.validate()?;
         config.validate()?;
-        Self::compacted(map, Conditioned::new(map, Scale::Metric), config)
+        Self::compacted(map, Conditioned::new(map, Scale::Metric), &config)
     }
 
-    fn compacted(given: &FruitCloud, map: Conditioned, config: Config) -> Result<Self> {
+    fn compacted(given: &FruitCloud, map: Conditioned, config: &Config) -> Result<Self> {
         if map.cloud.len() > compact::MOST {
             return Err(too_many(map.cloud.len(), compact::MOST));
         }
         let (index, map) = CompactMap::new(given, map);
         let prepared = PreparedMap::Compact(Box::new(index));
-        Ok(Self { map, config, method: Method::Verified, scale: Scale::Metric, prepared })
+        Ok(Self { map, config: *config, method: Method::Verified, scale: Scale::Metric, prepared })
     }
 
     /// The compact index of `map` that was kept as `bytes`; they are read as they are needed.

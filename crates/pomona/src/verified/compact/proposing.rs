@@ -79,7 +79,7 @@ pub(super) fn proposals(
             for look in looks {
                 effort.codes += 1;
                 let Some(proposer) = Proposer::new(query, ground, model, look.quad) else { continue };
-                shapes.within(&look.shape, (RADIUS * model.sigma / step) as f32, &mut runs, |target| {
+                shapes.within(look.shape, (RADIUS * model.sigma / step) as f32, &mut runs, |target| {
                     effort.candidates += 1;
                     let Some((pose, residual)) = proposer.fit(&target) else { return };
                     if residual > 2.0 * (RADIUS * model.sigma).powi(2) {

@@ -77,7 +77,7 @@ impl<'a> Shapes<'a> {
     }
 
     /// Calls `visit` with every seed whose code is within `radius` of `shape`, both in steps.
-    pub(super) fn within(&self, shape: &Shape, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Quad)) {
+    pub(super) fn within(&self, shape: Shape, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Quad)) {
         let limit = (radius * radius).min(f32::from(u16::MAX - 1)) as u16;
         self.facts.cells.near(&shape.map(f32::from), radius, runs, |cells| {
             let (first, end) = (self.starts[cells.start] as usize, self.starts[cells.end] as usize);
@@ -116,9 +116,9 @@ impl<'a> Shapes<'a> {
 
 /// Up to the largest number of 16 bits.
 #[inline]
-fn squared_distances(codes: &[u8], shape: &Shape) -> [u16; LANES] {
+fn squared_distances(codes: &[u8], shape: Shape) -> [u16; LANES] {
     let mut sums = [0u16; LANES];
-    for (numbers, &own) in codes.chunks_exact(LANES).zip(shape) {
+    for (numbers, own) in codes.chunks_exact(LANES).zip(shape) {
         for (sum, &number) in sums.iter_mut().zip(numbers) {
             let apart = u16::from(number.abs_diff(own));
             *sum = sum.saturating_add(apart * apart);

@@ -85,7 +85,7 @@ fn an_index_of_another_map_is_refused() {
     let (_, map) = visits(0.02);
     let mut moved = map.clone();
     moved.positions[7].x += 1e-9;
-    let refused = opened(&kept(&map), &moved).err().expect("the map has changed");
+    let refused = opened(&kept(&map), &moved).expect_err("the map has changed");
     assert!(refused.to_string().contains("another map"), "{refused}");
 }
 
