@@ -16,7 +16,7 @@ def write_picture(rows: Sequence[dict[str, Any]]) -> None:
     for key in TIMES:
         times.loglog(fruits, [row[key] for row in rows], "o-", label=key.replace(" cpu_s", "").replace(",", ""))
     times.set(xlabel="fruits in the map", ylabel="CPU seconds")
-    for key in ("file_mb", "resident_mb", "make peak_mb"):
+    for key in ("file_mb", "resident_mb"):
         memory.loglog(fruits, [row[key] for row in rows], "o-", label=key.removesuffix("_mb"))
     memory.set(xlabel="fruits in the map", ylabel="MB")
     for name in ("visit", "visit up", "frame", "frame up"):

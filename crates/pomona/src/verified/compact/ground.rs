@@ -70,8 +70,11 @@ impl<'a> Ground<'a> {
         let mut own: Vec<CellKey> = places.map(|place| cell_of(&place, self.inverse_cell)).collect();
         distinct(&mut own);
         let steps = move || -reach..=reach;
-        let near = |[x, y, z]: CellKey| {
-            steps().flat_map(move |dx| steps().flat_map(move |dy| steps().map(move |dz| [x + dx, y + dy, z + dz])))
+        let near = |cell: CellKey| {
+            let beside = move |axis: usize, step: i64| cell[axis].saturating_add(step);
+            steps().flat_map(move |dx| {
+                steps().flat_map(move |dy| steps().map(move |dz| [beside(0, dx), beside(1, dy), beside(2, dz)]))
+            })
         };
         let mut cells: Vec<CellKey> = own.into_iter().flat_map(near).collect();
         distinct(&mut cells);
