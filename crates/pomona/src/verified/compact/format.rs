@@ -56,7 +56,7 @@ impl CompactMap {
             return wrong("made from another map, or the map has changed since");
         }
         let index = Self::over(facts, bytes, content.len(), lengths)?;
-        if sum_of_all(&index.columns()) != sum || !index.is_sound() {
+        if sum_of_all(&index.columns()) != sum || !is_padded_by_nothing(content, &lengths) || !index.is_sound() {
             return wrong("the file is damaged: its checksum is not that of its content");
         }
         Ok(index)
@@ -119,6 +119,16 @@ impl CompactMap {
             && self.labels.get().len() == seeds
             && self.codes.get().len() == seeds.div_ceil(LANES) * LANES * NUMBERS
     }
+}
+
+/// Whether the bytes between the columns, which no sum holds, are zero; the lengths are those of `content`.
+fn is_padded_by_nothing(content: &[u8], lengths: &[usize; COLUMNS]) -> bool {
+    let mut end = HEADER * 8;
+    lengths.iter().all(|length| {
+        let padding = end + length..end + length.next_multiple_of(ALIGNED);
+        end = padding.end;
+        content[padding].iter().all(|&byte| byte == 0)
+    })
 }
 
 fn wrong<T>(reason: &str) -> Result<T> {

@@ -4,7 +4,7 @@
 //! fruit: 7 kB each. Most of that is never used in a large map. A shape that thousands of places show says nothing about
 //! the place, and only few places are ever looked at closely. So here
 //!
-//! 1. the map keeps the seeds of rare shape, some [`making::KEPT`] a fruit, and which shapes are common (`making`);
+//! 1. the map keeps the seeds of rare shape, 48 a fruit on average, and which shapes are common (`making`);
 //! 2. a query looks up its own seeds, those of the rarest shape first, with all labelings that noise could have made, until it
 //!    has met as many candidates as a budget allows (`proposing`);
 //! 3. the map around the best candidates is cut out, and what is cut out is verified as a small map is, against what chance
