@@ -88,17 +88,22 @@ def run_afresh(folder: Path, *flags: str, cores: int | None = None) -> Run:
 
 
 def run_with_killed_workers(folder: Path, seed: int, kills: int) -> Run:
-    """Run a farm from nothing while workers are killed at random moments."""
-    shutil.rmtree(folder / "results", ignore_errors=True)
-    begun_s, killed = time.monotonic(), list[int]()
-    with _started(folder, "--workers", "2") as process:
-        killer = threading.Thread(target=_kill_workers, args=(process.pid, random.Random(seed), kills, killed))
-        killer.start()
-        told = _told(process)
-    killer.join()
-    if process.returncode or len(killed) < kills:
-        raise SystemExit(f"{len(killed)} workers were killed, and the run ended with {process.returncode}")
-    return Run(time.monotonic() - begun_s, *_counts(told), made_by(folder))
+    """Run a farm from nothing while workers are killed at random moments, again until so many were."""
+    dice, begun_s, killed, told = random.Random(seed), time.monotonic(), list[int](), list[tuple[str, str]]()
+    made: list[dict[str, object]] = []
+    while len(killed) < kills:
+        shutil.rmtree(folder / "results", ignore_errors=True)
+        with _started(folder, "--workers", "2") as process:
+            killer = threading.Thread(target=_kill_workers, args=(process.pid, dice, kills, killed))
+            killer.start()
+            told += [(event, f"{step} of run {len(made)}") for event, step in _told(process)]
+        killer.join()
+        if process.returncode:
+            raise SystemExit(f"the run ended with exit code {process.returncode}, {len(killed)} workers killed")
+        made.append(made_by(folder))
+    if any(one != made[0] for one in made):
+        raise SystemExit("killed workers made different results")
+    return Run(time.monotonic() - begun_s, *_counts(told), made[0])
 
 
 def run_and_kill(folder: Path, seed: int, kills: int) -> Run:
@@ -152,7 +157,7 @@ def _kill_workers(run: int, dice: random.Random, kills: int, killed: list[int]) 
     """Kill a worker now and then, as often as asked or until the run ends."""
     with contextlib.suppress(FileNotFoundError):
         while len(killed) < kills:
-            time.sleep(dice.uniform(1, 9))
+            time.sleep(dice.uniform(4, 12))
             children = Path(f"/proc/{run}/task/{run}/children").read_text(encoding="ascii").split()
             for child in dice.sample(children, min(1, len(children))):
                 with contextlib.suppress(ProcessLookupError):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 
-__all__ = ["may_hang"]
+__all__ = ["LIKELY", "may_hang"]
 
 LIKELY = 0.5
 """Probability of being a fruit above which one that was missed is one."""

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from pomona.errors import PomonaError
+from pomona.orchard.hanging import LIKELY
 from pomona.store.schema import FORMAT_VERSION, LAYERS, create
 
 __all__ = ["LAYER_COLUMNS", "Column", "columns_of_layer", "prepare", "require_store"]
@@ -45,10 +46,11 @@ VIEWS = """
 CREATE VIEW pomona_now.maps AS
 SELECT map, max(pushed_at) AS pushed_at, count(*) AS n_pushes FROM pomona.pushes GROUP BY map;
 CREATE VIEW pomona_now.row_summary AS
-SELECT map, count(*) FILTER (WHERE state <> 'gone') AS n_fruits, count(*) FILTER (WHERE state = 'gone') AS n_gone,
-    1000 * avg(diameter_m) FILTER (WHERE state <> 'gone') AS mean_diameter_mm,
-    avg(growth_mm_per_day) FILTER (WHERE state <> 'gone') AS growth_mm_per_day, max(last_seen) AS last_seen
-FROM pomona_now.fruits GROUP BY map;
+SELECT map, count(*) FILTER (WHERE hangs) AS n_fruits, count(*) FILTER (WHERE state = 'gone') AS n_gone,
+    1000 * avg(diameter_m) FILTER (WHERE hangs) AS mean_diameter_mm,
+    avg(growth_mm_per_day) FILTER (WHERE hangs) AS growth_mm_per_day, max(last_seen) AS last_seen
+FROM (SELECT *, state <> 'gone' AND (state <> 'missed' OR coalesce(fruit_probability, 1) > {likely}) AS hangs
+    FROM pomona_now.fruits) AS judged GROUP BY map;
 CREATE VIEW pomona_now.session_summary AS
 SELECT s.map, s.name, s.date, count(o.id) AS n_fruits, 1000 * avg(o.diameter_m) AS mean_diameter_mm
 FROM pomona_now.sessions s LEFT JOIN pomona_now.observations o ON o.map = s.map AND o.session_id = s.id
@@ -172,7 +174,7 @@ def _lay_out(connection: Any) -> None:
     connection.run("INSERT INTO pomona.format VALUES (:version)", version=FORMAT_VERSION)
     for layer, _, _, description in LAYERS:
         connection.run(_layer(layer, description))
-    connection.run(VIEWS)
+    connection.run(VIEWS.format(likely=LIKELY))
 
 
 def _require_format(connection: Any) -> None:
