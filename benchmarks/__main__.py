@@ -30,6 +30,7 @@ NAMES = (
     "scan",
     "shipped",
     "localize",
+    "localize_loop",
     "metric",
     "disturbed",
     "endurance",
