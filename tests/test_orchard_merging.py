@@ -189,6 +189,12 @@ def test_what_cannot_be_merged_is_said_in_a_line(
     for with_whom, line in said:
         assert run(monkeypatch, "merge", path, with_whom) == 2
         assert capsys.readouterr().err == f"pomona: {line}\n"
+    damaged = tmp_path / "damaged.gpkg"
+    content = bytearray(path.read_bytes())
+    content[11 * 4096 : 12 * 4096] = bytes(4096)  # of a table: the file still opens
+    damaged.write_bytes(content)
+    assert run(monkeypatch, "merge", damaged, other, "-o", tmp_path / "whole.gpkg") == 2
+    assert capsys.readouterr().err.startswith(f"pomona: {damaged}: ")
     assert run(monkeypatch, "merge", path, other, "-o", other) == 2
     assert "is the input" in capsys.readouterr().err
     assert run(monkeypatch, "merge", path, other) == 0

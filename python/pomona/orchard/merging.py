@@ -123,7 +123,7 @@ def merge_maps(
     with tempfile.TemporaryDirectory(prefix="pomona-") as folder:
         copy = Path(folder) / "merged.gpkg"
         _copy(path, copy)
-        with writing(copy, "map", shown=Path(output)) as (connection, _):
+        with writing(copy, "map", shown=path) as (connection, _):  # what is wrong in a copy is wrong in the map
             merged = _merge(connection, theirs, settings)
         if merged.is_merged:
             with whole_file(output) as partial:
