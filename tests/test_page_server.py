@@ -213,3 +213,14 @@ def test_the_live_page_says_what_it_needs(orchard: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2
     assert "fastapi and uvicorn: pip install" in done.stderr
+
+
+def test_an_odd_request_leaves_the_terminal_alone(orchard: Path) -> None:
+    command = [sys.executable, "-m", "pomona", "view", str(orchard), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().strip()
+        assert ask(address, "/", Connection="Upgrade", Upgrade="websocket")[0] == 200
+        process.terminate()
+        _, said = process.communicate()
+    assert "WebSocket" not in said

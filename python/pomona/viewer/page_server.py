@@ -159,4 +159,4 @@ def serve(app: Any, taken: socket.socket) -> None:
     """Answer until Ctrl-C."""
     import uvicorn
 
-    uvicorn.Server(uvicorn.Config(app, log_config=None, server_header=False)).run(sockets=[taken])
+    uvicorn.Server(uvicorn.Config(app, log_config=None, log_level="error", server_header=False)).run(sockets=[taken])
