@@ -41,6 +41,9 @@ __all__ = [
 MARGIN_M = 0.5
 """Between visits that still are compared: trees sag and trajectories drift by less."""
 
+PLACE_DIGITS, COVARIANCE_DIGITS = 9, 15
+"""Of metres and of square metres, with which a match of two visits is asked."""
+
 LARGE = 10_000
 """Fruits of a map of which the surroundings of a session are chosen first; fewer are made ready in half a second."""
 
@@ -178,11 +181,25 @@ def matches_between(
 def _match_of_two(visit: KnownVisit, other: KnownVisit, settings: Settings) -> VisitPair | None:
     is_later = visit.seen.key > other.seen.key
     query, map_ = (visit.cloud, other.cloud) if is_later else (other.cloud, visit.cloud)
-    match = settings.match(query, map_)
+    match = settings.match(_rounded(query), _rounded(map_))
     if match.status.value != "Found":
         return None
     assert match.map_from_query is not None
     return VisitPair(0, 0, match.map_from_query, match.log_odds, match.pairs[:, ::-1], match.probabilities)
+
+
+def _rounded(cloud: FruitCloud) -> FruitCloud:
+    """Leave out the digits that a place loses on its way into the frame of a map and back.
+
+    Steps of a match end where they are small enough: with the last digit of a place their number changes, and with
+    that the sixth of the pose. So the same visits are asked about with the same digits, whichever came first.
+    """
+    covariances = cloud.covariances
+    return replace(
+        cloud,
+        positions=np.round(cloud.positions, PLACE_DIGITS),
+        covariances=None if covariances is None else np.round(covariances, COVARIANCE_DIGITS),
+    )
 
 
 def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
