@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pomona.cli.localize_options import (
+    depth_option,
+    detections_option,
+    min_score_option,
+    model_option,
+    odometry_option,
+    single_option,
+)
 from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Verbs, Writes
@@ -33,23 +41,17 @@ def ros_replay(
         ..., "--map", metavar="ORCHARD", help="Fruits of the map: an orchard map, a session, or a cloud."
     ),
     map_frame: str = typer.Option("map", metavar="NAME", help="What the frame of the map is called."),
-    single: bool = typer.Option(False, "--single", help="Find each frame from nothing, not from the one before."),
-    detections: Path | None = typer.Option(
-        None, metavar="FILE", help="Boxes, as for `pomona scan`; else detections.csv or ids/ there, else --model."
-    ),
-    model: Path | None = typer.Option(None, metavar="ONNX", help="Detector instead of boxes: a file, or shipped."),
-    min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least confidence of the model's boxes."),
+    single: bool = single_option,
+    detections: Path | None = detections_option,
+    model: Path | None = model_option,
+    min_score: float | None = min_score_option,
     up: list[str] | None = up_option,
     calibration: Path | None = typer.Option(None, metavar="FILE", help="Calibration instead of the camera_info."),
     topics: str | None = typer.Option(
         None, metavar="ROLE=TOPIC,...", help="Topics: left, right, depth, left_info, right_info, poses."
     ),
-    depth: str = typer.Option(
-        "auto", metavar="auto|stereo|dense|ONNX", help="Depth pictures, else stereo at the fruits; or stereo all over."
-    ),
-    odometry: bool = typer.Option(
-        False, "--odometry", help="Motion from the pictures, even where poses were recorded."
-    ),
+    depth: str = depth_option,
+    odometry: bool = odometry_option,
     config: Path | None = config_option,
     threads: int | None = threads_option,
     json: bool = typer.Option(False, "--json", help="Print JSON."),
