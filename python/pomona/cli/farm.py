@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args, get_origin
 import typer
 from typer.models import OptionInfo
 
-from pomona.cli.terminal import say, say_json, tell
+from pomona.cli.terminal import libraries_on_stderr, say, say_json, tell
 from pomona.cli.verbs import Verbs, Writes
 from pomona.likes import FARM_PLAN
 
@@ -87,7 +87,8 @@ def farm_run(
     if dry_run:
         _print_commands(season, run, json=json)
         return
-    with ledger.locked():
+    # Ray prints what happens to its machines on the standard output, from a thread of its own.
+    with ledger.locked(), libraries_on_stderr():
         executor = _executor(season, ledger, workers, ray)
         run_farm(season, run, keys, ledger, executor, _teller(run, json=json))
     if json:

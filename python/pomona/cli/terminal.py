@@ -21,6 +21,7 @@ READER_GONE = 141
 _COMMANDS = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 _result_is_elsewhere = ContextVar("_result_is_elsewhere", default=False)
+_kept_stdout: ContextVar[TextIO | None] = ContextVar("_kept_stdout", default=None)
 
 
 def shown(text: str) -> str:
@@ -30,7 +31,7 @@ def shown(text: str) -> str:
 
 def say(*lines: str) -> None:
     """Print lines of the result on the standard output; on the standard error where the output is there itself."""
-    _print(sys.stderr if _result_is_elsewhere.get() else sys.stdout, lines)
+    _print(sys.stderr if _result_is_elsewhere.get() else _kept_stdout.get() or sys.stdout, lines)
 
 
 def say_json(value: Any) -> None:
@@ -55,6 +56,19 @@ def result_elsewhere(elsewhere: bool) -> Iterator[None]:
         _result_is_elsewhere.reset(before)
 
 
+@contextmanager
+def libraries_on_stderr() -> Iterator[None]:
+    """Keep the standard output for results while the block runs, though a library prints there by itself."""
+    kept = sys.stdout
+    before = _kept_stdout.set(kept)
+    sys.stdout = sys.stderr if kept else kept  # nothing where whoever started the program has closed it
+    try:
+        yield
+    finally:
+        sys.stdout = kept
+        _kept_stdout.reset(before)
+
+
 def _print(stream: TextIO | None, lines: tuple[str, ...]) -> None:
     if stream is None:  # closed by whoever started the program
         return
@@ -67,7 +81,7 @@ def _print(stream: TextIO | None, lines: tuple[str, ...]) -> None:
         _forget(stream)
         if isinstance(error, BrokenPipeError):
             raise typer.Exit(READER_GONE) from None
-        if stream is sys.stdout:
+        if stream is not sys.stderr:
             raise PomonaError(f"the standard output: cannot be written: {error.strerror}") from None
 
 
