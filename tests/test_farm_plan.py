@@ -189,6 +189,11 @@ def test_a_first_plan_is_written_for_what_is_there_and_is_a_plan(tmp_path):
         ('results = "a\\u0000b"\n' + SIMPLE, "results: found"),
         (SIMPLE + f"[scan]\nevery = {'9' * 5000}\n", "not TOML"),
         (SIMPLE + '[map]\nconfig = "nowhere.toml"\n', "nowhere.toml: is not there"),
+        (SIMPLE + '[map]\nconfig = "{row}.toml"\n', "{row}.toml: is not there"),
+        (
+            SIMPLE + '[scan]\ndetections = "{besides}/boxes.csv"\n',
+            "found '{besides}', expected {row}, {date}, {beside}",
+        ),
         ('[recordings]\nfolder = "rec"\npattern = "{row}/*****{date}.mp4"\n', "5 stars, expected 4 at the most"),
         ('[recordings]\ntable = "twice.csv"\n', "found 2 columns row"),
         ('[recordings]\ntable = "more.csv"\n', "found 4 cells, expected 3"),
@@ -214,21 +219,23 @@ def test_a_name_is_one_however_its_accents_were_written_and_stands_in_values_as_
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("table", "value", "told"),
     [
-        ('method = "magic"', "--method"),
-        ('noise = "a"', "--noise"),
-        ("noise = -1", "--noise"),
-        ("noise = nan", "--noise"),
+        ("map", 'method = "magic"', "--method"),
+        ("map", 'noise = "a"', "--noise"),
+        ("map", "noise = -1", "--noise"),
+        ("map", "noise = nan", "--noise"),
+        ("growth", 'harvest = "tomorrow"', "--harvest: found 'tomorrow', expected a day"),
+        ("report", 'classes = "70,60"', "--classes: found '70,60', expected rising limits"),
     ],
 )
-def test_the_verbs_look_at_their_flags_before_anything_is_run(tmp_path, value, told):
-    touch(tmp_path, "rec/a/2024-08-09.mp4")
-    plan_of(tmp_path, f"{SIMPLE}[map]\n{value}\n")
+def test_the_verbs_look_at_their_flags_before_anything_is_run(tmp_path, table, value, told):
+    touch(tmp_path, "rec/a/2024-08-09.mp4", "rec/a/2024-08-16.mp4")
+    plan_of(tmp_path, f"{SIMPLE}[{table}]\n{value}\n")
     command = [sys.executable, "-m", "pomona", "farm", "run", "farm.toml", "--dry-run"]
     refused = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert refused.stderr.startswith("pomona: farm.toml: [map]: ")
+    assert refused.stderr.startswith(f"pomona: farm.toml: [{table}]: ")
     assert told in refused.stderr
     assert refused.stderr.count("\n") == 1
 

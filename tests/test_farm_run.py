@@ -164,8 +164,11 @@ def test_a_map_that_other_settings_made_is_kept_aside_and_made_anew(farm):
     run(farm)
     before = content(farm)
     (farm / "farm.toml").write_text(PLAN.replace("[map]", "[map]\nnoise = 0.03"))
-    assert begun(run(farm)) == ALL
+    lines = run(farm)
+    assert begun(lines) == ALL
     aside = sorted(path.name for path in (farm / "results" / "maps").glob("*.before-*.gpkg"))
+    told = [str(line["reason"]) for line in lines if line["event"] == "done" and "map" in str(line["step"])]
+    assert [sum(name in reason for reason in told) for name in aside] == [1] * len(ROWS)
     assert [name.split(".")[0] for name in aside] == list(ROWS)
     assert [content(farm)[name] for name in aside] == [before[f"{row}.gpkg"] for row in ROWS]
 

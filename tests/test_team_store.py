@@ -207,6 +207,21 @@ def test_a_server_killed_in_the_middle_of_a_push_keeps_the_map_as_it_was(server,
     assert content(tmp_path / "again.gpkg") == content(row)
 
 
+def test_a_push_says_that_it_waits_for_another_of_the_same_map(server, database, row):
+    push_map(row, parsed_url(database))
+    with connection(server, database) as other:
+        other.run("BEGIN")
+        other.run("SELECT pg_advisory_xact_lock(hashtext('pomona'), hashtext('row'))")
+        assert "waiting" not in push(row, database, "--name", "second").stderr, "another map waits for nobody"
+        with subprocess.Popen(
+            [sys.executable, "-m", "pomona", "map", "push", str(row), database], stderr=subprocess.PIPE, text=True
+        ) as pushing:
+            assert "another push of this map is at work" in pushing.stderr.readline()
+            other.run("COMMIT")
+            pushing.communicate()
+    assert pushing.returncode == 0
+
+
 def test_no_output_replaces_a_map(database, row):
     push_map(row, parsed_url(database))
     before = row.read_bytes()

@@ -150,8 +150,8 @@ def _require_flags(path: Path, steps: list[FarmStep]) -> None:
             words = command[2 if kind == "map" else 1 :]
             try:
                 typer.main.get_command(alone).make_context(kind, words)
-            except UsageError as error:
-                said = cast("Any", error).format_message()
+            except (UsageError, PomonaError) as error:
+                said = cast("Any", error).format_message() if isinstance(error, UsageError) else str(error)
                 raise PomonaError(f"{path}: [{kind}]: {' '.join(said.split())}") from None
 
 

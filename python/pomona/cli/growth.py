@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.page_wishes import Classes, Harvest
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import GROWN
@@ -23,13 +24,11 @@ def growth(
     output: Annotated[Path, Writes(GROWN)] = typer.Option(
         ..., "-o", "--output", help="Folder for tables and pictures; made where it does not exist."
     ),
-    harvest: str | None = typer.Option(None, metavar="DATE", help="Day to foretell sizes for, as 2024-09-10."),
+    harvest: Harvest = None,
     temperature: Path | None = typer.Option(
         None, metavar="CSV", help="Daily temperatures (date,mean_c or date,min_c,max_c): degree days are tried too."
     ),
-    classes: str | None = typer.Option(
-        None, metavar="MM,MM,...", help="Limits of the size classes in mm, 60,65,70; else every 5 mm."
-    ),
+    classes: Classes = None,
     pack_kg: float = typer.Option(13.0, min=0.001, metavar="KG", help="Kilograms that a pack holds."),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:

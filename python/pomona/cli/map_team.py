@@ -13,6 +13,8 @@ from pomona.likes import PULLED
 
 URL_HELP = "postgresql://USER@HOST:PORT/DATABASE; the password comes from PGPASSWORD, or stands in it."
 
+WAITS = "another push of this map is at work; waiting for its end"
+
 
 def map_push(
     orchards: list[Path] = typer.Argument(metavar="ORCHARD...", help="Maps (.gpkg)."),
@@ -40,7 +42,9 @@ def map_push(
     pushed = []
     for orchard in orchards:
         with working(f"pushing {orchard.name}"):
-            pushed.append(push_map(orchard, database, name=name, drop_sessions=drop_sessions))
+            pushed.append(
+                push_map(orchard, database, name=name, drop_sessions=drop_sessions, waits=lambda: tell(WAITS))
+            )
         if not json:
             one = pushed[-1]
             changed = f"{one.n_written} rows written, {one.n_ended} ended"

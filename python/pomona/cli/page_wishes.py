@@ -13,14 +13,37 @@ if TYPE_CHECKING:
 
     from pomona.viewer.season_page import Wishes
 
+
+def _is_day(text: str | None) -> str | None:
+    from pomona.growth.harvest_day import harvest_day
+
+    harvest_day(text)
+    return text
+
+
+def _are_classes(text: str | None) -> str | None:
+    from pomona.growth.size_classes import parsed_classes
+
+    if text is not None:
+        parsed_classes(text)
+    return text
+
+
 OrchardMapFile = Annotated[Path, typer.Argument(metavar="ORCHARD", help="The map (.gpkg).")]
-Harvest = Annotated[str | None, typer.Option(metavar="DATE", help="Day to foretell sizes for, as 2024-09-10.")]
+
+# Looked at with the flags themselves, so that a farm's plan is refused before anything is scanned for it.
+Harvest = Annotated[
+    str | None, typer.Option(metavar="DATE", help="Day to foretell sizes for, as 2024-09-10.", callback=_is_day)
+]
 Temperature = Annotated[
     Path | None, typer.Option(metavar="CSV", help="Daily temperatures, as `pomona growth` takes them.")
 ]
 Calipers = Annotated[Path | None, typer.Option(metavar="CSV", help="Diameters by hand, as `pomona validate` takes.")]
 Classes = Annotated[
-    str | None, typer.Option(metavar="MM,MM,...", help="Limits of the size classes in mm; else every 5 mm.")
+    str | None,
+    typer.Option(
+        metavar="MM,MM,...", help="Limits of the size classes in mm, 60,65,70; else every 5 mm.", callback=_are_classes
+    ),
 ]
 Target = Annotated[
     int | None, typer.Option(min=0, metavar="FRUITS", help="That each tree shall keep; the page can change it.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from pomona.errors import PomonaError
 from pomona.farm.recorded_visits import RecordedVisit, visits_by_pattern, visits_by_table
 from pomona.reading import read_text, shown
 
-__all__ = ["FarmPlan", "Flag", "Takes", "read_plan"]
+__all__ = ["PLACES", "FarmPlan", "Flag", "Takes", "read_plan"]
 
 Takes = Literal["path", "switch", "value"]
 """What a flag of a verb takes: a file, nothing, or a text."""
@@ -21,6 +22,9 @@ VERBS = ("scan", "map", "growth", "report", "export")
 """Tables of the plan: what is done, with the flags of the verb. The first two are done anyhow."""
 
 RECORDINGS = ("folder", "pattern", "table", "skip")
+PLACES = ("{row}", "{date}", "{beside}")
+"""What stands in the flags of a scan for each recording's own row, date and folder."""
+
 NAMED = ("shipped",)
 """What a flag may name besides files: the detector that is inside."""
 
@@ -108,7 +112,8 @@ def read_plan(path: str | Path, flags: Mapping[str, Mapping[str, Flag]]) -> Farm
     files: dict[str, tuple[Path, ...]] = {}
     for verb, table in {"scan": {}, "map": {}, **tables}.items():
         given = {name: value for name, value in table.items() if (verb, name) != ("export", "to")}
-        arguments[verb], files[verb] = _arguments(f"{path}: [{verb}]", path.parent, given, flags[verb])
+        places = PLACES if verb == "scan" else ()
+        arguments[verb], files[verb] = _arguments(f"{path}: [{verb}]", path.parent, given, flags[verb], places)
     visits = tuple(_visits(path, recordings))
     for visit in visits:
         if visit.path.resolve().is_relative_to((path.parent / results).resolve()):
@@ -166,7 +171,7 @@ def _formats(path: Path, table: Mapping[str, Any] | None) -> tuple[str, ...]:
 
 
 def _arguments(
-    where: str, folder: Path, table: Mapping[str, Any], flags: Mapping[str, Flag]
+    where: str, folder: Path, table: Mapping[str, Any], flags: Mapping[str, Flag], places: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[Path, ...]]:
     """Turn a table into arguments of the verb, and say which files they name."""
     arguments: list[str] = []
@@ -186,15 +191,19 @@ def _arguments(
             # Joined by =, so that no value is taken for a flag.
             arguments.append(f"{flag.on}={one}")
             if flag.takes == "path":
-                files += _file(f"{where} {name}", folder, str(one))
+                files += _file(f"{where} {name}", folder, str(one), places)
     return tuple(arguments), tuple(files)
 
 
-def _file(where: str, folder: Path, name: str) -> list[Path]:
+def _file(where: str, folder: Path, name: str, places: tuple[str, ...]) -> list[Path]:
     """Give the file that a flag names, if it is one for all recordings and not the name of what is inside."""
     path = folder / name
     if path.is_file():
         return [path]
-    if name not in NAMED and "{" not in name and not path.exists():
+    found = re.findall(r"\{[^{}]*\}", name) if places else []
+    for place in found:
+        if place not in places:
+            raise PomonaError(f"{where}: found {shown(place)}, expected {', '.join(places)}")
+    if name not in NAMED and not found and not path.exists():
         raise PomonaError(f"{where}: {path}: is not there")
     return []

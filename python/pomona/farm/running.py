@@ -71,6 +71,7 @@ class _Driver:
         self.executor, self.changed = executor, changed
         self.lines = ledger.read()
         self.tries: dict[str, int] = {}
+        self.kept: dict[str, tuple[str, ...]] = {}
         self.peaks_bytes: dict[str, int] = {}
         for line in self.lines.values():
             self._note_peak(line.kind, line.peak_bytes)
@@ -108,7 +109,7 @@ class _Driver:
         for output in step.outputs:
             output.parent.mkdir(parents=True, exist_ok=True)
         if step.kind == "map" and before is not None and before.settings != settings:
-            _set_aside(step.outputs[0], before.settings)
+            self.kept[step.name] = _set_aside(step.outputs[0], before.settings)
         outputs = () if before is None else before.outputs
         self._write(Line(step.name, step.kind, "", settings, outputs))
 
@@ -123,7 +124,7 @@ class _Driver:
         except PomonaError as error:
             self._fail(step, str(error))
             return
-        told = _told(step, outcome)
+        told = (*self.kept.pop(step.name, ()), *_told(step, outcome))
         is_incomplete = outcome.exit_code == NOT_FOUND
         self._remove_others(step, outputs)
         self._write(
@@ -201,7 +202,10 @@ def _told(step: FarmStep, outcome: Outcome) -> tuple[str, ...]:
     return tuple([*(verdicts if step.kind == "map" else ()), *warned][:MOST_TOLD])
 
 
-def _set_aside(orchard: Path, settings: str) -> None:
-    """Keep a map that was made with other settings under another name: none is thrown away."""
-    if orchard.exists():
-        orchard.rename(orchard.with_name(f"{orchard.stem}.before-{settings[:8]}.gpkg"))
+def _set_aside(orchard: Path, settings: str) -> tuple[str, ...]:
+    """Keep a map that was made with other settings under another name, and say so: none is thrown away."""
+    if not orchard.exists():
+        return ()
+    kept = orchard.with_name(f"{orchard.stem}.before-{settings[:8]}.gpkg")
+    orchard.rename(kept)
+    return (f"other settings; the map made before is kept as {kept.name}",)

@@ -10,12 +10,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
-from pomona.farm.farm_plan import FarmPlan
+from pomona.farm.farm_plan import PLACES, FarmPlan
 from pomona.farm.recorded_visits import RecordedVisit
 
 __all__ = ["FarmStep", "Kind", "MadeBy", "steps_of"]
-
-PLACES = re.compile(r"\{(row|date|beside)\}")
 
 Kind = Literal["scan", "map", "growth", "report", "export"]
 
@@ -112,8 +110,8 @@ def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> FarmStep:
 
 def _filled(flag: str, plan: FarmPlan, visit: RecordedVisit) -> str:
     """Let a flag name what lies beside each recording: ``detections = "{beside}/boxes.csv"``."""
-    meaning = {"{row}": visit.row, "{date}": visit.date, "{beside}": _shown(plan, visit.path.parent)}
-    return PLACES.sub(lambda found: meaning[found[0]], flag)
+    meaning = dict(zip(PLACES, (visit.row, visit.date, _shown(plan, visit.path.parent)), strict=True))
+    return re.sub("|".join(map(re.escape, PLACES)), lambda found: meaning[found[0]], flag)
 
 
 def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[RecordedVisit, FarmStep]) -> FarmStep:

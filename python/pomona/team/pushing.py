@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     import sqlite3
 
 __all__ = ["Pushed", "push_map"]
+
+LOCK = "SELECT pg_{how}advisory_xact_lock(hashtext('pomona'), hashtext(:map))"
 
 INCOMING = "CREATE TEMPORARY TABLE incoming_{layer} ({columns}) ON COMMIT DROP"
 
@@ -61,7 +63,14 @@ class Pushed:
     roles_without_rights: tuple[str, ...] = ()
 
 
-def push_map(path: str | Path, database: Database, *, name: str | None = None, drop_sessions: bool = False) -> Pushed:
+def push_map(
+    path: str | Path,
+    database: Database,
+    *,
+    name: str | None = None,
+    drop_sessions: bool = False,
+    waits: Callable[[], None] = lambda: None,
+) -> Pushed:
     """Bring a map into the team's store; what is there of it and has not changed is left alone.
 
     Parameters
@@ -74,6 +83,8 @@ def push_map(path: str | Path, database: Database, *, name: str | None = None, d
         Of the map in the store; else the file's.
     drop_sessions : bool
         Whether sessions that the store has, and the file has not, go. They stay as older versions of rows.
+    waits : callable
+        Called when another push of the map is at work, whose end this one awaits.
 
     Raises
     ------
@@ -91,7 +102,10 @@ def push_map(path: str | Path, database: Database, *, name: str | None = None, d
         without = prepare(target)
         target.run("SAVEPOINT prepared")
         # One push of a map at a time; readers wait for nobody.
-        target.run("SELECT pg_advisory_xact_lock(hashtext('pomona'), hashtext(:map))", map=name)
+        ((is_free,),) = target.run(LOCK.format(how="try_"), map=name)
+        if not is_free:
+            waits()
+            target.run(LOCK.format(how=""), map=name)
         _require_successor(source, target, name, database, drop_sessions=drop_sessions)
         ((push,),) = target.run(
             "INSERT INTO pomona.pushes (map, program_version, last_ids) VALUES (:map, :version, :ids) "
