@@ -23,6 +23,7 @@ from pomona.synth.seasons import SEASONS, draw_season
 from pomona.synth.seasons.season_files import write_season
 from pomona.team import pull_map, push_map
 from pomona.team.database_url import parsed_url
+from qgis_program import require_qgis, seen_by_qgis
 
 pg = pytest.importorskip("pg8000.native", reason="pg8000 is not installed: pip install pg8000")
 pytestmark = pytest.mark.skipif(
@@ -166,6 +167,20 @@ def test_readers_see_whole_maps_and_cannot_write(server, database, row):
     assert refused.returncode == 2
     assert "permission denied" in refused.stderr
     assert refused.stderr.count("\n") == 1
+
+
+def test_qgis_opens_the_store(server, database, row, tmp_path):
+    require_qgis()
+    push_map(row, parsed_url(database))
+    push_map(row, parsed_url(database), name="second")
+    there = f"host=127.0.0.1 port={server.port} dbname={parsed_url(database).name}"
+    who = f"user={postgres_server.USER} password={postgres_server.PASSWORD}"
+    layers = [f"""{there} {who} key='"map","id"' table="pomona_now"."{name}" (geom)""" for name in ("fruits", "trees")]
+    fruits, trees = seen_by_qgis("postgres", *layers, home=tmp_path)
+    assert (fruits["valid"], trees["valid"]) == (True, True)
+    assert fruits["count"] == 2 * len(content(row)["fruits"])
+    assert {"map", "state", "diameter_m"} <= set(fruits["fields"])
+    assert len(fruits["colours"]) > 1, "something is drawn"
 
 
 def wait_for_a_push_in_the_middle(reader):
