@@ -14,6 +14,7 @@ import pytest
 from pyogrio.raw import read as read_layer
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from growth_maker import grow_row
@@ -21,6 +22,8 @@ from pomona import FruitCloud, PomonaError
 from pomona.cli import app
 from pomona.export import export_cloud
 from pomona.orchard import add_session, load_session, write_session
+from pomona.recording.poses import read_kitti, read_tum
+from pomona.trajectory import Trajectory
 
 
 @pytest.fixture
@@ -170,7 +173,7 @@ def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, sess
         (
             "a.dxf",
             [],
-            "found suffix '.dxf', expected .csv, .ply, .geojson, .json, .shp, .parquet, .mcap, or --to FORMAT",
+            "expected .csv, .ply, .geojson, .json, .shp, .parquet, .mcap, .tum, .kitti, or --to FORMAT",
         ),
         ("a.txt", ["--to", "shp"], "a Shapefile is five files, expected a name that ends in .shp"),
     ):
@@ -179,6 +182,35 @@ def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, sess
         assert said in err
         assert not session_file.with_name(name).exists()
     assert pomona("export", session_file, "--to", "csv", "-o", session_file.with_name("fruits.txt"))[0] == 0
+
+
+def test_the_way_of_a_session_is_poses_for_other_programs(pomona: Pomona, tmp_path: Path) -> None:
+    turned = Rotation.from_euler("xyz", [[0, 0, 0], [3, 20, -4], [5, 40, 8]], degrees=True).as_matrix()
+    poses = np.tile(np.eye(4), (3, 1, 1))
+    poses[:, :3, :3], poses[:, 0, 3] = turned, [0.0, 0.5, 1.25]
+    way = Trajectory(np.array([0, 1, 3]), np.array([10.0, 10.1, 10.3]), poses)
+    session = tmp_path / "row.gpkg"
+    cloud = FruitCloud(np.random.default_rng(0).normal(size=(5, 3)))
+    write_session(session, cloud, name="row", date="2024-08-09", recording="test", trajectory=way)
+    assert pomona("export", session, "-o", tmp_path / "way.tum") == (0, f"{tmp_path / 'way.tum'}: 3 poses\n", "")
+    times_s, read = read_tum(tmp_path / "way.tum")
+    np.testing.assert_allclose(times_s, way.times_s, atol=1e-6)
+    np.testing.assert_allclose(read, poses, atol=1e-8)
+    assert pomona("export", session, "-o", tmp_path / "way.txt", "--to", "kitti")[0] == 0
+    np.testing.assert_allclose(read_kitti(tmp_path / "way.txt"), poses, atol=1e-8)
+    assert pomona("export", session, "-o", tmp_path / "way.tum")[0] == 0, "ours is written anew"
+    code, _, told = pomona("export", session, "-o", tmp_path / "way.txt", "--to", "kitti")
+    assert code == 2, "a recording's poses look like this"
+    assert "way.txt" in told
+
+
+def test_what_has_no_way_is_told(pomona: Pomona, session_file: Path, orchard: Path) -> None:
+    for source in (orchard, session_file):
+        code, out, err = pomona("export", source, "-o", source.with_name("way.tum"))
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+        assert str(source) in err
+    assert "alone" in pomona("export", session_file, "-o", session_file.with_name("way.tum"), "--observations")[2]
 
 
 def mixed_cloud(n: int) -> FruitCloud:

@@ -21,9 +21,11 @@ from pomona.shapefile import WGS84_TEXT, write_shapefile
 if TYPE_CHECKING:
     from pomona.earth import Anchor
 
-__all__ = ["SUFFIXES", "ExportFormat", "export_cloud", "format_of"]
+__all__ = ["SUFFIXES", "CloudFormat", "ExportFormat", "PoseFormat", "export_cloud", "export_trajectory", "format_of"]
 
-ExportFormat = Literal["csv", "ply", "geojson", "shp", "parquet", "mcap"]
+CloudFormat = Literal["csv", "ply", "geojson", "shp", "parquet", "mcap"]
+PoseFormat = Literal["tum", "kitti"]
+ExportFormat = CloudFormat | PoseFormat
 
 SUFFIXES: dict[str, ExportFormat] = {
     ".csv": "csv",
@@ -33,11 +35,13 @@ SUFFIXES: dict[str, ExportFormat] = {
     ".shp": "shp",
     ".parquet": "parquet",
     ".mcap": "mcap",
+    ".tum": "tum",
+    ".kitti": "kitti",
 }
 """What the name of a file says of its format."""
 
 
-def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat, anchor: Anchor | None = None) -> None:
+def export_cloud(cloud: FruitCloud, path: str | Path, to: CloudFormat, anchor: Anchor | None = None) -> None:
     """Write fruits with their ids, in metres, in the frame they are in; the file appears whole or not at all.
 
     Parameters
@@ -69,7 +73,35 @@ def export_cloud(cloud: FruitCloud, path: str | Path, to: ExportFormat, anchor: 
     elif to == "mcap":
         _write_scene(path, cloud if anchor is None else cloud.transformed(anchor.enu_from_map))
     else:
-        raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(ExportFormat))}")
+        raise PomonaError(f"--to: found {to!r}, expected one of {', '.join(get_args(CloudFormat))}")
+
+
+def export_trajectory(session: str | Path, path: str | Path, to: PoseFormat) -> int:
+    """Write where the camera of a session was, in the session's frame; return for how many frames.
+
+    Parameters
+    ----------
+    session : str or Path
+        A session (.gpkg).
+    path : str or Path
+        The file to write.
+    to : {"tum", "kitti"}
+        TUM text has times, KITTI's has not: its lines are the session's frames, one after the other.
+
+    Raises
+    ------
+    PomonaError
+        The file is no session, or one without poses.
+    """
+    from pomona.orchard import read_session
+    from pomona.recording.poses import write_kitti, write_tum
+
+    trajectory = read_session(session).trajectory
+    if trajectory is None:
+        raise PomonaError(f"{session}: found a session without poses, expected a trajectory")
+    with whole_file(Path(path)) as partial:
+        (write_tum if to == "tum" else write_kitti)(partial, trajectory)
+    return len(trajectory)
 
 
 def _write_on_earth(path: Path, cloud: FruitCloud, geodetic: NDArray[np.float64], to: ExportFormat) -> None:

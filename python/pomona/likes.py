@@ -66,6 +66,9 @@ BOXES_DRAWN = ".boxes.png"
 POSES_MARK = "# time tx ty tz qx qy qz qw: map_from_camera"
 """First line of the poses that are found in a map, by which they are told from those of a recording."""
 
+WAY_MARK = "# time tx ty tz qx qy qz qw: session_from_camera"
+"""First line of the poses of a session."""
+
 PLY_MARK = "comment fruits written by pomona, metres"
 """Line in the header of the PLY files that are written here."""
 
@@ -202,6 +205,10 @@ def _is_ply(path: Path) -> bool:
 
 def _has_poses(path: Path) -> bool:
     return _head(path).startswith(POSES_MARK.encode())
+
+
+def _is_way(path: Path) -> bool:
+    return _head(path).startswith(WAY_MARK.encode())
 
 
 def _is_geojson(path: Path) -> bool:
@@ -369,4 +376,6 @@ EXPORTS = {
     "shp": Like("a Shapefile of fruits", _is_shapefile),
     "parquet": Like("a GeoParquet of fruits", _is_parquet),
     "mcap": Like("an MCAP of fruits", _is_mcap),
+    "tum": Like("poses of a session", _is_way),
+    "kitti": Like("poses in KITTI's text, which nothing tells from those of a recording", lambda _: False),
 }

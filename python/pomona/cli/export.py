@@ -16,7 +16,7 @@ from pomona.likes import BY_DATE, EXPORTS, Like
 
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
-    from pomona.export import ExportFormat
+    from pomona.export import ExportFormat, PoseFormat
 
 
 class Format(StrEnum):
@@ -28,6 +28,8 @@ class Format(StrEnum):
     shp = "shp"
     parquet = "parquet"
     mcap = "mcap"
+    tum = "tum"
+    kitti = "kitti"
     parquet_by_date = "parquet-by-date"
 
 
@@ -38,6 +40,8 @@ _SINGLE: dict[Format, ExportFormat] = {
     Format.shp: "shp",
     Format.parquet: "parquet",
     Format.mcap: "mcap",
+    Format.tum: "tum",
+    Format.kitti: "kitti",
 }
 """Formats of one file."""
 
@@ -85,7 +89,7 @@ def export(
 
     A map with a georeference (`pomona map georeference`) gives longitude, latitude and height to GeoJSON, Shapefile,
     GeoParquet, and to CSV as further columns. An MCAP is a scene for Foxglove, fruits coloured by their state, or with
-    --growth by their rate.
+    --growth by their rate. Of a session, .tum and .kitti are where its camera was, in the session's frame.
     """
     from pomona.cloud import FruitCloud
     from pomona.export import export_cloud, format_of
@@ -96,6 +100,10 @@ def export(
         return
     told: ExportFormat | None = None if to is None else _SINGLE[to]
     wanted = format_of(output, told)
+    match wanted:
+        case "tum" | "kitti":
+            _export_poses(source, output, wanted, plain=not (growth or harvest or observations))
+            return
     if growth or harvest is not None:
         cloud = _grown(source, harvest, plain=not growth or observations)
     else:
@@ -112,6 +120,15 @@ def _export_by_date(source: Path, output: Path, *, plain: bool) -> None:
     if not plain:
         raise PomonaError("--to parquet-by-date: found it with --growth or --harvest, expected it alone")
     say(f"{output}: {export_by_date(source, output)} observations")
+
+
+def _export_poses(source: Path, output: Path, to: PoseFormat, *, plain: bool) -> None:
+    from pomona.errors import PomonaError
+    from pomona.export import export_trajectory
+
+    if not plain:
+        raise PomonaError(f"--to {to}: found it with --growth, --harvest or --observations, expected it alone")
+    say(f"{output}: {export_trajectory(source, output, to)} poses")
 
 
 def _grown(source: Path, harvest: str | None, *, plain: bool) -> FruitCloud:
