@@ -210,11 +210,13 @@ def _write_mcap(path: Path, entries: list[Entry], *, compression: str, chunk_siz
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=chunk_size, compression=CompressionType[compression.upper()])
         writer.start()
-        channels = {}
+        schemas: dict[str, int] = {}
+        channels: dict[str, int] = {}
         for topic, logged_ns, kind, fields in entries:
+            if kind not in schemas:
+                schemas[kind] = writer.register_schema(kind, "ros2msg", b"")
             if topic not in channels:
-                schema = writer.register_schema(kind, "ros2msg", b"")
-                channels[topic] = writer.register_channel(topic, "cdr", schema)
+                channels[topic] = writer.register_channel(topic, "cdr", schemas[kind])
             body = bytes(ROS2.serialize_cdr(message(ROS2, kind, fields), kind))
             writer.add_message(channels[topic], logged_ns, body, logged_ns)
         writer.finish()

@@ -22,7 +22,7 @@ from pomona.recording import open_recording
 from pomona.recording.bags import mcap_file
 from pomona.recording.checks.readable import unreadable_frames
 
-OTHER_EYE = np.uint8(1)
+OTHER_EYE = np.uint8(64)
 """What the right pictures differ by: a pair of one picture is refused."""
 
 
@@ -61,6 +61,25 @@ def test_an_mcap_cut_off_in_the_middle_is_used_as_far_as_it_goes(pomona, tmp_pat
     code, _, errors = pomona("info", bag)
     assert code == 0
     assert "row.mcap: cut off: what is there is used" in errors
+
+
+@pytest.mark.parametrize("form", ["mcap", "mcap lz4"])
+def test_an_mcap_cut_off_whose_pictures_fill_a_chunk_each_knows_all_topics(tmp_path, form):
+    """A writer tells a type once, in the chunk of the topic that came first; later chunks only name it."""
+    size = (320, 240)
+    entries = []
+    for row in range(6):
+        at = START_NS + row * STEP_NS
+        for side, shift, changed in (("left", 0.0, 0), ("right", -60 * 0.12, OTHER_EYE)):
+            entries.append(info(f"/{side}/camera_info", at, shift, size=size))
+            entries.append(image(f"/{side}/image_rect", at, picture(row, size) ^ changed, "bgr8"))
+    bag = write_bag(tmp_path / "row", entries, form)
+    bag.write_bytes(bag.read_bytes()[: bag.stat().st_size * 2 // 3])
+    with pytest.warns(PomonaWarning, match="cut off"):
+        recording = open_recording(bag)
+    assert 3 <= len(recording) <= 4
+    for frame in recording.frames():
+        assert np.array_equal(frame.read_right(), picture(frame.number, size) ^ OTHER_EYE)
 
 
 @pytest.mark.parametrize("form", ["mcap", "mcap lz4"])

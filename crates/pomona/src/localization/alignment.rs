@@ -4,7 +4,8 @@
 //! is known so far, or a stranger, of which there are rho in a cubic metre. With a share s of sightings in the map, the
 //! weights of expectation and maximisation are
 //!
-//! w = s N / ((1 - s) rho + s sum N), and the evidence is the sum of ln(1 - s + s sum N / rho).
+//! w = s N / ((1 - s) rho + s sum N), and the evidence is the sum of v ln(1 - s + s sum N / rho), v one over how often
+//! the sighting's fruit was seen.
 //!
 //! Each turn takes a step of Gauss and Newton under these weights. The pose's own covariance widens S at first and
 //! shrinks from turn to turn, so that the first turns see past the nearest fruit.
@@ -50,6 +51,8 @@ pub(super) struct Say {
     pub place: Vector3<f64>,
     /// Sum of its weights.
     pub weight: f64,
+    /// As the sighting's.
+    pub voice: f64,
     /// Weighted mean of where its fruits are from there.
     pub residual: Vector3<f64>,
     /// Sum of weighted inverse covariances.
@@ -132,6 +135,7 @@ fn say(
     let mut says = Say {
         place,
         weight: 0.0,
+        voice: seen.voice,
         residual: Vector3::zeros(),
         information: Matrix3::zeros(),
         by_pose,
@@ -200,7 +204,7 @@ fn solved(matrix: &Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
 
 /// The share of sightings in the map that explains them best, and the evidence under it, nats.
 fn best_share(says: &[Say]) -> (f64, f64) {
-    let evidence = |share: f64| says.iter().map(|say| (1.0 - share + share * say.ratio).ln()).sum::<f64>();
+    let evidence = |share: f64| says.iter().map(|say| say.voice * (1.0 - share + share * say.ratio).ln()).sum::<f64>();
     let all = SHARES.map(|share| (share, evidence(share)));
     all.into_iter().fold((FIRST_SHARE, f64::NEG_INFINITY), |best, one| if one.1 > best.1 { one } else { best })
 }

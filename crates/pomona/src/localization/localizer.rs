@@ -18,7 +18,7 @@ use crate::matching::{MapIndex, Method};
 use crate::pose::Pose;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// Sightings in the map below which a pose has no redundancy: three fix it.
+/// Fruits in the map below which a pose has no redundancy: three fix it.
 const MIN_PAIRED: f64 = 4.0;
 
 /// Standard deviations of a pose that the matcher found: metres, radians.
@@ -163,7 +163,7 @@ impl Localizer {
 
     /// Covariance of a pose, if there is enough for it; `chosen_nats` is what the choice among many gains by chance.
     fn believed(&self, aligned: &Aligned, chosen_nats: f64) -> Option<Matrix6<f64>> {
-        let paired: f64 = aligned.says.iter().map(|say| say.weight).sum();
+        let paired: f64 = aligned.says.iter().map(|say| say.voice * say.weight).sum();
         let needed = FITTED_NATS + chosen_nats - self.config.false_alarm_rate.ln();
         let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
         enough.then(|| covariance(aligned, &self.map, self.config.shared_m, self.config.reach_m)).flatten()

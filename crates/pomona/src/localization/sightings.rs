@@ -14,6 +14,9 @@ pub(super) struct Sighting {
     pub covariance: Matrix3<f64>,
     /// Row in the newest frame; `None` of older ones.
     pub row: Option<usize>,
+    /// Its part of what is known of its fruit: one over how often the fruit was seen. A stranger that hangs near a fruit
+    /// of the map does so in every frame.
+    pub voice: f64,
 }
 
 impl Sighting {
@@ -23,6 +26,7 @@ impl Sighting {
             place: seen.positions[row].coords,
             covariance: covariance_of(seen, row),
             row: Some(row),
+            voice: 1.0,
         };
         (0..seen.len()).map(one).collect()
     }
@@ -34,6 +38,7 @@ impl Sighting {
             place: now_from_then.to_session(&self.place),
             covariance: covariance + Matrix3::identity() * (spread_m * spread_m),
             row: None,
+            voice: self.voice,
         }
     }
 }

@@ -62,7 +62,7 @@ impl Window {
                 all.extend(seen.iter().map(|one| one.carried(now_from_then, spread_m)));
             }
         }
-        all
+        with_voices(all)
     }
 
     /// Each fruit once, as far as places tell: a cloud to be matched. A frame that stands alone is not mixed with those
@@ -78,4 +78,20 @@ impl Window {
         }
         fruits
     }
+}
+
+/// Two sightings of the newest frame are two fruits; of the others nobody knows which frame they are from.
+fn with_voices(mut all: Vec<Sighting>) -> Vec<Sighting> {
+    let is_one_fruit = |one: &Sighting, other: &Sighting| {
+        (one.row.is_none() || other.row.is_none()) && (other.place - one.place).norm() < ONE_FRUIT_M
+    };
+    let seen = |row: usize| {
+        let again = |&other: &usize| other != row && is_one_fruit(&all[row], &all[other]);
+        1 + (0..all.len()).filter(again).count()
+    };
+    let voices: Vec<f64> = (0..all.len()).map(|row| 1.0 / seen(row) as f64).collect();
+    for (one, voice) in all.iter_mut().zip(voices) {
+        one.voice = voice;
+    }
+    all
 }

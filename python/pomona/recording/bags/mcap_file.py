@@ -57,6 +57,7 @@ class McapFile:
     pieces: tuple[Piece, ...]
     topics: dict[str, Topic]
     _channels: dict[int, Topic]
+    _schemas: dict[int, Any]
     _damaged: set[int] = field(default_factory=set)
     _inhabitants: dict[int, frozenset[int]] = field(default_factory=dict)
 
@@ -79,10 +80,10 @@ class McapFile:
             if file.read(len(MAGIC)) != MAGIC:
                 raise PomonaError(f"{path}: not an MCAP file, or one without its beginning")
             try:
-                pieces, channels, whole = _walk(file)
+                pieces, channels, schemas, whole = _walk(file)
             except DAMAGES as error:
                 raise PomonaError(f"{path}: a damaged MCAP ({error})") from None
-        opened = cls(path, tuple(pieces), {}, channels)
+        opened = cls(path, tuple(pieces), {}, channels, schemas)
         if not whole:
             message = f"{path}: cut off: what is there is used"
             warnings.warn(message, PomonaWarning, stacklevel=4)
@@ -129,22 +130,21 @@ class McapFile:
                 yield *_head(plain, start), plain[start + MESSAGE_HEAD.size : end]
 
     def _chunk(self, piece: Piece, content: bytes) -> bytes:
-        """Unpack a chunk that is whole; note the channels in it."""
+        """Unpack a chunk that is whole; note the channels in it, and schemas, which those of later chunks may name."""
         chunk = _record("Chunk", content)
         plain = unpacked(chunk.compression, chunk.data, chunk.uncompressed_size)
         if chunk.uncompressed_crc not in (0, zlib.crc32(plain)):
             raise ValueError("its checksum is another")
-        schemas: dict[int, Any] = {}
         inhabitants: set[int] = set()
         for operation, start, end in _records(plain):
             if operation == MESSAGE:
                 inhabitants.add(_head(plain[start:end], 0)[0])
             elif operation == SCHEMA:
                 schema = _record("Schema", plain[start:end])
-                schemas[schema.id] = schema
+                self._schemas.setdefault(schema.id, schema)
             elif operation == CHANNEL:
                 channel = _record("Channel", plain[start:end])
-                self._channels.setdefault(channel.id, _topic(channel, schemas))
+                self._channels.setdefault(channel.id, _topic(channel, self._schemas))
         self._inhabitants.setdefault(piece.offset, frozenset(inhabitants))
         return plain
 
@@ -174,8 +174,8 @@ def _head(content: bytes, start: int) -> tuple[int, int, int]:
     return channel, min(logged_ns, LATEST_NS), min(published_ns, LATEST_NS)
 
 
-def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
-    """Find the pieces, the channels outside of them, and whether the file goes on to its end."""
+def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], dict[int, Any], bool]:
+    """Find the pieces, the channels and schemas outside of them, and whether the file goes on to its end."""
     pieces: list[Piece] = []
     schemas: dict[int, Any] = {}
     channels: dict[int, Topic] = {}
@@ -200,7 +200,7 @@ def _walk(file: BinaryIO) -> tuple[list[Piece], dict[int, Topic], bool]:
         if operation == FOOTER:
             break
         offset += length
-    return pieces, channels, ended
+    return pieces, channels, schemas, ended
 
 
 def _piece(file: BinaryIO, operation: int, offset: int, length: int) -> Piece | None:
