@@ -57,9 +57,7 @@ class Besides:
     def renamed(self, names: Mapping[str, str]) -> Besides:
         """Return it with other names for some sessions."""
         own = POINT_NAMES.index("session")
-        points = [
-            (*point[:own], names.get(point[own], point[own]), *point[own + 1 :]) for point in self.control_points
-        ]
+        points = [(*point[:own], names.get(point[own], point[own]), *point[own + 1 :]) for point in self.control_points]
         history = [(cause, names.get(session, session), change) for cause, session, change in self.history]
         return replace(self, control_points=points, history=history)
 
