@@ -28,8 +28,8 @@ UNMOVED_M = 1e-9
 """By less than this nothing moves: rounding."""
 
 DIGITS = 4
-"""Of probabilities as they are written. One visit more makes all others a little surer: rows that nobody could tell from
-what they were stay as they are."""
+"""Of probabilities as they are written. One visit more makes all others a little surer: rows that nobody could tell
+from what they were stay as they are."""
 
 SUREST = 1.0 - 10.0**-DIGITS
 """That two sights are one fruit, as it is written."""
