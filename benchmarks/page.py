@@ -2,7 +2,7 @@
 
 Rows of fruits at random places with curves of growth on ten dates, and a picture of 48 px of each, are told as a map is
 told. Chromium draws with SwiftShader, on the processor alone; each frame turns the camera, and ends when its pixels can
-be read. Writes page.csv and page.md.
+be read. Idle is nobody touching it for some seconds. Writes page.csv and page.md.
 """
 
 import argparse
@@ -24,6 +24,7 @@ CHROMIUM = "/usr/bin/chromium"
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"]
 SIZES = (1_000, 5_000, 50_000)
 FRAMES = 30
+SETTLED_S, IDLE_S = 3, 5
 VIEWPORT: Any = {"width": 1280, "height": 860}
 
 TURN = """async (how) => {
@@ -50,6 +51,16 @@ TURN = """async (how) => {
 }""".replace("FRAMES", str(FRAMES))
 
 
+COUNT = """() => {
+  const gl = document.querySelector("canvas").getContext("webgl2");
+  window.drawn = 0;
+  for (const name of ["drawArrays", "drawElements"]) {
+    const draw = gl[name].bind(gl);
+    gl[name] = (...how) => { window.drawn++; return draw(...how); };
+  }
+}"""
+
+
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks page", description=__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
@@ -64,6 +75,7 @@ def main(arguments: list[str]) -> None:
         "report, MB",
         "without pictures, MB",
         "opens in, s",
+        "drawn when idle",
         "turning, ms a frame",
         "playing, ms a frame",
     )
@@ -81,6 +93,7 @@ def measured(page: Page, n: int) -> dict[str, object]:
         page.goto(path.as_uri(), wait_until="commit")
         page.wait_for_selector("canvas")
     opened = page.evaluate("performance.now() / 1000")
+    drawn = idle(page)
     turning, playing = (timed(page, how) for how in ("turn", "play"))
     sys.stderr.write(f"page: {n} fruits done\n")
     return {
@@ -88,9 +101,20 @@ def measured(page: Page, n: int) -> dict[str, object]:
         "report_mb": round(len(report) / 1e6, 2),
         "bare_mb": round(len(bare) / 1e6, 2),
         "opens_s": round(opened, 2),
+        "idle": drawn,
         "turning_ms": turning,
         "playing_ms": playing,
     }
+
+
+def idle(page: Page) -> str:
+    """Count calls that draw while nobody touches the page; behind it the share of a processor that it takes."""
+    page.wait_for_timeout(1000 * SETTLED_S)
+    page.evaluate(COUNT)
+    before = cpu_s()
+    page.wait_for_timeout(1000 * IDLE_S)
+    share = (cpu_s() - before) / IDLE_S
+    return f"{page.evaluate('window.drawn')} ({100 * share:.0f} %)"
 
 
 def timed(page: Page, how: str) -> str:

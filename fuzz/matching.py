@@ -43,7 +43,11 @@ def _search(draw: Drawn) -> None:
         threads=draw.choice(None, 1, 2),
     )
     query, noise_m = cloud(draw), draw.choice(None, None, draw.positive())
-    if draw.choice(False, False, True):
+    if draw.choice(False, False, False, True):
+        found = _core.match_expected(
+            query, cloud(draw), map_from_query=draw.pose(), config=draw.config(), noise_m=noise_m, threads=1
+        )
+    elif draw.choice(False, False, True):
         found = index.pairs_under(query, map_from_query=draw.pose(), noise_m=noise_m)
     else:
         up = draw.choice(None, ([0.0, 0.0, 1.0], draw.numbers(3).tolist()))

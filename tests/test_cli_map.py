@@ -13,7 +13,7 @@ import pytest
 
 from pomona import FruitCloud
 from pomona.cli import main
-from pomona.orchard import FORMAT_VERSION, write_session
+from pomona.orchard import FORMAT_VERSION, Session, add_session, write_session
 from pomona.orchard.session import GUESSED
 from pomona.synth.clouds import scene_pair
 
@@ -61,7 +61,24 @@ def test_info_tells_people_and_programs(orchard: Path) -> None:
     assert np.shape(info["extent_m"]) == (2, 3)
     text = run("info", orchard).stdout
     assert text.startswith(f"{orchard}: map, format {FORMAT_VERSION}\n{info['n_fruits']} fruits (")
-    assert text.splitlines()[-1].split()[0] == "september"
+    assert text.splitlines()[-1].split()[-1] == "september"
+
+
+def test_info_keeps_its_columns_whatever_a_session_is_called(tmp_path: Path) -> None:
+    path = tmp_path / "orchard.gpkg"
+    few, many = (FruitCloud(np.random.default_rng(n).uniform(0, 1, (n, 3))) for n in (9, 12))
+    long = "row 4, from the road to the shed, " * 20
+    add_session(path, Session(long, "2024-08-01", "drawn", few))
+    add_session(path, Session("b", "2024-09-01", "drawn", many), new_part=True)
+    header, *rows = run("info", path).stdout.splitlines()[3:]
+    assert [header.split(), *(row.split()[:6] for row in rows)] == [
+        ["date", "fruits", "matched", "new", "method", "noise", "session"],
+        ["2024-08-01", "9", "0", "9", "-", "-"],
+        ["2024-09-01", "12", "0", "12", "-", "-"],
+    ]
+    names = header.index("session")
+    assert [row[names:] for row in rows] == [long.rstrip(), "b"]
+    assert names < 60
 
 
 def test_check_says_ok_or_what_is_wrong(orchard: Path, tmp_path: Path) -> None:

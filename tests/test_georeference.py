@@ -288,7 +288,7 @@ def test_a_csv_has_both(anchored_orchard: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "flags", "line"),
     [
-        ("x,y,z,lon,lat\n0,0,0,9.1,47.6\n", (), "found 1 known points, expected two or more"),
+        ("x,y,z,lon,lat\n0,0,0,9.1,47.6\n", (), "wrong.csv: found 1 known points, expected two or more"),
         ("x,y,z,lon,lat\n", (), "found no known points"),
         ("x,y,lon,lat\n0,0,9.1,47.6\n", (), "found the header 'x,y,lon,lat', expected x,y,z (or frame"),
         ("x,y,z,lon,lat\n0,0,0,9.1,147.6\n", (), "line 2: lat: found 147.6, expected degrees from -90 to 90"),
@@ -296,7 +296,12 @@ def test_a_csv_has_both(anchored_orchard: Path) -> None:
         ("x,y,z,easting,northing\n0,0,0,1,2\n", (), "found columns easting, northing without --epsg"),
         ("x,y,z,lon,lat\n0,0,0,9,47\n", ("--epsg", "32632"), "found --epsg 32632 with columns lon, lat"),
         ("x,y,z,easting,northing\n0,0,0,1,2\n", ("--epsg", "4326"), "--epsg: found 4326, expected a UTM zone"),
-        ("x,y,z,lon,lat\n0,0,0,9.1,47.6\n0.5,0,0,9.1,47.6\n", (), "known points reach 0.5 m in plan, expected 2 m"),
+        ("x,y,z,lon,lat\n0,0,0,9.1,47.6\n0.5,0,0,9.1,47.6\n", (), "wrong.csv: known points reach 0.5 m in plan, "),
+        (
+            "x,y,z,easting,northing\n0,0,0,-1,2\n",
+            ("--epsg", "32632"),
+            "wrong.csv: line 2: found easting -1 and northing 2, expected metres in the zone of --epsg 32632",
+        ),
         (
             "name,x,y,z,lon,lat\nA,0,0,0,9.1,47.6\nB,6,0,0,9.2,47.6\n",
             (),

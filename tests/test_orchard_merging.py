@@ -18,8 +18,6 @@ from pomona.synth.clouds import scene_pair
 
 DATES = ("2024-06-01", "2024-06-29", "2024-07-27", "2024-08-24", "2024-09-07")
 
-TAKEN = "expected a name that the map does not have: `map add --name` gives one, --replace takes the other's place"
-
 
 @pytest.fixture(scope="module")
 def row() -> FruitCloud:
@@ -146,6 +144,57 @@ def test_all_sessions_in_both_changes_nothing(visits: list[Session], tmp_path: P
     assert problems(path) == []
 
 
+def test_another_session_of_a_name_gets_another_name_which_is_told(
+    visits: list[Session],
+    together: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    called = ["row 1", "row 1 (theirs)", "row 1", "july", "row 1 (theirs)"]
+    named = [replace(one, name=name) for one, name in zip(visits, called, strict=True)]
+    path = grown(tmp_path / "ours.gpkg", named[:2])
+    # The first visit is in both, under two names; its name there is another one's here.
+    first = replace(visits[0], name="row 1 (theirs, 2)")
+    other = grown(tmp_path / "theirs.gpkg", [first, named[2], named[3], named[4]])
+    with writing(on_earth(other, 9.0), "map") as (connection, _):
+        connection.execute("DELETE FROM changes")
+        one = int((OrchardMap(other).fruits().ids or ())[0])
+        connection.execute(
+            """INSERT INTO changes (cause, session, event, from_fruit_id, to_fruit_id, n_observations)
+            VALUES ('added', 'row 1', 'joined', 9999, ?, 2)""",
+            (one,),
+        )
+        connection.execute("UPDATE control_points SET session = 'row 1'")
+    assert run(monkeypatch, "merge", path, other, "--json") == 0
+    merged = json.loads(capsys.readouterr().out)
+    now = {"row 1": "row 1 (theirs, 3)", "row 1 (theirs)": "row 1 (theirs) (theirs)"}
+    assert merged["renamed"] == now
+    assert merged["shared"] == ["row 1 (theirs, 2)"]
+    assert merged["sessions"] == ["row 1 (theirs, 3)", "july", "row 1 (theirs) (theirs)"]
+    assert sorted(visit.name for visit in OrchardMap(path).visits()) == sorted([*called[:2], *merged["sessions"]])
+    assert who_is_who(path) == who_is_who(together)
+    assert problems(path) == []
+    assert ("row 1 (theirs, 3)", 2) in [
+        (session, change.n_observations) for _, session, change in OrchardMap(path).changes()
+    ]
+    assert asked(path, "SELECT session FROM control_points") == [("row 1 (theirs, 3)",)]
+    # Merged again, all of it is there.
+    assert run(monkeypatch, "merge", path, other, "--json") == 0
+    merged = json.loads(capsys.readouterr().out)
+    assert (merged["sessions"], merged["renamed"], len(merged["shared"])) == ([], {}, 4)
+
+
+def test_names_that_changed_are_said_a_line_each(
+    visits: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = grown(tmp_path / "ours.gpkg", visits[:1])
+    other = grown(tmp_path / "theirs.gpkg", [replace(visits[2], name=DATES[0])])
+    assert run(monkeypatch, "merge", path, other) == 0
+    line = f"{DATES[0]}: another session is called so, here it is {DATES[0]} (theirs)"
+    assert line in capsys.readouterr().out.splitlines()
+
+
 def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Session], tmp_path: Path) -> None:
     strangers = [visit(scene_pair("base", seed=9).map, number) for number in (1, 3)]
     path = grown(tmp_path / "orchard.gpkg", [visits[0]])
@@ -178,13 +227,14 @@ def test_what_cannot_be_merged_is_said_in_a_line(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:2])
     other = grown(tmp_path / "theirs.gpkg", [visits[2]])
-    named = grown(tmp_path / "named.gpkg", [replace(visits[3], name=visits[0].name)])
+    again = {"june.svo2": "0" * 64}
+    path = grown(tmp_path / "made.gpkg", [replace(visits[0], input_hashes=again), visits[1]])
+    rescanned = grown(tmp_path / "rescanned.gpkg", [replace(visits[3], input_hashes=again)])
     said = [
         (path, f"{path}: is the map itself, expected another one to merge with {path}"),
         (tmp_path / "none.gpkg", f"{tmp_path / 'none.gpkg'}: is not there, expected a session or a map (.gpkg)"),
-        (named, f"{path}: another session is called {visits[0].name}, with other fruits, {TAKEN}"),
+        (rescanned, f"{path}: session {DATES[3]} is in the map already, as {DATES[0]}: the same input files"),
     ]
     for with_whom, line in said:
         assert run(monkeypatch, "merge", path, with_whom) == 2

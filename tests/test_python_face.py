@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pomona
 from pomona import FruitCloud, Index, Match, OrchardMap, PomonaError
+from pomona.matching import match_expected
 from pomona.synth.clouds import scene_pair
+from pomona.synth.planting import grow_row
 
 ROOT = Path(__file__).parent.parent
 
@@ -39,6 +42,28 @@ def test_names_of_files_are_clouds(visits: tuple[Path, Path], match: Match) -> N
     np.testing.assert_array_equal(index.pairs_under(visits[0], pose).pairs, index.pairs_under(query, pose).pairs)
     figure = pomona.draw_match(visits[0], visits[1], match)
     assert figure.get_suptitle().startswith("Found")
+
+
+def test_an_expected_pose_saves_the_search_and_changes_nothing_of_what_is_found() -> None:
+    rng = np.random.default_rng(5)
+    row = grow_row(rng, 6).positions
+    seen = [row[rng.random(len(row)) < 0.8] + rng.normal(0, 0.008, 3) for _ in range(2)]
+    query, map = (places + rng.normal(0, 0.006, places.shape) for places in seen)
+    turn = Rotation.from_rotvec([0.4, -1.0, 2.0]).as_matrix()
+    query = (query - [3.0, 1.0, -2.0]) @ turn
+    searched = pomona.match(query, map)
+    middle = query.mean(axis=0)
+    for off_m in (0.0, 0.02, 0.08):
+        expected = searched.map_from_query.copy()
+        expected[:3, :3] = Rotation.from_rotvec([0.0, off_m / 10.0, 0.0]).as_matrix() @ expected[:3, :3]
+        expected[:3, 3] += searched.map_from_query[:3, :3] @ middle - expected[:3, :3] @ middle + off_m
+        found = match_expected(query, map, expected)
+        np.testing.assert_array_equal(found.pairs, searched.pairs)
+        np.testing.assert_allclose(found.probabilities, searched.probabilities, atol=1e-9)
+    aside = searched.map_from_query + np.pad([[2.0], [2.0], [0.0]], ((0, 1), (3, 0)))
+    assert not match_expected(query, map, aside)
+    with pytest.raises(PomonaError, match=r"map_from_query: found an array of shape \(3, 3\), expected \(4, 4\)"):
+        match_expected(query, map, np.eye(3))
 
 
 def test_a_file_of_unknown_scale_is_read_as_it_is(visits: tuple[Path, Path], tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "fuse_fruits",
     "lift",
     "look_of",
+    "match_expected",
     "one_fruit_each",
     "read_pair",
     "rejoin",
@@ -108,6 +109,16 @@ class MapIndex:
     def pairs_under(
         self, query: _Arrays, *, map_from_query: list[list[float]], noise_m: float | None = None
     ) -> Match: ...
+
+def match_expected(
+    query: _Arrays,
+    map: _Arrays,
+    *,
+    map_from_query: list[list[float]],
+    config: str,
+    noise_m: float | None = None,
+    threads: int | None = None,
+) -> Match: ...
 
 @final
 class Localization:

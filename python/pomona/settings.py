@@ -16,6 +16,9 @@ from pomona.threads import require_threads
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
 
@@ -73,6 +76,22 @@ class Settings:
         from pomona.matching import match
 
         return match(query, map, **self.call, config=self.overrides)
+
+    def match_expected(self, query: FruitCloud, map: FruitCloud, map_from_query: NDArray[np.float64]) -> Match:
+        """Run `pomona.match` with these settings where the pose is known to a few decimetres."""
+        from pomona.matching import match_expected
+
+        if self._takes_expectations:
+            named = {name: self.call[name] for name in ("noise_m", "threads")}
+            found = match_expected(query, map, map_from_query, **named, config=self.overrides)
+            if found:
+                return found
+        return self.match(query, map)
+
+    @property
+    def _takes_expectations(self) -> bool:
+        call = self.call
+        return call["method"] == "verified" and call["scale"] == "metric" and call["up"] is None
 
     def as_toml(self) -> str:
         """Return every effective value with what it means; reading it back gives the same settings."""

@@ -48,5 +48,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("MOST_MISALIGNED", (CORRECTED[0], CORRECTED[1]))?;
     module.add_function(wrap_pyfunction!(matching::default_config, module)?)?;
     module.add_function(wrap_pyfunction!(matching::setting_meanings, module)?)?;
+    module.add_function(wrap_pyfunction!(matching::match_expected, module)?)?;
     Ok(())
 }

@@ -208,6 +208,32 @@ impl PyMapIndex {
     }
 }
 
+/// Pairs of two clouds whose pose is known to a few decimetres.
+#[pyfunction]
+#[pyo3(signature = (query, map, *, map_from_query, config, noise_m=None, threads=None))]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+pub fn match_expected(
+    py: Python<'_>,
+    query: Arrays<'_>,
+    map: Arrays<'_>,
+    map_from_query: [[f64; 4]; 4],
+    config: &str,
+    noise_m: Option<f64>,
+    threads: Option<usize>,
+) -> PyResult<PyMatch> {
+    let config = config_of(config)?;
+    let pool = threads.map(pool_of).transpose()?;
+    let (query, map) = (query.to_cloud()?, map.to_cloud()?);
+    let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
+    let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
+    let search = || pomona::match_expected(&query, &map, &pose, noise_m, &config);
+    let found = py.detach(|| match &pool {
+        Some(pool) => pool.install(search),
+        None => search(),
+    });
+    found.map(PyMatch).map_err(wrong)
+}
+
 impl PyMapIndex {
     fn made(
         py: Python<'_>,

@@ -63,16 +63,17 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
 
 def _info_as_lines(info: dict[str, Any]) -> list[str]:
     states = ", ".join(f"{count} {state}" for state, count in info["states"].items())
-    header = ("session", "date", "fruits", "matched", "new", "method", "noise")
+    # Names come last: however long one is, the numbers stay where they are read.
+    header = ("date", "fruits", "matched", "new", "method", "noise", "session")
     rows = [
         (
-            visit["name"],
             visit["date"],
             str(visit["n_fruits"]),
             str(visit["n_matched"]),
             str(visit["n_new"]),
             visit["method"] or "-",
             "-" if visit["noise_m"] is None else f"{100 * visit['noise_m']:.1f} cm",
+            visit["name"],
         )
         for visit in info["sessions"]
     ]

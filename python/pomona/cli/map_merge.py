@@ -35,8 +35,9 @@ def map_merge(
     """Join two maps that overlap: all sessions of OTHER come to ORCHARD.
 
     The result is that of adding each session. Fruits of ORCHARD keep their ids, those of OTHER get ids of ORCHARD.
-    Trees, the place on Earth and the history of OTHER come too; what ORCHARD has its own of is left out and told. Exit
-    code 0: merged. 1: OTHER was not found in ORCHARD, and nothing is written. 2: wrong input.
+    Trees, the place on Earth and the history of OTHER come too; what ORCHARD has its own of is left out and told. A
+    session that is in both comes once; one whose name another has gets another name, which is told. Exit code 0:
+    merged. 1: OTHER was not found in ORCHARD, and nothing is written. 2: wrong input.
     """
     from pomona.cli.progress import working
     from pomona.orchard import merge_maps
@@ -62,6 +63,7 @@ def _merged_as_json(other: Path, merged: Merged) -> dict[str, Any]:
         "status": None if merged.match is None else merged.match.status.value,
         "sessions": list(merged.sessions),
         "shared": list(merged.shared),
+        "renamed": dict(merged.renamed),
         "n_fruits": len(merged.fruit_ids),
         "n_known": merged.n_known,
         "fruit_ids": merged.fruit_ids,
@@ -78,4 +80,9 @@ def _merged_as_lines(other: Path, merged: Merged) -> list[str]:
     told = (
         f"{other}: sessions that came: {n_came}, in both: {n_shared}; {merged.n_known} of {n_fruits} fruits were known"
     )
-    return [told, *map(change_as_text, merged.changes), *(f"left out: {what}" for what in merged.left_out)]
+    return [
+        told,
+        *(f"{name}: another session is called so, here it is {now}" for name, now in merged.renamed.items()),
+        *map(change_as_text, merged.changes),
+        *(f"left out: {what}" for what in merged.left_out),
+    ]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pomona.earth.ellipsoid import EQUATOR_M, FLATTENING
 from pomona.errors import PomonaError
 
-__all__ = ["from_utm"]
+__all__ = ["are_outside_zone", "from_utm"]
 
 _N = FLATTENING / (2.0 - FLATTENING)
 _RADIUS_M = EQUATOR_M / (1.0 + _N) * (1.0 + _N**2 / 4.0 + _N**4 / 64.0)
@@ -31,24 +31,28 @@ _ZONES = {326: (1, 60), 327: (1, 60), 258: (28, 38)}
 _ROUNDS = 6
 
 
+def are_outside_zone(epsg: int, easting_m: NDArray[np.float64], northing_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which places, (N,), are far outside of a UTM zone.
+
+    Raises
+    ------
+    PomonaError
+        When the code is none of a UTM zone.
+    """
+    _require_zone(epsg)
+    return np.asarray((np.abs(easting_m - _EASTING_M) > 500_000.0) | (northing_m < -1.0) | (northing_m > 10_000_001.0))
+
+
 def from_utm(epsg: int, easting_m: NDArray[np.float64], northing_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return longitudes and latitudes in degrees, (N, 2).
 
     Raises
     ------
     PomonaError
-        When the code is none of a UTM zone, or a place is far outside of it.
+        When the code is none of a UTM zone.
     """
-    family, zone = divmod(epsg, 100)
-    first, last = _ZONES.get(family, (1, 0))
-    if not first <= zone <= last:
-        raise PomonaError(f"--epsg: found {epsg}, expected a UTM zone: 32601 to 32660, 32701 to 32760, 25828 to 25838")
+    family, zone = _require_zone(epsg)
     south = _NORTHING_SOUTH_M if family == 327 else 0.0
-    wrong = (np.abs(easting_m - _EASTING_M) > 500_000.0) | (northing_m < -1.0) | (northing_m > 10_000_001.0)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        found = f"easting {easting_m[row]:g} and northing {northing_m[row]:g}"
-        raise PomonaError(f"--epsg {epsg}: found {found}, expected metres in that zone")
     eta, xi = (easting_m - _EASTING_M) / (_SCALE * _RADIUS_M), (northing_m - south) / (_SCALE * _RADIUS_M)
     plain_xi, plain_eta = xi.copy(), eta.copy()
     for order, beta in enumerate(_BETA, 1):
@@ -57,6 +61,15 @@ def from_utm(epsg: int, easting_m: NDArray[np.float64], northing_m: NDArray[np.f
     conformal = np.sin(plain_xi) / np.hypot(np.sinh(plain_eta), np.cos(plain_xi))
     longitude = np.degrees(np.arctan2(np.sinh(plain_eta), np.cos(plain_xi))) + 6.0 * zone - 183.0
     return np.stack([longitude, np.degrees(np.arctan(_geodetic_tangent(conformal)))], axis=1)
+
+
+def _require_zone(epsg: int) -> tuple[int, int]:
+    """Return the family of a code and the zone in it."""
+    family, zone = divmod(epsg, 100)
+    first, last = _ZONES.get(family, (1, 0))
+    if not first <= zone <= last:
+        raise PomonaError(f"--epsg: found {epsg}, expected a UTM zone: 32601 to 32660, 32701 to 32760, 25828 to 25838")
+    return family, zone
 
 
 def _geodetic_tangent(conformal: NDArray[np.float64]) -> NDArray[np.float64]:

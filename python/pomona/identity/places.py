@@ -150,9 +150,10 @@ def _meeting_points(
         return nowhere
     lines = vectors[tell, :, 2] @ axes.T
     across = np.eye(3) - lines[:, :, None] * lines[:, None, :]
+    of_lines = np.concatenate([across.reshape(-1, 9), np.einsum("nij,nj->ni", across, own[tell])], axis=1)
     nearest = cKDTree(own[tell]).query(places, k=list(range(1, min(PENCIL, len(tell)) + 1)))[1]
-    weights = across[nearest].sum(axis=1)
-    moments = np.einsum("knij,knj->ki", across[nearest], own[tell][nearest])
+    sums = of_lines[nearest].sum(axis=1)
+    weights, moments = sums[:, :9].reshape(-1, 3, 3), sums[:, 9:]
     # Lines that are all parallel meet nowhere; the little weight of the place itself keeps the sum solvable.
     little = 1e-6
     solved = np.linalg.solve(weights + little * np.eye(3), (moments + little * places)[:, :, None])

@@ -30,7 +30,7 @@ from pomona.store.numbering import last_ids
 from pomona.store.opening import TIMEOUT_S, Waiting, blank, writing
 from pomona.store.rows import columns_of
 
-__all__ = ["Added", "add_session", "add_sessions", "require_new"]
+__all__ = ["Added", "add_session", "add_sessions", "require_unseen"]
 
 BETWEEN_PARTS_M = 10.0
 """From one part of a map to the next, where nobody knows how they lie to each other."""
@@ -261,10 +261,7 @@ def _told(settlement: Settlement, session_id: int) -> Added:
 
 def require_new(connection: sqlite3.Connection, session: Session, content: str) -> None:
     """Refuse a session that is in the map: by its name, by the hash of what it saw or by what it was made from."""
-    columns = columns_of(connection, "sessions", ("name", "content_sha256", "input_hashes"))
-    if not columns[0]:
-        raise WrongContentError("has no session, expected at least one")
-    for name, content_sha256, input_hashes in zip(*columns, strict=True):
+    for name, content_sha256 in zip(*columns_of(connection, "sessions", ("name", "content_sha256")), strict=True):
         if name == session.name and content_sha256 != content:
             raise WrongContentError(
                 f"another session is called {name}, with other fruits, expected a name that the map does not have: "
@@ -272,6 +269,15 @@ def require_new(connection: sqlite3.Connection, session: Session, content: str) 
             )
         if name == session.name:
             raise WrongContentError(f"session {name} is in the map already")
+    require_unseen(connection, session, content)
+
+
+def require_unseen(connection: sqlite3.Connection, session: Session, content: str) -> None:
+    """Refuse a session that is in the map, whatever it is called there."""
+    columns = columns_of(connection, "sessions", ("name", "content_sha256", "input_hashes"))
+    if not columns[0]:
+        raise WrongContentError("has no session, expected at least one")
+    for name, content_sha256, input_hashes in zip(*columns, strict=True):
         if content_sha256 == content:
             raise WrongContentError(f"session {session.name} is in the map already, as {name}: the same fruits")
         if session.input_hashes and input_hashes == session.input_hashes_json:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pomona.earth import Anchor
@@ -53,6 +53,13 @@ class Besides:
     fit: tuple[str, int, float] | None
     control_points: Sequence[tuple[Any, ...]]
     history: Sequence[tuple[str, str, Change]]
+
+    def renamed(self, names: Mapping[str, str]) -> Besides:
+        """Return it with other names for some sessions."""
+        own = POINT_NAMES.index("session")
+        points = [(*point[:own], names.get(point[own], point[own]), *point[own + 1 :]) for point in self.control_points]
+        history = [(cause, names.get(session, session), change) for cause, session, change in self.history]
+        return replace(self, control_points=points, history=history)
 
 
 POINT_NAMES = (

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.earth import from_utm
+from pomona.earth import are_outside_zone, from_utm
 from pomona.errors import PomonaError
 from pomona.reading import number_in, shown
 from pomona.table_lines import table_lines
@@ -26,6 +26,7 @@ class ControlTable:
 
     Attributes
     ----------
+    path : Path
     where : tuple of N str
         File and line of each.
     names : tuple of N str
@@ -37,6 +38,7 @@ class ControlTable:
         Longitude and latitude in degrees, height in metres; NaN where it is not known.
     """
 
+    path: Path
     where: tuple[str, ...]
     names: tuple[str, ...]
     place: str
@@ -73,6 +75,7 @@ def read_control_points(path: Path, epsg: int | None = None) -> ControlTable:
     if not rows:
         raise PomonaError(f"{path}: found no known points, expected two or more")
     if epsg is not None:
+        _require_in_zone(where, epsg, plan)
         plan = from_utm(epsg, plan[:, 0], plan[:, 1])
     _require_degrees(where, plan)
     heights = [
@@ -80,6 +83,7 @@ def read_control_points(path: Path, epsg: int | None = None) -> ControlTable:
         for at, row in zip(where, rows, strict=True)
     ]
     return ControlTable(
+        path=path,
         where=tuple(where),
         names=tuple(row.get("name", "").strip() or f"point {n}" for n, row in enumerate(rows, 1)),
         place=place[0],
@@ -93,6 +97,14 @@ def _only(path: Path, header: list[str], choices: tuple[tuple[str, ...], ...]) -
     if len(there) != 1:
         raise PomonaError(f"{path}: found the header {shown(','.join(header))}, expected {_EXPECTED}")
     return there[0]
+
+
+def _require_in_zone(where: list[str], epsg: int, plan: NDArray[np.float64]) -> None:
+    wrong = are_outside_zone(epsg, plan[:, 0], plan[:, 1])
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        found = f"easting {plan[row, 0]:g} and northing {plan[row, 1]:g}"
+        raise PomonaError(f"{where[row]}: found {found}, expected metres in the zone of --epsg {epsg}")
 
 
 def _require_degrees(where: list[str], plan: NDArray[np.float64]) -> None:

@@ -95,7 +95,7 @@ def georeference(
     with writing(Path(path), "map", timeout_s=timeout_s, waiting=waiting) as (connection, _):
         named, frames, positions = _in_map(connection, table, session)
         up = _up(connection) if up_in_map is None else np.asarray(up_in_map, np.float64)
-        anchor = anchored(positions, table.geodetic, up, free_scale=free_scale)
+        anchor = _anchored(table, positions, up, free_scale=free_scale)
         off_m = anchor.off_m(positions, table.geodetic)
         _require_near(table, positions, anchor, up, off_m, within_m)
         scale = float(np.cbrt(np.linalg.det(anchor.enu_from_map[:3, :3])))
@@ -155,6 +155,15 @@ def _up(connection: sqlite3.Connection) -> NDArray[np.float64] | None:
     if not ways:
         return None
     return np.asarray(-np.concatenate(ways)[:, :3, DOWN_IN_CAMERA].mean(axis=0))
+
+
+def _anchored(
+    table: ControlTable, positions: NDArray[np.float64], up_in_map: NDArray[np.float64] | None, *, free_scale: bool
+) -> Anchor:
+    try:
+        return anchored(positions, table.geodetic, up_in_map, free_scale=free_scale)
+    except PomonaError as error:
+        raise PomonaError(f"{table.path}: {error}") from None
 
 
 def _require_near(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.identity import VisitPair
-from pomona.orchard.adding import require_new
+from pomona.orchard.adding import require_unseen
 from pomona.orchard.carrying import carry_anchor, carry_history, carry_trees
 from pomona.orchard.evidence import Evidence, KnownVisit, read_evidence
 from pomona.orchard.fruit_ids import Change
@@ -58,6 +58,8 @@ class Merged:
         Whether the map holds its sessions now.
     sessions, shared : tuple of str
         Names of the sessions that came, and of those that were in both.
+    renamed : mapping of str to str
+        Names that another session of the map had, and what the sessions that came are called instead.
     fruit_ids : mapping of int to int
         Fruit of the other map to the fruit that has most of its sights now.
     n_known : int
@@ -72,6 +74,7 @@ class Merged:
     is_merged: bool
     sessions: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
+    renamed: Mapping[str, str] = field(default_factory=dict)
     fruit_ids: Mapping[int, int] = field(default_factory=dict)
     n_known: int = 0
     changes: tuple[Change, ...] = ()
@@ -91,7 +94,8 @@ def merge_maps(
 
     The other map is only read. Fruits of the map keep their ids; those of the other get ids of the map, and the layer
     `changes` keeps which. Trees, the place on Earth and the history of the other come too, where the map does not have
-    its own. When the two do not overlap nothing is written. All of it happens in one transaction.
+    its own. A session that is in both comes once; one whose name another session of the map has gets the name of its
+    file behind its own. When the two do not overlap nothing is written. All of it happens in one transaction.
 
     Parameters
     ----------
@@ -109,8 +113,8 @@ def merge_maps(
     Raises
     ------
     PomonaError
-        When a file is not a map of ours, both are the same file, two different sessions have one name, or the map
-        cannot be written.
+        When a file is not a map of ours, both are the same file, a session was made from the input files of another
+        one of the map, or the map cannot be written.
     """
     path, other = Path(path), Path(other)
     if other.exists() and path.exists() and path.samefile(other):
@@ -143,7 +147,9 @@ def _merge(connection: sqlite3.Connection, theirs: OtherMap, settings: Settings)
     ours = dict(zip(*columns_of(connection, "sessions", ("content_sha256", "id")), strict=True))
     shared = {number: ours[content] for number, content in enumerate(theirs.contents) if content in ours}
     for number in theirs.all_but(shared):
-        require_new(connection, theirs.sessions[number], theirs.contents[number])
+        require_unseen(connection, theirs.sessions[number], theirs.contents[number])
+    (taken,) = columns_of(connection, "sessions", ("name",))
+    theirs, renamed = theirs.with_free_names(theirs.all_but(shared), taken)
     found = None if shared else recognised(connection, theirs.fruits, settings)
     if found is not None and not found.is_found:
         return Merged(found.match, is_merged=False)
@@ -164,7 +170,7 @@ def _merge(connection: sqlite3.Connection, theirs: OtherMap, settings: Settings)
     write_changes(connection, "added", theirs.name, settlement.changes)
     write_changes(connection, "merged", theirs.name, became)
     left_out = _carried(connection, theirs, map_from_other, merged.fruit_ids)
-    return replace(merged, changes=tuple(settlement.changes), left_out=left_out)
+    return replace(merged, renamed=renamed, changes=tuple(settlement.changes), left_out=left_out)
 
 
 def _carried(

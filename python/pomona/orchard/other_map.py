@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Container
-from dataclasses import dataclass
+from collections.abc import Collection, Container, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,24 @@ class OtherMap:
     def all_but(self, left_out: Container[int]) -> list[int]:
         """Return the numbers of the other sessions."""
         return [number for number in range(len(self.sessions)) if number not in left_out]
+
+    def with_free_names(self, numbers: Sequence[int], taken: Collection[str]) -> tuple[OtherMap, dict[str, str]]:
+        """Return it with other names for those of its sessions whose name is taken, and which have which now."""
+        names = {*taken, *(session.name for session in self.sessions)}
+        renamed: dict[str, str] = {}
+        for name in (self.sessions[number].name for number in numbers):
+            if name in taken:
+                renamed[name] = next(one for one in self._names_for(name) if one not in names)
+                names.add(renamed[name])
+        sessions = [
+            replace(session, name=renamed.get(session.name, session.name)) if number in numbers else session
+            for number, session in enumerate(self.sessions)
+        ]
+        return replace(self, sessions=sessions, besides=self.besides.renamed(renamed)), renamed
+
+    def _names_for(self, name: str) -> Iterator[str]:
+        yield f"{name} ({self.name})"
+        yield from (f"{name} ({self.name}, {number})" for number in count(2))
 
     def last_sights(self) -> list[tuple[int, int]]:
         """Return for each of `fruits` the visit that saw it last, and its row there."""

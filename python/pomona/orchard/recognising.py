@@ -174,14 +174,19 @@ def matches_between(
     ]
     asked = Settings({**settings.call, "up": None, "per_frame": False, "threads": 1}, settings.overrides)
     with ThreadPoolExecutor(capped_threads(settings.call["threads"]) or cores()) as pool:
-        found = pool.map(lambda number: _match_of_two(visit, evidence.visits[number], asked), numbers)
+        found = pool.map(lambda number: _match_of_two(visit, evidence.visits[number], map_from_visit, asked), numbers)
         return {number: pair for number, pair in zip(numbers, found, strict=True) if pair is not None}
 
 
-def _match_of_two(visit: KnownVisit, other: KnownVisit, settings: Settings) -> VisitPair | None:
+def _match_of_two(
+    visit: KnownVisit, other: KnownVisit, map_from_visit: NDArray[np.float64], settings: Settings
+) -> VisitPair | None:
+    """Return how two visits match; where they seem to lie saves a search, and changes nothing of what is found."""
     is_later = visit.seen.key > other.seen.key
-    query, map_ = (visit.cloud, other.cloud) if is_later else (other.cloud, visit.cloud)
-    match = settings.match(_rounded(query), _rounded(map_))
+    sides = [(visit.cloud, map_from_visit), (other.cloud, other.map_from_session)]
+    (query, map_from_query), (map_, map_from_map) = sides if is_later else sides[::-1]
+    expected = np.linalg.inv(map_from_map) @ map_from_query
+    match = settings.match_expected(_rounded(query), _rounded(map_), expected)
     if match.status.value != "Found":
         return None
     assert match.map_from_query is not None

@@ -44,8 +44,12 @@ const GATE: f64 = 0.3;
 const REACH: f64 = 3.0;
 const GROWS: f64 = 1.6;
 
-/// Poses that are grown.
-const GROWN: usize = 32;
+/// Rounds in which anchors all over the map are asked, and poses that are grown in each.
+const ROUNDS: usize = 8;
+const GROWN: usize = 8;
+
+/// Share of the visit's fruits that meet one of the map where no other place has to be looked for: chance gives a sixth.
+const ENOUGH: f64 = 0.5;
 
 /// Anchors that are worth a thread of their own.
 const SHARE_OF_ANCHORS: usize = 32;
@@ -74,12 +78,20 @@ pub fn whereabouts(map: &FruitCloud, visit: &FruitCloud) -> Result<Option<Wherea
     let middle = median_place(&map.positions);
     let places: Vec<_> = map.positions.iter().map(|place| place - middle).collect();
     let search = Search::new(&places, &visit.cloud);
-    let mut guesses = search.guesses();
-    guesses.sort_by(|a, b| b.n_met.cmp(&a.n_met).then(a.anchor.cmp(&b.anchor)));
-    guesses.truncate(GROWN);
-    let grown = guesses.par_iter().filter_map(|guess| search.grown(guess)).collect::<Vec<_>>();
-    // The first of equal ones, whatever the threads.
-    let best = grown.into_iter().reduce(|best, next| if next.n_met > best.n_met { next } else { best });
+    let anchors = search.anchors();
+    let mut best: Option<Whereabouts> = None;
+    for round in 0..ROUNDS {
+        let some: Vec<u32> = anchors.iter().copied().skip(round).step_by(ROUNDS).collect();
+        let mut guesses = search.guesses(&some);
+        guesses.sort_by(|a, b| b.n_met.cmp(&a.n_met).then(a.anchor.cmp(&b.anchor)));
+        guesses.truncate(GROWN);
+        let grown = guesses.par_iter().filter_map(|guess| search.grown(guess)).collect::<Vec<_>>();
+        // The first of equal ones, whatever the threads.
+        best = best.into_iter().chain(grown).reduce(|best, next| if next.n_met > best.n_met { next } else { best });
+        if best.as_ref().is_some_and(|best| best.n_met as f64 > ENOUGH * search.visit.len() as f64) {
+            break;
+        }
+    }
     let outward = Similarity { translation: middle, ..Similarity::identity() };
     Ok(best.map(|found| Whereabouts {
         map_from_visit: outward.compose(&found.map_from_visit).compose(&visit.outward().inverse()),
@@ -120,12 +132,15 @@ impl<'a> Search<'a> {
         Self { map, tree: Tree::new(&points), visit, seeds, sigma }
     }
 
-    /// Poses of the seeds of anchors all over the map.
-    fn guesses(&self) -> Vec<Guess> {
+    /// Fruits all over the map.
+    fn anchors(&self) -> Vec<u32> {
         let wanted = (ANCHORS_EACH * self.map.len() / self.visit.len()).clamp(ANCHORS_EACH, ANCHORS);
         let stride = self.map.len().div_ceil(wanted) as u64;
-        let anchors: Vec<u32> =
-            (0..self.map.len() as u32).filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride)).collect();
+        (0..self.map.len() as u32).filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride)).collect()
+    }
+
+    /// Poses of the seeds of anchors.
+    fn guesses(&self, anchors: &[u32]) -> Vec<Guess> {
         anchors.par_iter().with_min_len(SHARE_OF_ANCHORS).flat_map_iter(|&anchor| self.guesses_at(anchor)).collect()
     }
 

@@ -38,6 +38,11 @@ impl VerifiedMap {
         Self { landscape, seeds, scale, fruits: map.len() }
     }
 
+    /// Where no seeds are looked up, as poses are proposed.
+    pub(super) fn without_seeds(map: &FruitCloud) -> Self {
+        Self { landscape: Landscape::new(map), seeds: SeedIndex::empty(), scale: Scale::Metric, fruits: map.len() }
+    }
+
     /// What is cut out of a map of so many fruits and of this spacing, for poses that are proposed.
     pub(super) fn part(cloud: &FruitCloud, spacing: f64, fruits: usize) -> Self {
         let landscape = Landscape::part(cloud, spacing);

@@ -11,6 +11,8 @@
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
+//!
+//! Where it is known about where the query lies, seeds are looked up there in place of steps 1 and 5 (`expected`).
 
 mod acceptance;
 mod beliefs;
@@ -24,6 +26,7 @@ mod decision;
 mod displacement;
 mod doubts;
 mod evidence;
+mod expected;
 mod extent;
 #[cfg(test)]
 mod fixture;
@@ -48,6 +51,7 @@ mod vertical;
 pub use acceptance::VerifiedConfig;
 pub(crate) use case::{SEED_SIGMA, VerifiedMap};
 pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
+pub(crate) use expected::search_expected;
 pub(crate) use landscape::{Landscape, median};
 pub(crate) use nearest::single;
 pub(crate) use seeds::{COMPANIONS, Quad, SeedIndex, canonical, frame, near_ties, shuffled};

@@ -1,0 +1,163 @@
+//! A query of which it is known to a few decimetres where it lies: what seeds this lays on each other, in place of an index.
+//!
+//! To make the index of a map and to look seeds up in it costs as much as all that follows. Where the query is expected
+//! somewhere, the fruits of the map that a seed may be are those near it. Which of these poses is the best, and what
+//! grows out of it, follows from the two clouds alone: by how much the expectation is off changes nothing. An answer
+//! that leaves a doubt is none: the other poses that would rule it out were not looked for.
+
+use super::acceptance::VerifiedConfig;
+use super::case::{Search, Stages, VerifiedMap};
+use super::decision::{MIN_FRUITS, answer_of};
+use super::landscape::Landscape;
+use super::nearest::single;
+use super::placement::Placement;
+use super::proposal::Proposer;
+use super::search::{Contender, Effort, by_evidence, distinct, of_some_fruits};
+use super::seeds::{Quad, STARS, Seed};
+use super::size::Diameters;
+use crate::answer::{Match, Verdict};
+use crate::cloud::FruitCloud;
+use crate::geometry::{Scale, Similarity};
+use crate::matching::Request;
+use nalgebra::Vector3;
+
+/// Spacings by which a fruit may be off from where it is expected: 27 cm in an orchard.
+const OFF: f64 = 1.0;
+
+/// Standard deviations by which two fruits of a seed may be nearer to each other, or farther, than in the map.
+const APART: f64 = 2.5;
+
+/// Seeds shorter than this, in standard deviations, fix no pose.
+const SHORTEST: f64 = 6.0;
+
+/// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
+const FRUITS: usize = 128;
+const REFINED: usize = 32;
+
+/// An answer with this many times the evidence needed has no rival.
+const BEYOND_DOUBT: f64 = 6.0;
+
+/// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt.
+pub(crate) fn search_expected(
+    map: &FruitCloud,
+    query: &FruitCloud,
+    map_from_query: &Similarity,
+    request: &Request,
+    config: &VerifiedConfig,
+) -> Match {
+    if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS || request.scale != Scale::Metric {
+        return Match::without_answer(Verdict::NoMatch, Stages::new());
+    }
+    let prepared = VerifiedMap::without_seeds(map);
+    let landscape = Landscape::new(query);
+    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
+    let search = Search::new(&prepared, &landscape, sizes, request, config);
+    let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
+    let contenders = search.contenders(&expected);
+    let (findings, stages) = search.weigh(&contenders, Effort::default());
+    let least = BEYOND_DOUBT * search.threshold();
+    if findings.accepted.first().is_some_and(|best| best.overlap.log_odds > least) {
+        answer_of(&search, (findings, stages))
+    } else {
+        Match::without_answer(Verdict::NoMatch, stages)
+    }
+}
+
+impl Search<'_> {
+    /// The best poses that lay a seed of the query on fruits near where it is expected.
+    fn contenders(&self, expected: &Placement) -> Vec<Contender> {
+        let seeds = of_some_fruits(self.query, self.query.len().div_ceil(FRUITS) as u64, 0..1);
+        let mut found = Vec::new();
+        for seed in &seeds {
+            self.lay(seed, expected, &mut found);
+        }
+        found.sort_unstable_by(by_evidence);
+        distinct(self.query, self.map.spacing, &mut found, REFINED)
+    }
+
+    fn lay(&self, &(quad, code): &Seed, expected: &Placement, found: &mut Vec<Contender>) {
+        if f64::from(code[0]) < SHORTEST * self.model.sigma {
+            return;
+        }
+        let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
+        let fruits = quad.map(|row| self.query.points[row as usize]);
+        let near = fruits.map(|fruit| self.near(&expected.apply(&fruit)));
+        let most = 2.0 * (APART * self.model.sigma).powi(2);
+        self.each_alike(&fruits, &near, &mut |target| {
+            let Some((pose, residual)) = proposer.fit(&target) else { return };
+            if residual > most {
+                return;
+            }
+            let Some(pose) = proposer.upright(pose) else { return };
+            let log_odds = proposer.first_look(&pose);
+            if log_odds > 0.0 {
+                found.push(Contender { pose, log_odds, place: proposer.centroid, key: (quad, target) });
+            }
+        });
+    }
+
+    /// Fruits of the map near a place.
+    fn near(&self, place: &Vector3<f64>) -> Vec<u32> {
+        let mut rows = Vec::new();
+        self.map.tree.within(&single(place), (OFF * self.map.spacing) as f32, |row, _| rows.push(row));
+        rows.sort_unstable();
+        rows
+    }
+
+    /// Calls `take` with four fruits of the map, one of each list, that lie to each other as those of the query do.
+    fn each_alike(&self, fruits: &[Vector3<f64>; STARS], near: &[Vec<u32>; STARS], take: &mut impl FnMut(Quad)) {
+        let apart = |one: usize, other: usize| (fruits[one] - fruits[other]).norm();
+        let place = |row: u32| self.map.points[row as usize];
+        let alike = |one: usize, other: usize, rows: [u32; 2]| {
+            let [here, there] = rows.map(place);
+            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < APART * self.model.sigma
+        };
+        for &a in &near[0] {
+            for &b in near[1].iter().filter(|&&b| alike(0, 1, [a, b])) {
+                for &c in near[2].iter().filter(|&&c| alike(0, 2, [a, c]) && alike(1, 2, [b, c])) {
+                    let fits = |d: u32| alike(0, 3, [a, d]) && alike(1, 3, [b, d]) && alike(2, 3, [c, d]);
+                    near[3].iter().filter(|&&d| fits(d)).for_each(|&d| take([a, b, c, d]));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::verified::fixture::visits;
+    use nalgebra::Rotation3;
+
+    fn asked(query: &FruitCloud, map: &FruitCloud, expected: &Similarity) -> Match {
+        search_expected(map, query, expected, &Request::default(), &Config::default().verified)
+    }
+
+    #[test]
+    fn what_is_found_does_not_follow_the_expectation_nor_differ_from_a_search() {
+        let (query, map) = visits(0.01);
+        let request = Request::default();
+        let config = Config::default();
+        let prepared = VerifiedMap::new(&map, Scale::Metric);
+        let searched = super::super::search(&prepared, &map, &query, &request, &config.verified);
+        let [first, second] = [0.0, 0.02].map(|off: f64| {
+            let turn = Rotation3::new(Vector3::new(off, -off, off));
+            asked(&query, &map, &Similarity::rigid(turn, Vector3::new(off, 3.0 * off, -off)))
+        });
+        assert_eq!(first.verdict, Verdict::Found);
+        let facts = |found: &Match| found.pairs.iter().map(|p| (p.query, p.map, p.probability)).collect::<Vec<_>>();
+        assert_eq!(facts(&first), facts(&second));
+        let pairs = |found: &Match| found.pairs.iter().map(|p| (p.query, p.map)).collect::<Vec<_>>();
+        let (here, there) = (pairs(&first), pairs(&searched));
+        let same = here.iter().filter(|pair| there.contains(pair)).count();
+        assert!(100 * same >= 99 * here.len().max(there.len()), "{same} of {} and {}", here.len(), there.len());
+    }
+
+    #[test]
+    fn where_nothing_is_nothing_is_found() {
+        let (query, map) = visits(0.01);
+        let aside = Similarity { translation: Vector3::new(2.0, 0.0, 0.0), ..Similarity::identity() };
+        assert_eq!(asked(&query, &map, &aside).verdict, Verdict::NoMatch);
+    }
+}
