@@ -10,6 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.growth_draw import draw_sizes
+from benchmarks.growth_outside import course_outside
+from benchmarks.growth_scores import scores
 
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
@@ -25,6 +28,7 @@ from pomona.growth.size_classes import class_counts, parsed_classes
 from pomona.growth.size_table import SizeTable
 from pomona.growth.straying import SPELL_DAYS, straying
 from pomona.orchard import OrchardMap, Session, add_session
+from pomona.synth.seasons import SEASONS
 
 Pomona = Callable[..., tuple[int, str, str]]
 
@@ -148,6 +152,15 @@ def test_sizes_rates_and_forecasts_are_near_the_truth(row: GrownRow, grown: Seas
     assert np.quantile(mean, 0.05) < true.mean() < np.quantile(mean, 0.95)
     # A block's mean is surer than a fruit, and never as sure as fruits whose errors were their own would make it.
     assert (high - low).mean() > np.ptp(np.quantile(mean, (0.05, 0.95))) > 0.5
+
+
+def test_what_no_curve_foretells_is_in_the_interval() -> None:
+    """Growth that slows down towards the harvest, which three visits do not show: 3 mm less than the curve says."""
+    drawn = draw_sizes(SEASONS["hard"], 1, course_outside("slowing", 1))
+    found = scores(growth_of(drawn.fruits, harvest=drawn.harvest.date()), drawn)
+    assert found["bias_mm"] > 2.5
+    assert found["block_covered"]
+    assert found["fruits_covered"] > 0.8 * found["n_fruits"]
 
 
 def test_a_forecast_is_the_wider_the_farther_ahead(grown: SeasonGrowth) -> None:
