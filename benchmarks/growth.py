@@ -2,32 +2,49 @@
 
 Sizes of the fruits of `pomona.synth`'s rows on the visits of its seasons: 2 mm of noise on each, an error of 2 to 3 %
 that all sizes of a visit share, fruits that are hidden on most visits or few, false points of a single visit;
-identities are the true ones. Then the same in years that differ: 15 % in the rate of growth, 10 days in its onset. The
-first 60 % of the season are measured, its last visit is foretold. Twelve Fuji of `season_apples`: the same from
+identities are the true ones. Then the same in years that differ: 15 % in the rate of growth, 10 days in its onset; and
+in years that no curve of the model describes: a dry spell of two to four weeks, growth that slows down towards the
+harvest, stone fruits, growth that falls from the first day, growth in a straight line. The first 60 % of the season are
+measured, its last visit is foretold. Twelve Fuji of `season_apples`: the same from
 calipers, and from boxes in the plane of the tennis balls. `kinect_apples`: diameters of scans against calipers. Writes
 growth.csv, growth.md, growth_season_apples.png and growth_kinect_apples.png.
 """
 
 import argparse
 import sys
+from functools import partial
+from pathlib import Path
 
 from benchmarks.growth_draw import Year, draw_sizes
+from benchmarks.growth_outside import OUTSIDE, Course, course_outside
 from benchmarks.growth_real import kinect_apples, season_apples
 from benchmarks.growth_scores import line, scores
+from benchmarks.kept_rows import KeptRows
 from benchmarks.results import markdown, shared_data, write_rows, write_text
 from pomona.growth.season_growth import growth_of
 from pomona.synth.seasons import SEASONS
 
-SEEDS = 20
-DIFFERENT = "that differ"
-YEARS = ("all the same", DIFFERENT)
+SEEDS, SEEDS_OUTSIDE = 4, 3
+SAME, DIFFERENT = "all the same", "that differ"
+YEARS = (SAME, DIFFERENT, *OUTSIDE)
 
 
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks growth", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="of years that the model's curves describe")
+    parser.add_argument("--seeds-outside", type=int, default=SEEDS_OUTSIDE, help="of each kind of the others")
+    parser.add_argument("--kept", type=Path, help="file that keeps outcomes: an interrupted run goes on")
     options = parser.parse_args(arguments)
-    rows = [score_season(name, seed, years) for name in SEASONS for years in YEARS for seed in range(options.seeds)]
+    seeds = {years: options.seeds_outside if years in OUTSIDE else options.seeds for years in YEARS}
+    kept = KeptRows(options.kept)
+    rows = [
+        kept.row({"season": name, "years": years, "seed": seed}, partial(score_season, name, seed, years))
+        for seed in range(max(seeds.values()))
+        for years in YEARS
+        for name in SEASONS
+        if seed < seeds[years]
+    ]
+    rows.sort(key=lambda row: (list(SEASONS).index(str(row["season"])), YEARS.index(str(row["years"]))))
     write_rows("growth.csv", rows)
     text = report(rows)
     data = shared_data()
@@ -39,9 +56,9 @@ def main(arguments: list[str]) -> None:
 
 
 def score_season(name: str, seed: int, years: str) -> dict[str, object]:
-    drawn = draw_sizes(SEASONS[name], seed, Year.draw(seed) if years == DIFFERENT else Year())
+    drawn = draw_sizes(SEASONS[name], seed, course_of(years, seed))
     found = growth_of(drawn.fruits, harvest=drawn.harvest.date())
-    sys.stderr.write(f"growth: {name} {seed} done\n")
+    sys.stderr.write(f"growth: {name}, {years}, {seed} done\n")
     return {
         "season": name,
         "years": years,
@@ -49,6 +66,12 @@ def score_season(name: str, seed: int, years: str) -> dict[str, object]:
         "curve": found.curve.fitted.family.name,
         **scores(found, drawn),
     }
+
+
+def course_of(years: str, seed: int) -> Course:
+    if years in OUTSIDE:
+        return course_outside(years, seed)
+    return (Year.draw(seed) if years == DIFFERENT else Year()).diameters_m
 
 
 def report(rows: list[dict[str, object]]) -> str:

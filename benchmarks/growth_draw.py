@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.growth_outside import Course
 from pomona.cloud import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.measured import MeasuredFruits
 from pomona.synth.living import LivingRow, grow
-from pomona.synth.living.fruit_curves import ONSET_DAYS
+from pomona.synth.living.fruit_curves import ONSET_DAYS, FruitCurves
 from pomona.synth.living.fruit_lives import ALIVE
 from pomona.synth.seasons import SeasonPlan
 
@@ -42,6 +43,10 @@ class Year:
         """Days after bloom of the usual year on which fruits are as large."""
         return ONSET_DAYS + self.faster * (days - ONSET_DAYS - self.late_days)
 
+    def diameters_m(self, curves: FruitCurves, days: float) -> NDArray[np.float64]:
+        """Diameters, (F,), so many days after bloom."""
+        return curves.diameters_m(self.clock(days))
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnSizes:
@@ -53,11 +58,11 @@ class DrawnSizes:
     true_rates: NDArray[np.float64]
 
 
-def draw_sizes(plan: SeasonPlan, seed: int, year: Year = Year()) -> DrawnSizes:
+def draw_sizes(plan: SeasonPlan, seed: int, course: Course = Year().diameters_m) -> DrawnSizes:
     row, rng = grow(plan.design, seed), np.random.Generator(np.random.PCG64([seed, 60]))
     days = np.array([row.days_after_bloom(day) for day in plan.days])
     measured = days[days <= days[0] + MEASURED_SHARE * (days[-1] - days[0])]
-    sizes_mm = np.stack([row.crop.curves.diameters_m(year.clock(day)) for day in measured], axis=1) * 1000.0
+    sizes_mm = np.stack([course(row.crop.curves, day) for day in measured], axis=1) * 1000.0
     alive = np.stack([row.crop.lives.states(day) == ALIVE for day in measured], axis=1)
     shown = rng.normal(size=(len(row.crop), 1)) + OWN_CHANCE * rng.normal(size=sizes_mm.shape)
     seen = alive & (shown > np.quantile(shown, plan.hidden_share))
@@ -67,7 +72,7 @@ def draw_sizes(plan: SeasonPlan, seed: int, year: Year = Year()) -> DrawnSizes:
     scales = np.exp(rng.uniform(*SCALE_SIGMAS) * rng.normal(size=len(measured)))
     noisy_mm = np.maximum(sizes_mm * scales + rng.normal(0.0, 1000.0 * plan.size_noise_m, sizes_mm.shape), 5.0)
     trees = np.concatenate([row.crop.trees, row.crop.trees[rows[false]]])
-    true_mm, rates = truth(row, measured[-1], days[-1], year)
+    true_mm, rates = truth(row, measured[-1], days[-1], course)
     nothing = np.full(len(false), np.nan)
     return in_order(plan, trees, noisy_mm, np.append(true_mm, nothing), np.append(rates, nothing))
 
@@ -79,11 +84,13 @@ def single(sizes_mm: NDArray[np.float64], rows: NDArray[np.int64], columns: NDAr
     return found
 
 
-def truth(row: LivingRow, now: float, harvest: float, year: Year) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def truth(
+    row: LivingRow, now: float, harvest: float, course: Course
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sizes at the harvest of fruits that hang then, mm, and rates now of those that hang now."""
     curves, lives = row.crop.curves, row.crop.lives
-    sizes_mm = np.where(lives.states(harvest) == ALIVE, 1000.0 * curves.diameters_m(year.clock(harvest)), np.nan)
-    rates = 1000.0 * (curves.diameters_m(year.clock(now + 0.5)) - curves.diameters_m(year.clock(now - 0.5)))
+    sizes_mm = np.where(lives.states(harvest) == ALIVE, 1000.0 * course(curves, harvest), np.nan)
+    rates = 1000.0 * (course(curves, now + 0.5) - course(curves, now - 0.5))
     return sizes_mm, np.where(lives.states(now) == ALIVE, rates, np.nan)
 
 
@@ -117,7 +124,7 @@ def as_fruits(
         path=Path("drawn"),
         cloud=FruitCloud(np.zeros((n, 3)), extras={"state": states}),
         ids=np.arange(1, n + 1),
-        trees=BearingTrees(tuple(map(str, names + 1)), numbers.astype(np.int64), np.zeros(n)),
+        trees=BearingTrees(tuple(map(str, names + 1)), numbers.astype(np.int64), np.zeros(n), ("",) * len(names)),
         sessions=tuple(moment.isoformat() for moment in moments),
         moments=moments,
         diameters_mm=sizes_mm,

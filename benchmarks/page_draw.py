@@ -39,7 +39,9 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
         "name": f"{n} fruits",
         "visits": [{"name": str(day), "date": str(day), "n_fruits": n, "n_matched": n} for day in days],
         "map_from_page": np.eye(4).tolist(),
-        "trees": [{"name": str(tree), "middle": [TREE_M * tree, 0.0, 1.3]} for tree in range(trees.max() + 1)],
+        "trees": [
+            {"name": str(tree), "row": "", "middle": [TREE_M * tree, 0.0, 1.3]} for tree in range(trees.max() + 1)
+        ],
         "fruits": {
             "ids": packed_texts([str(one) for one in range(1, n + 1)]),
             "tree": packed(trees),

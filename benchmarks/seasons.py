@@ -6,15 +6,18 @@ of which it says so it is right, and of how many that hang it says so. Writes se
 """
 
 import argparse
+import dataclasses
 import random
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from benchmarks.drawn_seasons import DrawnSeason, drawn_season
 from benchmarks.identity_scores import IdentityScore, score_identities
+from benchmarks.kept_rows import KeptRows
 from benchmarks.results import markdown, share, write_rows, write_text
 from pomona.orchard import OrchardMap, add_session
 from pomona.synth.seasons import SEASONS
@@ -30,12 +33,15 @@ def main(arguments: list[str]) -> None:
         "--seeds", type=int, default=20, help="seasons of each name; default: as in the committed table"
     )
     parser.add_argument("--drawn", type=Path, help="folder that keeps the drawn seasons; drawing one takes a minute")
+    parser.add_argument("--kept", type=Path, help="file that keeps outcomes: an interrupted run goes on")
     parser.add_argument("--shuffled", action="store_true", help="add the visits in a random order; writes nothing")
     options = parser.parse_args(arguments)
+    kept = KeptRows(options.kept)
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.drawn or Path(scratch)
+        made = partial(outcome, folder, shuffled=options.shuffled)
         rows = [
-            row_of(drawn_season(folder, name, seed), shuffled=options.shuffled)
+            parted(kept.row({"season": name, "seed": seed, "shuffled": options.shuffled}, partial(made, name, seed)))
             for name in options.seasons
             for seed in range(options.seeds)
         ]
@@ -44,6 +50,17 @@ def main(arguments: list[str]) -> None:
         return
     write_rows("seasons.csv", [{**row, **vars(score), **score.shares()} for row, score in rows])
     write_text("seasons.md", f"# Seasons\n\n{' '.join((__doc__ or '').split())}\n\n{table(rows)}")
+
+
+def outcome(folder: Path, name: str, seed: int, *, shuffled: bool) -> dict[str, object]:
+    row, score = row_of(drawn_season(folder, name, seed), shuffled=shuffled)
+    return {**row, **dataclasses.asdict(score)}
+
+
+def parted(outcome: dict[str, object]) -> tuple[dict[str, object], IdentityScore]:
+    """Part an outcome into what it is of and its counts."""
+    counts = {field.name: outcome.pop(field.name) for field in dataclasses.fields(IdentityScore)}
+    return outcome, IdentityScore(**counts)
 
 
 def row_of(season: DrawnSeason, *, shuffled: bool) -> tuple[dict[str, object], IdentityScore]:

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.growth_draw import draw_sizes
+from benchmarks.growth_outside import course_outside
+from benchmarks.growth_scores import scores
 
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
@@ -18,11 +21,14 @@ from pomona.growth.curve_families import FAMILIES
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.fitting import fit_shape
 from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.mixed_quantiles import mixed_quantile
 from pomona.growth.season_clock import DegreeDays, read_temperatures
 from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
 from pomona.growth.size_classes import class_counts, parsed_classes
 from pomona.growth.size_table import SizeTable
+from pomona.growth.straying import SPELL_DAYS, straying
 from pomona.orchard import OrchardMap, Session, add_session
+from pomona.synth.seasons import SEASONS
 
 Pomona = Callable[..., tuple[int, str, str]]
 
@@ -57,7 +63,7 @@ def small_table() -> SizeTable:
     return SizeTable.of(sizes_mm, np.array([0, 0, 0, 1, 1]), np.array([100.0, 114.0, 130.0]))
 
 
-SHAPE = Shape(0.09, 95.0, 0.07, 3.0, 0.02, 0.025, 2.0)
+SHAPE = Shape(0.09, 95.0, 0.07, 3.0, 0.02, 0.025, 2.0, 0.001)
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -71,7 +77,8 @@ def test_the_likelihood_is_that_of_one_large_gaussian(name: str) -> None:
     middle = np.log(30.0) - model.log_size(np.array(SHAPE.onset_day))
     same_fruit, same_visit = fruits[:, None] == fruits, visits[:, None] == visits
     same_tree = table.trees[fruits][:, None] == table.trees[fruits]
-    covariance = 0.3**2 + SHAPE.visit_spread**2 * same_visit + SHAPE.tree_spread**2 * same_tree
+    covariance = 0.2**2 + SHAPE.visit_spread**2 * same_visit + SHAPE.tree_spread**2 * same_tree
+    covariance = covariance + SHAPE.stray_per_day**2 * straying(table.times)[np.ix_(visits, visits)]
     of_fruit = SHAPE.fruit_spread**2 + SHAPE.onset_spread_days**2 * np.outer(slopes, slopes)
     covariance = covariance + of_fruit * same_fruit + np.diag((SHAPE.noise_mm / table.typical_mm[visits]) ** 2)
     away = table.logs[fruits, visits] - middle - model.log_size(table.times)[visits]
@@ -90,6 +97,39 @@ def test_draws_scatter_about_their_expectation() -> None:
     for name in ("visits", "trees", "sizes", "onsets_days"):
         values = np.array([getattr(one, name) for one in drawn])
         np.testing.assert_allclose(values.mean(axis=0), getattr(expected, name), atol=4 * values.std() / 60)
+
+
+def test_straying_is_the_sum_of_days_that_are_alike() -> None:
+    """Its closed form against days that are summed up one by one."""
+    days = np.arange(0.0, 90.0, 0.5) + 0.25
+    alike = np.exp(-np.abs(days[:, None] - days) / SPELL_DAYS)
+    times = np.array([200.0, 215.0, 215.0, 260.0, 290.0])
+    until = (days < (times - times[0])[:, None]) * 0.5
+    np.testing.assert_allclose(straying(times), until @ alike @ until.T, rtol=2e-3, atol=1e-9)
+
+
+def test_draws_of_straying_and_errors_add_up_to_what_visits_share() -> None:
+    table, times = small_table(), np.array([100.0, 114.0, 130.0, 190.0])
+    model = Hierarchy(table, FAMILIES["expolinear"], SHAPE)
+    effects, rng = model.expected(), np.random.default_rng(0)
+    drawn = np.array([model.draw_stray(effects, times, rng) for _ in range(4000)])
+    covariance = SHAPE.stray_per_day**2 * straying(times)
+    shared = covariance[:3, :3] + SHAPE.visit_spread**2 * np.eye(3)
+    gain = covariance[:, :3] @ np.linalg.inv(shared)
+    np.testing.assert_allclose(drawn.mean(axis=0), gain @ effects.visits, atol=0.0025)
+    np.testing.assert_allclose(np.cov(drawn.T), covariance - gain @ covariance[:3], atol=1.5e-4)
+    # Nothing is known of the weeks after the last visit: there it is widest.
+    assert drawn[:, 3].std() > 2.0 * drawn[:, 2].std()
+
+
+def test_quantiles_of_a_mixture_are_those_of_its_draws() -> None:
+    rng = np.random.default_rng(4)
+    means, sigmas = [np.array([0.0, 2.0]), np.array([-3.0, 2.0])], [np.array([1.0, 0.5]), np.array([0.2, 0.5])]
+    drawn = np.concatenate([rng.normal(m, s, (n, 2)) for m, s, n in zip(means, sigmas, (150_000, 50_000), strict=True)])
+    for level in (0.05, 0.5, 0.95):
+        found = mixed_quantile(level, (0.75, 0.25), means, sigmas)
+        np.testing.assert_allclose(found, np.quantile(drawn, level, axis=0), atol=0.02)
+        np.testing.assert_allclose(mixed_quantile(level, (1.0,), means[1:], sigmas[1:])[1], found[1], atol=1e-6)
 
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=list(FAMILIES))
@@ -112,6 +152,43 @@ def test_sizes_rates_and_forecasts_are_near_the_truth(row: GrownRow, grown: Seas
     assert np.quantile(mean, 0.05) < true.mean() < np.quantile(mean, 0.95)
     # A block's mean is surer than a fruit, and never as sure as fruits whose errors were their own would make it.
     assert (high - low).mean() > np.ptp(np.quantile(mean, (0.05, 0.95))) > 0.5
+
+
+def test_what_no_curve_foretells_is_in_the_interval() -> None:
+    """Growth that slows down towards the harvest, which three visits do not show: 3 mm less than the curve says."""
+    drawn = draw_sizes(SEASONS["hard"], 1, course_outside("slowing", 1))
+    found = scores(growth_of(drawn.fruits, harvest=drawn.harvest.date()), drawn)
+    assert found["bias_mm"] > 2.5
+    assert found["block_covered"]
+    assert found["fruits_covered"] > 0.8 * found["n_fruits"]
+
+
+def test_a_forecast_is_the_wider_the_farther_ahead(grown: SeasonGrowth) -> None:
+    soon = growth_of(grown.fruits, harvest=BLOOM + timedelta(days=105)).foretold
+    widths = [np.ptp(np.quantile(told.summaries["blocks"][:, 0, -2], (0.05, 0.95))) for told in (soon, grown.foretold)]
+    assert widths[1] > 1.5 * widths[0]
+    assert sum(curve.weight for curve in grown.curves) == pytest.approx(1.0)
+    assert len(grown.curves) == len(FAMILIES)
+
+
+def test_what_is_gone_has_no_size_now(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    """Its curve ends with the visit that measured it last; tables, layers and the page say the same."""
+    path = tmp_path / "orchard.gpkg"
+    path.write_bytes(row.path.read_bytes())
+    with closing(geopackage.connect(path)) as connection, connection:
+        sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
+        connection.execute("UPDATE fruits SET state = 'gone', last_session_id = ? WHERE id = 7", (sessions[1],))
+        connection.execute("DELETE FROM observations WHERE fruit_id = 7 AND session_id IN (?, ?)", sessions[2:])
+    assert pomona("growth", path, "-o", tmp_path / "g", "--harvest", HARVEST)[0] == 0
+    gone = next(line for line in rows_of(tmp_path / "g" / "fruits.csv") if line["fruit_id"] == "7")
+    assert {gone[name] for name in ("rate_mm_per_day", "rate_sigma_mm_per_day", "forecast_mm")} == {""}
+    days = [line["date"] for line in rows_of(tmp_path / "g" / "curves.csv") if line["fruit_id"] == "7"]
+    assert days == [str(row.day(50)), str(row.day(65))]
+    assert pomona("export", path, "-o", tmp_path / "g.csv", "--growth", "--harvest", HARVEST)[0] == 0
+    exported = {line["id"]: line for line in rows_of(tmp_path / "g.csv")}
+    assert {exported["7"][name] for name in ("size_mm", "rate_mm_per_day", "forecast_mm")} == {""}
+    assert exported["7"]["diameter_m"] != ""
+    assert float(exported["8"]["size_mm"]) > 40.0
 
 
 def test_the_error_that_a_visit_shares_is_told(grown: SeasonGrowth) -> None:
@@ -348,7 +425,7 @@ def test_growth_by_degree_days_is_found_by_what_it_foretells(tmp_path: Path) -> 
         connection.execute("UPDATE sessions SET date = ? WHERE name = ?", (str(first + timedelta(days=30)), name))
     found = grow_season(moved, temperature=path)
     assert found.curve.clock.name == "degree days"
-    assert len(found.curve.held_out) == 6
+    assert len(found.curves) == 6
 
 
 @pytest.mark.parametrize(

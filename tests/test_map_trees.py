@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.cli import app
-from pomona.growth.bearing_trees import bearing_trees
+from pomona.growth.bearing_trees import as_counted, bearing_trees
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.map_trees import find_trees
@@ -127,6 +127,24 @@ def test_rows_are_parted_whatever_their_frame(spindles: tuple[np.ndarray, np.nda
         assert len(set(inside // len(places))) == 1
         assert len(inside) >= 0.99 * len(places)
         assert abs(line.direction @ turn[:, 0]) > 0.999
+
+
+def test_fruits_of_several_rows_know_their_row(tmp_path: Path) -> None:
+    """Trees, and what is told of them, go row by row: of two that face each other one is not between the other's."""
+    places = np.concatenate([foot + grown_row("spindle", 3, 1.2, 1)[0] for foot in ([0, 0, 0], [0.4, 3.5, 0])])
+    path = tmp_path / "orchard.gpkg"
+    add_session(path, visit(places, "2024-08-01"))
+    assert "row" not in OrchardMap(path).fruits().extras
+    assert len(find_trees(path)) == 2
+    fruits = OrchardMap(path).fruits()
+    across_m = (fruits.positions @ TURN)[:, 1]
+    rows = np.array(fruits.extras["row"])
+    assert set(rows) - {""} == {"row 1", "row 2"}
+    assert min((rows[across_m < 1.75] == "row 1").mean(), (rows[across_m > 1.75] == "row 2").mean()) in (
+        pytest.approx(0.0, abs=0.05), pytest.approx(1.0, abs=0.05),
+    )  # fmt: skip
+    assert bearing_trees(fruits).rows[:6] == ("row 1",) * 3 + ("row 2",) * 3
+    assert sorted(["row 10", "row 2", "north"], key=as_counted) == ["north", "row 2", "row 10"]
 
 
 def test_a_row_that_bends_is_unrolled() -> None:

@@ -194,10 +194,10 @@ def test_the_table_filters_sorts_and_is_saved(page: Any, row: GrownRow, tmp_path
         assert found == pytest.approx(place_of[line["fruit_id"]].tolist(), abs=0.002)
 
 
-def saved(page: Any, folder: Path) -> list[dict[str, str]]:
+def saved(page: Any, folder: Path, name: str = "orchard-fruits.csv") -> list[dict[str, str]]:
     with page.expect_download() as download:
         page.get_by_role("button", name="Save CSV").click()
-    assert download.value.suggested_filename == "orchard-fruits.csv"
+    assert download.value.suggested_filename == name
     download.value.save_as(folder / "saved.csv")
     with (folder / "saved.csv").open(newline="") as file:
         return list(csv.DictReader(file))
@@ -304,6 +304,49 @@ def test_names_of_trees_are_texts_in_the_page_and_in_a_spreadsheet(browser: Any,
             trees = {line["tree"] for line in csv.DictReader(file)}
         assert trees == {HOSTILE, "'=1+1", '\'@"a,b"'}
         assert page.evaluate("window.owned") is None
+
+
+def test_fruits_and_trees_go_by_their_rows(browser: Any, tmp_path: Path) -> None:
+    """Rows are in the order that they are told in: 2 before 10, by number."""
+    document = drawn_document(400, with_pictures=False)
+    for tree, row in zip(document["trees"], ("row 2", "row 2", "row 10", "row 10"), strict=True):
+        tree["row"] = row
+    document["growth"]["blocks"].append({**document["growth"]["blocks"][0], "kind": "row", "name": "row 10"})
+    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        heads = ["row 2", "Tree 0", "Tree 1", "row 10", "Tree 2", "Tree 3"]
+        assert page.locator(".trees tbody th").all_text_contents() == heads
+        assert page.locator(".trees .of-row td").all_inner_texts()[:1] == ["200"]
+        page.get_by_role("tab", name="Fruits").click()
+        assert page.get_by_role("columnheader").nth(1).inner_text() == "Row"
+        page.get_by_role("button", name="Row", exact=True).click()
+        page.get_by_role("button", name="Row ↑", exact=True).click()
+        assert {cells[1] for cells in shown_rows(page)} == {"row 10"}
+        page.locator('select[aria-label="Row"]').select_option("row 2")
+        assert page.locator(".filter-bar output").inner_text() == "200 of 400 fruits"
+        assert {cells[1] for cells in shown_rows(page)} == {"row 2"}
+        assert {line["row"] for line in saved(page, tmp_path, "400_fruits-fruits.csv")} == {"row 2"}
+
+
+def test_what_is_gone_has_no_size_now(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+    path = tmp_path / "orchard.gpkg"
+    shutil.copy(row.path, path)
+    with contextlib.closing(geopackage.connect(path)) as connection, connection:
+        sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
+        connection.execute("UPDATE fruits SET state = 'gone', last_session_id = ? WHERE id = 7", (sessions[1],))
+        connection.execute("DELETE FROM observations WHERE fruit_id = 7 AND session_id IN (?, ?)", sessions[2:])
+    write_report(path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 1)))
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        page.get_by_role("tab", name="Fruits").click()
+        page.get_by_label("State").select_option("gone")
+        (cells,) = shown_rows(page)
+        assert cells[3].endswith(" %")
+        assert set(cells[5:]) == {"\N{EN DASH}"}
+        page.locator(".lines .line").first.click()
+        card = page.locator(".fruit-card").first
+        assert "Now" not in card.locator("dt").all_inner_texts()
+        said = card.locator(".curve").get_attribute("aria-label")
+        assert re.fullmatch(r"Growth curve .* from [\d.]+ mm on 14 Jun 2024 to [\d.]+ mm on 29 Jun 2024", said)
 
 
 def assert_harmless(page: Any, hostile: GrownRow) -> None:

@@ -9,6 +9,7 @@ export type Action = "keep" | "thin" | "drops" | "";
 
 export interface Facts {
   readonly id: string;
+  readonly row: string;
   readonly tree: string;
   readonly state: State;
   readonly stateProbability: number;
@@ -37,11 +38,13 @@ export function factsOf({ season, target }: Page, fruit: number): Facts {
   const later = (rows: Float64Array | undefined): number => (growth?.harvest ? curve(rows, then) : NaN);
   return {
     id: season.ids[fruit],
+    row: season.trees[season.tree[fruit]].row,
     tree: season.trees[season.tree[fruit]].name,
     state: STATES[season.state[fruit]],
     stateProbability: season.stateProbability[fruit],
     sights: sights.starts[fruit + 1] - sights.starts[fruit],
-    sizeMm: growth ? curve(growth.medianMm, now) : lastMeasured(season, fruit),
+    // The curve of what no longer hangs ends when it was seen last.
+    sizeMm: growth ? curve(growth.medianMm, now) : hangs(season, fruit) ? lastMeasured(season, fruit) : NaN,
     lowMm: curve(growth?.lowMm, now),
     highMm: curve(growth?.highMm, now),
     rate: growth ? growth.rate[fruit] : NaN,

@@ -5,6 +5,7 @@ import { STATES, type State } from "./told/season";
 
 export interface Filter {
   readonly text: string;
+  readonly row: string;
   readonly tree: number | null;
   readonly state: State | "hanging" | "";
   readonly action: Action;
@@ -12,7 +13,7 @@ export interface Filter {
   readonly belowMm: number;
 }
 
-export const ANY: Filter = { text: "", tree: null, state: "", action: "", fromMm: NaN, belowMm: NaN };
+export const ANY: Filter = { text: "", row: "", tree: null, state: "", action: "", fromMm: NaN, belowMm: NaN };
 
 export const isAny = (filter: Filter): boolean =>
   Object.entries(ANY).every(([name, value]) => Object.is(filter[name as keyof Filter], value));
@@ -27,10 +28,11 @@ export function passing(page: Page): number[] {
 
 export function passesOf(page: Page): (fruit: number) => boolean {
   const { season } = page;
-  const { text, tree, state, action, fromMm, belowMm } = page.filter.value;
+  const { text, row, tree, state, action, fromMm, belowMm } = page.filter.value;
   const wanted = text.trim().toLowerCase();
   const isSized = !Number.isNaN(fromMm) || !Number.isNaN(belowMm);
   return (fruit) => {
+    if (row !== "" && season.trees[season.tree[fruit]].row !== row) return false;
     if (tree !== null && season.tree[fruit] !== tree) return false;
     const its = STATES[season.state[fruit]];
     if (state === "hanging" ? !hangs(season, fruit) : state !== "" && its !== state) return false;

@@ -73,7 +73,8 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
     return {
         "curve": grown.curve.fitted.family.name,
         "time": grown.curve.clock.name,
-        "held_out_log_likelihood": dict(grown.curve.held_out),
+        "held_out_log_likelihood": {curve.name: curve.held_out for curve in grown.curves},
+        "weights": {curve.name: curve.weight for curve in grown.curves},
         "noise_mm": shape.noise_mm,
         "visit_scales": dict(zip(grown.fruits.sessions, grown.foretold.scales.tolist(), strict=True)),
         "harvest": None if grown.harvest is None else grown.harvest.isoformat(),

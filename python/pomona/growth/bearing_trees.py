@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from pomona.cloud import FruitCloud
 from pomona.plot.projections import side_and_plan
 from pomona.tree_rows.names import tree_names
 
-__all__ = ["BearingTrees", "bearing_trees"]
+__all__ = ["BearingTrees", "as_counted", "bearing_trees"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,22 +22,26 @@ class BearingTrees:
     Attributes
     ----------
     names : tuple of T str
-        In the order along the row; a single blank one where no trees are known.
+        Row by row and in the order along it; a single blank one where no trees are known.
     numbers : (N,) int64
         Of each fruit, a row of `names`.
     along_m : (N,) float64
         Place of each fruit along the row.
+    rows : tuple of T str
+        Name of the row that each tree stands in, blank where the map names none.
     """
 
     names: tuple[str, ...]
     numbers: NDArray[np.int64]
     along_m: NDArray[np.float64]
+    rows: tuple[str, ...]
 
     def select(self, fruits: NDArray[np.int64]) -> BearingTrees:
         """Keep some fruits, and the trees that they hang on."""
         kept, numbers = np.unique(self.numbers[fruits], return_inverse=True)
         names = tuple(self.names[number] for number in kept)
-        return BearingTrees(names, numbers.astype(np.int64), self.along_m[fruits])
+        rows = tuple(self.rows[number] for number in kept)
+        return BearingTrees(names, numbers.astype(np.int64), self.along_m[fruits], rows)
 
     def of_fruits(self) -> tuple[str, ...]:
         """Name of the tree of each fruit."""
@@ -52,7 +57,17 @@ def bearing_trees(cloud: FruitCloud) -> BearingTrees:
     axis = side_and_plan(cloud.positions)[0].axes[0]
     along_m = cloud.positions @ axis
     of_fruits = np.array(cloud.extras.get("tree") or tree_names(cloud.positions), dtype=object)
-    names = sorted(set(of_fruits.tolist()) - {""}, key=lambda name: along_m[of_fruits == name].mean())
+    row_of = dict(zip(of_fruits.tolist(), cloud.extras.get("row", ("",) * len(cloud)), strict=True)) | {"": ""}
+    middles = {name: along_m[of_fruits == name].mean() for name in set(of_fruits.tolist()) - {""}}
+    names = sorted(middles, key=lambda name: (as_counted(row_of[name]), middles[name]))
     names += [""] * ("" in of_fruits)
     number_of = {name: number for number, name in enumerate(names)}
-    return BearingTrees(tuple(names), np.array([number_of[name] for name in of_fruits], np.int64), along_m)
+    numbers = np.array([number_of[name] for name in of_fruits], np.int64)
+    return BearingTrees(tuple(names), numbers, along_m, tuple(row_of[name] for name in names))
+
+
+def as_counted(name: str) -> tuple[tuple[int, str], ...]:
+    """Return a key by which row 2 comes before row 10."""
+    parts = re.split(r"0*([0-9]+)", name)
+    # A longer number is a larger one, whatever its length: names come from strangers.
+    return tuple((len(part) if number % 2 else 0, part) for number, part in enumerate(parts))

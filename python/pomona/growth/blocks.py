@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.growth.bearing_trees import as_counted
 from pomona.growth.foretelling import Summary
 from pomona.growth.measured import MeasuredFruits
 
@@ -34,10 +35,12 @@ class Block:
 
 
 def blocks_of(fruits: MeasuredFruits) -> tuple[Block, ...]:
-    """All hanging fruits, then those of each row where the map has a column ``row``, then those of each tree."""
+    """All hanging fruits, then those of each row where the map has several, then those of each tree."""
     hanging, trees = fruits.hanging, fruits.trees
     rows = np.array(fruits.cloud.extras.get("row", ("",) * len(hanging)))
-    of_rows = [Block("row", name, hanging & (rows == name)) for name in sorted(set(rows.tolist()) - {""})]
+    of_rows = [
+        Block("row", name, hanging & (rows == name)) for name in sorted(set(rows.tolist()) - {""}, key=as_counted)
+    ]
     named = [(number, name) for number, name in enumerate(trees.names) if name]
     of_trees = [Block("tree", name, hanging & (trees.numbers == number)) for number, name in named]
     return (Block(ALL, "", hanging), *(block for block in (*of_rows, *of_trees) if block.members.any()))

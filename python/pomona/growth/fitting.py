@@ -1,6 +1,6 @@
 r"""The nonlinear rest of the growth model: a prior, the mode, and draws weighted by the exact likelihood.
 
-The seven numbers of `Shape` are drawn around the mode of their posterior, from a multivariate t with the curvature
+The numbers of `Shape` are drawn around the mode of their posterior, from a multivariate t with the curvature
 there, and weighted by the ratio of the posterior to that density: importance sampling, so that neither the bend of the
 curve nor the skew of the spreads is lost, which a linearised fit loses.
 """
@@ -23,14 +23,14 @@ __all__ = ["FittedShape", "fit_shape"]
 
 Numbers = NDArray[np.float64]
 
-_PROPOSED, _DRAWS = 1500, 300
-"""Shapes that are proposed, and those that are kept, by weight: about one in three proposals counts."""
+_PROPOSED, _LEAST_PROPOSED = 5, 300
+"""Shapes that are proposed for each that is kept, and at least: about one in three proposals counts."""
 
 _TAILS = 5.0
 """Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
 
-_MOST_FRUITS = 1000
-"""That a shape is fitted to; seven numbers need no more."""
+_MOST_FRUITS = 300
+"""That a shape is fitted to; eight numbers need no more."""
 
 _GRADIENT = 0.05
 """At which the climb ends: the draws are weighted, so their middle need not be the mode to the last digit."""
@@ -42,14 +42,15 @@ _IMPOSSIBLE = -1e9
 """Logarithm of a likelihood below any that is met."""
 
 # Medians and standard deviations: of the logarithms, but of the onset, in days against the first visit.
-_ONSET_DAYS = (-10.0, 35.0)
-_RATE_SPREAD = 0.30
+_ONSET_DAYS = (-10.0, 20.0)
+_RATE_SPREAD = 0.20
 _SPREADS = (
     (0.07, 0.5),  # of a fruit's size
     (3.0, 0.5),  # of its onset, days
     (0.02, 0.7),  # of a tree's size
     (0.02, 0.5),  # of a visit's scale
     (2.0, 0.6),  # of a diameter, mm
+    (1e-4, 1.0),  # of the block's relative growth a day, against the curve
 )
 
 
@@ -98,18 +99,19 @@ class FittedShape:
     _mode: Numbers
     _root: Numbers
 
-    def draws(self, rng: np.random.Generator) -> tuple[Shape, ...]:
-        """Draw equally likely shapes, by the exact posterior and not by its curvature."""
-        drawn, log_density = _student(rng, self._root, self._mode)
+    def draws(self, rng: np.random.Generator, count: int) -> tuple[Shape, ...]:
+        """Draw so many equally likely shapes, by the exact posterior and not by its curvature."""
+        n_proposed = max(_PROPOSED * count, _LEAST_PROPOSED)
+        drawn, log_density = _student(rng, n_proposed, self._root, self._mode)
         log_weights = np.array([self._posterior(z) for z in drawn]) - log_density
-        chosen = _resampled(rng, np.exp(log_weights - log_weights.max()))
+        chosen = _resampled(rng, count, np.exp(log_weights - log_weights.max()))
         return tuple(self._posterior.shape(drawn[row]) for row in chosen)
 
 
 def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
     """Fit the shape of one family to a table of at least two visits at different times."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    mode: Numbers = minimize(posterior.cost, np.zeros(7), method="BFGS", tol=_GRADIENT).x
+    mode: Numbers = minimize(posterior.cost, np.zeros(len(_SPREADS) + 2), method="BFGS", tol=_GRADIENT).x
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
     # Where the differences see no bend, the prior's own is there.
     root = np.asarray(axes / np.sqrt(np.maximum(values, 1.0)))
@@ -129,11 +131,11 @@ def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
     return np.asarray(curvature / _STEP**2)
 
 
-def _student(rng: np.random.Generator, root: Numbers, mode: Numbers) -> tuple[Numbers, Numbers]:
+def _student(rng: np.random.Generator, count: int, root: Numbers, mode: Numbers) -> tuple[Numbers, Numbers]:
     """Draw from a multivariate t, and give the logarithms of its density there."""
     n = len(mode)
-    normal = rng.normal(size=(_PROPOSED, n))
-    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, _PROPOSED))
+    normal = rng.normal(size=(count, n))
+    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, count))
     drawn = mode + (normal * stretch[:, None]) @ root.T
     squares = ((normal * stretch[:, None]) ** 2).sum(axis=1)
     constant = gammaln((_TAILS + n) / 2) - gammaln(_TAILS / 2) - n / 2 * np.log(_TAILS * np.pi)
@@ -141,7 +143,7 @@ def _student(rng: np.random.Generator, root: Numbers, mode: Numbers) -> tuple[Nu
     return drawn, np.asarray(constant - (_TAILS + n) / 2 * np.log1p(squares / _TAILS))
 
 
-def _resampled(rng: np.random.Generator, weights: Numbers) -> NDArray[np.int64]:
-    """Rows drawn by weight, systematically: those that are kept."""
+def _resampled(rng: np.random.Generator, count: int, weights: Numbers) -> NDArray[np.int64]:
+    """So many rows drawn by weight, systematically: those that are kept."""
     ends = np.cumsum(weights) / weights.sum()
-    return np.minimum(np.searchsorted(ends, (np.arange(_DRAWS) + rng.random()) / _DRAWS), _PROPOSED - 1)
+    return np.minimum(np.searchsorted(ends, (np.arange(count) + rng.random()) / count), len(weights) - 1)

@@ -100,22 +100,21 @@ def _series(growth: SeasonGrowth) -> Iterator[Line]:
 
 
 def _curves(growth: SeasonGrowth) -> Iterator[Line]:
-    told = growth.foretold
+    told, is_told = growth.foretold, growth.is_told
     for row in _in_order_of_ids(growth):
-        for column, day in enumerate(growth.days):
-            if column < len(growth.fruits.days) or growth.fruits.hanging[row]:
-                sizes = told.sizes_mm[row, column], told.lows_mm[row, column], told.highs_mm[row, column]
-                yield growth.fruits.ids[row], day, *sizes
+        for column in np.flatnonzero(is_told[row]).tolist():
+            sizes = told.sizes_mm[row, column], told.lows_mm[row, column], told.highs_mm[row, column]
+            yield growth.fruits.ids[row], growth.days[column], *sizes
 
 
 def _fruits(growth: SeasonGrowth) -> Iterator[Line]:
     fruits, told = growth.fruits, growth.foretold
-    trees, n_days, hanging = fruits.trees.of_fruits(), fruits.n_days, fruits.hanging
+    trees, n_days, hanging, is_growing = fruits.trees.of_fruits(), fruits.n_days, fruits.hanging, growth.is_growing
     for row in _in_order_of_ids(growth):
         is_foretold = growth.harvest is not None and hanging[row]
         forecast = (sizes[row, -1] if is_foretold else None for sizes in (told.sizes_mm, told.lows_mm, told.highs_mm))
         rates = told.rates_mm_per_day, told.rate_sigmas_mm_per_day, told.relative_rates_per_day
-        about = fruits.ids[row], trees[row], n_days[row], *(rate[row] for rate in rates)
+        about = fruits.ids[row], trees[row], n_days[row], *(rate[row] if is_growing[row] else None for rate in rates)
         yield *about, *forecast, int(growth.odd[row])
 
 

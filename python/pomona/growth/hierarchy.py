@@ -5,9 +5,10 @@ Of fruit $i$ on tree $t$ at visit $s$, time $\tau_s$, the logarithm of the diame
 $$ y_{is} = \mu + m_s + b_t + a_i + o_i g_s + c_s + e_{is}, \qquad m_s = h(x_s) - h(x_\mathrm{mid}), \quad
    g_s = -k h'(x_s), \quad x_s = k (\tau_s - t_0) $$
 
-with $a_i$ its own size and $o_i$ its own onset, in which the curve is linear to 0.1 mm; $c_s$ is the error that all
-sizes of a visit share. All of them are Gaussian given `Shape`, so they are integrated out exactly: first each fruit's
-two numbers, then each tree's one, then the visits' and the mean together. docs/growth.md has the derivation.
+with $a_i$ its own size and $o_i$ its own onset, in which the curve is linear to 0.1 mm; $c_s$ is what all sizes of a
+visit share: the error of its scale, and how far the block's growth has strayed from the curve by then. All of them are
+Gaussian given `Shape`, so they are integrated out exactly: first each fruit's two numbers, then each tree's one, then
+the visits' and the mean together. docs/growth.md has the derivation.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from pomona.growth.curve_families import CurveFamily
 from pomona.growth.size_table import SizeTable
+from pomona.growth.straying import straying
 
 __all__ = ["Effects", "Hierarchy", "Shape"]
 
@@ -28,8 +30,8 @@ Numbers = NDArray[np.float64]
 _FINEST_MM = 0.01
 """Nothing measures a fruit to less; sizes that agree to the last digit were copied, and say no more than that."""
 
-_SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.3
-"""A fruit's usual diameter at the onset, give or take a third: of apples and their like, whatever the family."""
+_SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.2
+"""A fruit's usual diameter at the onset, give or take a fifth: of apples and their like, whatever the family."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,11 @@ class Shape:
     rate_per_day, onset_day : float
         k and t0.
     fruit_spread, onset_spread_days, tree_spread, visit_spread : float
-        Standard deviations of a, o, b and c.
+        Standard deviations of a, o, b and of the error that a visit's sizes share.
     noise_mm : float
         Standard deviation of a single diameter.
+    stray_per_day : float
+        Standard deviation of the block's relative growth a day against the curve's.
     """
 
     rate_per_day: float
@@ -53,6 +57,7 @@ class Shape:
     tree_spread: float
     visit_spread: float
     noise_mm: float
+    stray_per_day: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +69,7 @@ class Effects:
     mean : float
         Logarithm of the block's diameter in mm at the middle of the visits.
     visits : (S,)
-        c, the shared errors.
+        c, what sizes of a visit share: its error and how far growth has strayed from the curve.
     trees : (T,)
         b.
     sizes, onsets_days : (N,)
@@ -146,7 +151,8 @@ class Hierarchy:
         n = len(information)
         self._prior_mean = self._mean_from_onset()
         together = np.zeros((n + 1, n + 1))
-        together[:n, :n] = precision + np.eye(n) * self.shape.visit_spread**-2
+        self._shared = self.shape.visit_spread**2 * np.eye(n) + self.shape.stray_per_day**2 * self.table.straying
+        together[:n, :n] = precision + np.linalg.inv(self._shared)
         together[:n, n] = together[n, :n] = precision.sum(axis=0)
         together[n, n] = precision.sum() + _SIZE_AT_ONSET_SPREAD**-2
         said = np.append(information, information.sum() + self._prior_mean * _SIZE_AT_ONSET_SPREAD**-2)
@@ -160,14 +166,14 @@ class Hierarchy:
 
     def log_likelihood(self) -> float:
         """Logarithm of the density of all measurements, everything linear integrated out."""
-        shape, n_fruits, n_visits = self.shape, len(self._p11), len(self._curve)
+        shape, n_fruits = self.shape, len(self._p11)
         of_noise = -np.log(self._weights[self._weights > 0] / (2.0 * np.pi)).sum() + self._fit
         of_fruits = np.log(self._determinants).sum()
         of_fruits += 2.0 * n_fruits * np.log(shape.fruit_spread * shape.onset_spread_days)
         of_trees = np.log(self._tree_precision * shape.tree_spread**2).sum()
         of_trees -= (self._tree_information**2 / self._tree_precision).sum()
         of_visits = 2.0 * np.log(np.diag(self._factor[0])).sum() - float(self._said @ self._expected)
-        of_visits += 2.0 * n_visits * np.log(shape.visit_spread) + 2.0 * np.log(_SIZE_AT_ONSET_SPREAD)
+        of_visits += float(np.linalg.slogdet(self._shared)[1]) + 2.0 * np.log(_SIZE_AT_ONSET_SPREAD)
         of_visits += (self._prior_mean / _SIZE_AT_ONSET_SPREAD) ** 2
         return float(-0.5 * (of_noise + of_fruits + of_trees + of_visits))
 
@@ -179,6 +185,24 @@ class Hierarchy:
         """Draw all effects together, given the measurements."""
         noise = solve_triangular(self._factor[0], rng.normal(size=len(self._expected)), lower=True, trans=1)
         return self._effects(self._expected + noise, rng)
+
+    def draw_stray(self, effects: Effects, times: Numbers, rng: np.random.Generator) -> Numbers:
+        """Draw how far growth has strayed by each time, (Q,), given what the visits share; the rest is their error.
+
+        Parameters
+        ----------
+        effects : Effects
+        times : (Q,) float64
+            The visits', and later ones.
+        rng : Generator
+        """
+        n = len(self.table.times)
+        covariance = self.shape.stray_per_day**2 * straying(times)
+        # Matheron's rule: a draw from the prior, moved by what it misses of the visits.
+        values, axes = np.linalg.eigh(covariance)
+        stray = axes @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(times)))
+        missed = effects.visits - stray[:n] - self.shape.visit_spread * rng.normal(size=n)
+        return np.asarray(stray + covariance[:, :n] @ np.linalg.solve(self._shared, missed))
 
     def _effects(self, together: Numbers, rng: np.random.Generator | None) -> Effects:
         """Go back from the visits to the trees and the fruits; without chance, to their expectations."""

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.growth.blocks import Block, block_means, blocks_of
-from pomona.growth.choosing import ChosenCurve, choose_curve
 from pomona.growth.foretelling import Foretold, foretell
 from pomona.growth.measured import MeasuredFruits, measured_fruits, require_two_days
 from pomona.growth.oddities import odd_fruits, odd_measurements
 from pomona.growth.season_clock import CALENDAR, DegreeDays, SeasonClock, read_temperatures
 from pomona.growth.size_classes import FIVE_MM, class_counts, class_masses
 from pomona.growth.size_table import SizeTable
+from pomona.growth.weighing import WeighedCurve, weighed_curves
 
 __all__ = ["SeasonGrowth", "grow_season", "growth_of"]
 
@@ -34,7 +34,8 @@ class SeasonGrowth:
     ----------
     fruits : MeasuredFruits
         N fruits, in order of their trees.
-    curve : ChosenCurve
+    curves : tuple of WeighedCurve
+        Those that are believed most come first.
     blocks : tuple of Block
         All fruits, then each tree's.
     limits_mm : (C - 1,) float64
@@ -52,7 +53,7 @@ class SeasonGrowth:
     """
 
     fruits: MeasuredFruits
-    curve: ChosenCurve
+    curves: tuple[WeighedCurve, ...]
     blocks: tuple[Block, ...]
     limits_mm: NDArray[np.float64]
     foretold: Foretold
@@ -60,6 +61,23 @@ class SeasonGrowth:
     harvest: date | None
     odd: NDArray[np.bool_]
     put_aside: NDArray[np.bool_]
+
+    @property
+    def curve(self) -> WeighedCurve:
+        """The curve that is believed most."""
+        return self.curves[0]
+
+    @property
+    def is_told(self) -> NDArray[np.bool_]:
+        """On which days each fruit has a size, (N, Q): always while it hangs, else until it was measured last."""
+        measured = ~np.isnan(self.fruits.diameters_mm)
+        until = measured.shape[1] - measured[:, ::-1].argmax(axis=1)
+        return np.asarray(self.fruits.hanging[:, None] | (np.arange(len(self.days)) < until[:, None]))
+
+    @property
+    def is_growing(self) -> NDArray[np.bool_]:
+        """Which fruits have a size and a rate now, on the day of the last visit, (N,)."""
+        return np.asarray(self.is_told[:, len(self.fruits.days) - 1])
 
 
 def grow_season(
@@ -111,14 +129,14 @@ def growth_of(
     moments, trees = fruits.moments, fruits.trees.numbers
     put_aside = odd_measurements(SizeTable.of(fruits.diameters_mm, trees, CALENDAR.times(moments)))
     kept_mm = np.where(put_aside, np.nan, fruits.diameters_mm)
-    curve = choose_curve(kept_mm, trees, moments, clocks)
-    odd = put_aside.any(axis=1) | odd_fruits(curve.table, curve.fitted)
+    curves = weighed_curves(kept_mm, trees, moments, clocks)
+    odd = put_aside.any(axis=1) | odd_fruits(curves[0].table, curves[0].fitted)
     wanted = [*moments, *([max(moments[-1], datetime.combine(harvest, time()))] if harvest else [])]
     blocks = blocks_of(fruits)
     foretold = foretell(
-        curve,
-        curve.clock.times(wanted),
-        per_day=curve.clock.per_day(moments[-1]),
+        curves,
+        wanted,
+        n_visits=len(moments),
         summaries={
             "blocks": block_means(blocks),
             "counts": class_counts(limits_mm, fruits.hanging),
@@ -126,7 +144,7 @@ def growth_of(
         },
     )
     days = tuple(moment.date() for moment in wanted)
-    return SeasonGrowth(fruits, curve, blocks, limits_mm, foretold, days, harvest, odd, put_aside)
+    return SeasonGrowth(fruits, curves, blocks, limits_mm, foretold, days, harvest, odd, put_aside)
 
 
 def _clocks(fruits: MeasuredFruits, temperature: str | Path | None) -> tuple[SeasonClock, ...]:

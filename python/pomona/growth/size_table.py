@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from pomona.growth.straying import straying
 
 __all__ = ["SizeTable"]
 
@@ -36,15 +39,20 @@ class SizeTable:
         """Take (N, S) diameters, NaN for none; every visit has at least one."""
         return cls(np.log(diameters_mm), trees, times, np.nanmedian(diameters_mm, axis=0))
 
-    @property
+    @cached_property
     def seen(self) -> NDArray[np.bool_]:
         """Which fruit was measured when, (N, S)."""
         return ~np.isnan(self.logs)
 
-    @property
+    @cached_property
     def tree_starts(self) -> NDArray[np.int64]:
         """First row of each tree, (T,)."""
         return np.flatnonzero(np.diff(self.trees, prepend=-1))
+
+    @cached_property
+    def straying(self) -> NDArray[np.float64]:
+        """How growth may stray from a curve between the visits, (S, S): see `straying`."""
+        return straying(self.times)
 
     def without(self, cells: NDArray[np.bool_]) -> SizeTable:
         """Leave measurements out, (N, S)."""

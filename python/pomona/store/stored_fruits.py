@@ -116,11 +116,20 @@ def fruits_in_map(
 
 
 def _trees(connection: sqlite3.Connection, of_fruits: Sequence[int | None]) -> dict[str, tuple[str, ...]]:
-    """Return the column `tree`, blank for the fruits of none; nothing where the map has told these no trees."""
+    """Return the column `tree`, blank for the fruits of none, and `row` where the map has several rows of trees.
+
+    Nothing where the map has told these fruits no trees.
+    """
     if not any(of_fruits):
         return {}
-    names = dict(zip(*columns_of(connection, "trees", ("id", "name")), strict=True))
-    return {"tree": tuple("" if tree is None else names.get(tree) or f"tree {tree}" for tree in of_fruits)}
+    ids, names, row_ids = columns_of(connection, "trees", ("id", "name", "row_id"))
+    tree_named, row_of = dict(zip(ids, names, strict=True)), dict(zip(ids, row_ids, strict=True))
+    found = {"tree": tuple("" if tree is None else tree_named.get(tree) or f"tree {tree}" for tree in of_fruits)}
+    if len({row for row in row_ids if row is not None}) < 2:
+        return found
+    row_named = dict(zip(*columns_of(connection, "rows", ("id", "name")), strict=True))
+    of_rows = [row_of.get(tree) for tree in of_fruits]
+    return {**found, "row": tuple("" if row is None else row_named.get(row) or f"row {row}" for row in of_rows)}
 
 
 def only_session(connection: sqlite3.Connection) -> dict[str, Any]:

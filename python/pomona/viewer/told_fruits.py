@@ -88,10 +88,11 @@ class FruitsTold:
 
 
 def trees_told(fruits: FruitsTold, trees: BearingTrees) -> list[dict[str, Any]]:
-    """Tell the name and the middle of each tree; a single blank name where no trees are known."""
+    """Tell name, row and middle of each tree; a single blank name where no trees are known."""
     placed = fruits.placed(fruits.cloud.positions)
     middles = [placed[fruits.trees == number].mean(axis=0).round(3).tolist() for number in range(len(trees.names))]
-    return [{"name": name, "middle": middle} for name, middle in zip(trees.names, middles, strict=True)]
+    told = zip(trees.names, trees.rows, middles, strict=True)
+    return [{"name": name, "row": row, "middle": middle} for name, row, middle in told]
 
 
 def _numbers(cells: Sequence[str]) -> NDArray[np.float64]:

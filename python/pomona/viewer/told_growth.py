@@ -26,11 +26,11 @@ def growth_told(growth: SeasonGrowth, fruits: FruitsTold, pack_kg: float) -> dic
     told, shape, n_visits = growth.foretold, growth.curve.fitted.likeliest, len(growth.fruits.days)
     rows = fruits.rows_of(growth.fruits.ids)
     n = len(fruits.ids)
-    later = np.arange(len(growth.days)) >= n_visits
-    unknown = ~growth.fruits.hanging[:, None] & later  # what is gone has no forecast
+    is_told, is_growing = growth.is_told, growth.is_growing
     sizes_mm = {"median_mm": told.sizes_mm, "low_mm": told.lows_mm, "high_mm": told.highs_mm}
-    curves = {name: np.where(unknown, np.nan, sizes) for name, sizes in sizes_mm.items()}
-    rates = {"rate_mm_per_day": told.rates_mm_per_day, "rate_sigma_mm_per_day": told.rate_sigmas_mm_per_day}
+    curves = {name: np.where(is_told, sizes, np.nan) for name, sizes in sizes_mm.items()}
+    speeds = {"rate_mm_per_day": told.rates_mm_per_day, "rate_sigma_mm_per_day": told.rate_sigmas_mm_per_day}
+    rates = {name: np.where(is_growing, speed, np.nan) for name, speed in speeds.items()}
     return {
         "days": [day.isoformat() for day in growth.days],
         "n_visits": n_visits,

@@ -83,5 +83,6 @@ function spoken({ season }: Page, fruit: number): string {
   const growth = season.growth!;
   const q = growth.times.length;
   const at = (i: number): string => `${mm(growth.medianMm[fruit * q + i])} on ${fullDay(growth.times[i])}`;
-  return `Growth curve with its 90 % interval, from ${at(0)} to ${at(growth.nVisits - 1)}`;
+  const last = growth.medianMm.subarray(fruit * q, fruit * q + growth.nVisits).findLastIndex((size) => !Number.isNaN(size));
+  return `Growth curve with its 90 % interval, from ${at(0)} to ${at(last)}`;
 }

@@ -6,7 +6,7 @@ import type { Page } from "../page";
 import type { Season } from "../told/season";
 
 const COLUMNS = [
-  ...["fruit_id", "tree", "state", "state_probability", "n_visits", "x", "y", "z", "diameter_mm", "low_mm", "high_mm"],
+  ...["fruit_id", "row", "tree", "state", "state_probability", "n_visits", "x", "y", "z", "diameter_mm", "low_mm", "high_mm"],
   ...["rate_mm_per_day", "forecast_mm", "forecast_low_mm", "forecast_high_mm", "drop_probability", "action"],
 ] as const;
 
@@ -20,7 +20,7 @@ export function saveCsv(page: Page): void {
 export function csvOf(page: Page): string {
   const lines = passing(page).map((fruit) => {
     const one = factsOf(page, fruit);
-    const about = [one.id, one.tree, one.state, one.stateProbability, one.sights, ...placeInMap(page.season, fruit)];
+    const about = [one.id, one.row, one.tree, one.state, one.stateProbability, one.sights, ...placeInMap(page.season, fruit)];
     const sizes = [one.sizeMm, one.lowMm, one.highMm, one.rate, one.forecastMm, one.forecastLowMm, one.forecastHighMm];
     return [...about, ...sizes, one.dropProbability, one.action].map(cell).join(",");
   });

@@ -3,7 +3,7 @@ import { element } from "../elements";
 import { ANY, isAny, passing, type Filter } from "../filter";
 import type { Page } from "../page";
 import { watchAll } from "../signal";
-import { STATES } from "../told/season";
+import { rowsOf, STATES } from "../told/season";
 import { fruits, whole } from "../words";
 import { saveCsv } from "./csv";
 
@@ -13,6 +13,9 @@ export function filterBar(page: Page): HTMLElement {
   const text = element("input", { type: "search", placeholder: "Number", size: 8, "aria-label": "Fruit number", input: () => change({ text: text.value }) });
   const trees = season.trees.map((tree, i) => element("option", { value: i }, tree.label));
   const tree = element("select", { "aria-label": "Tree", change: () => change({ tree: tree.value === "" ? null : Number(tree.value) }) }, element("option", { value: "" }, "All trees"), ...trees);
+  const rows = rowsOf(season).map((name) => element("option", { value: name }, name));
+  const row = element("select", { "aria-label": "Row", change: () => change({ row: row.value }) }, element("option", { value: "" }, "All rows"), ...rows);
+  row.hidden = rows.length === 0;
   const states = ["hanging", ...STATES].map((name) => element("option", { value: name }, name));
   const state = element("select", { "aria-label": "State", change: () => change({ state: state.value as Filter["state"] }) }, element("option", { value: "" }, "All states"), ...states);
   const actions = ["keep", "thin", "drops"].map((name) => element("option", { value: name }, name));
@@ -25,12 +28,13 @@ export function filterBar(page: Page): HTMLElement {
   action.hidden = season.thinning === null;
   watchAll([filter, page.target], () => {
     const now = filter.value;
-    [tree.value, state.value, action.value] = [now.tree === null ? "" : String(now.tree), now.state, now.action];
+    [row.value, tree.value] = [now.row, now.tree === null ? "" : String(now.tree)];
+    [state.value, action.value] = [now.state, now.action];
     if (isAny(now)) text.value = from.value = below.value = "";
     clear.disabled = isAny(now);
     count.textContent = `${whole(passing(page).length)} of ${fruits(season.n)}`;
   });
-  const bar = [text, tree, state, action, from, element("span", { "aria-hidden": "true" }, "–"), below, clear, count, save];
+  const bar = [text, row, tree, state, action, from, element("span", { "aria-hidden": "true" }, "–"), below, clear, count, save];
   return element("form", { class: "filter-bar", role: "search", submit: (event: Event) => event.preventDefault() }, ...bar);
 }
 

@@ -31,7 +31,7 @@ function cardOf(page: Page, fruit: number): HTMLElement {
   const facts = factsOf(page, fruit);
   const close = element("button", { type: "button", "aria-label": "Close", click: () => page.selected.set(null) }, "✕");
   const tree = page.season.trees[page.season.tree[fruit]];
-  const where = element("span", { class: "soft" }, tree.name ? tree.label : "");
+  const where = element("span", { class: "soft" }, [tree.row, tree.name && tree.label].filter(Boolean).join(", "));
   const title = element("h2", {}, `Fruit ${facts.id}`);
   return element(
     "div",
@@ -57,8 +57,8 @@ function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
   const { season } = page;
   const lines: [string, Child][] = [
     ["State", `${SAID[facts.state]}, ${percent(facts.stateProbability)} sure`],
-    ["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)],
   ];
+  if (!Number.isNaN(facts.sizeMm)) lines.push(["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)]);
   if (!Number.isNaN(facts.rate)) {
     lines.push(["Growth", `${number(facts.rate, 2)} ± ${number(1.645 * (season.growth?.rateSigma[fruit] ?? NaN), 2)} mm a day`]);
   }

@@ -5,6 +5,7 @@ import { passing } from "../filter";
 import type { Page } from "../page";
 import { watchAll } from "../signal";
 import { isTimeToThin } from "../summary";
+import { rowsOf } from "../told/season";
 import { day, number, percent } from "../words";
 
 const ROW_PX = 32;
@@ -76,10 +77,13 @@ export function fruitTable(page: Page): HTMLElement {
   return scroller;
 }
 
+const rowColumn: Column = { width: 5, title: "Row", say: (one) => one.row, order: (one) => one.row };
+
 function columnsOf(page: Page): Column[] {
   const { growth } = page.season;
   const columns: Column[] = [
     { width: 5, title: "Fruit", say: (one) => one.id, order: (one) => Number(one.id) },
+    ...(rowsOf(page.season).length > 0 ? [rowColumn] : []),
     { width: 5, title: "Tree", say: (one) => one.tree, order: (one) => one.tree },
     { width: 5, title: "State", say: (one) => one.state, order: (one) => one.state },
     { width: 4.6, title: "sure", say: (one) => percent(one.stateProbability), order: (one) => one.stateProbability },

@@ -17,12 +17,34 @@ export function treeTable(page: Page): HTMLElement {
     replaceAll(head, ...titles.map((title) => element("th", { scope: "col" }, title)));
     const trees = treeSummaries(page);
     const most = Math.max(...trees.map((tree) => tree.fruits));
-    replaceAll(body, ...trees.map((tree) => lineOf(page, tree, most, isPlanned())));
+    const isOther = (i: number): boolean => season.trees[i].row !== (season.trees[i - 1]?.row ?? "");
+    const lines = trees.map((tree, i) => {
+      const line = lineOf(page, tree, most, isPlanned());
+      return isOther(i) ? [rowLine(page, season.trees[i].row, trees, isPlanned()), line] : [line];
+    });
+    replaceAll(body, ...lines.flat());
   };
   filter.watch(show);
   target.watch(show);
   const table = element("table", { class: "plain" }, element("thead", {}, head), body);
   return element("section", { class: "card trees" }, element("h2", {}, "Tree by tree"), element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Tree by tree" }, table));
+}
+
+/** Above the trees of a row what they come to together; a click looks at the row. */
+function rowLine({ season, filter }: Page, row: string, trees: readonly TreeSummary[], isPlanned: boolean): HTMLElement {
+  const { growth } = season;
+  const now = growth ? growth.nVisits - 1 : 0;
+  const own = trees.filter(({ tree }) => season.trees[tree].row === row);
+  const sum = (of: (tree: TreeSummary) => number): string => whole(own.reduce((total, tree) => total + of(tree), 0));
+  const block = growth?.blocks.find((one) => one.kind === "row" && one.name === row);
+  const isChosen = filter.value.row === row && row !== "";
+  const pick = (): void => filter.set({ ...filter.value, row: isChosen ? "" : row, tree: null });
+  const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, row || "no row");
+  const cells = [sum(({ fruits }) => fruits), number(block?.mean_mm[now] ?? NaN, 1), number(block?.rate_mm_per_day[1] ?? NaN, 2)];
+  if (growth?.harvest) cells.push(number(block?.mean_mm[growth.times.length - 1] ?? NaN, 1));
+  if (isPlanned) cells.push(sum(({ thin }) => thin));
+  const about = element("th", { scope: "row" }, button);
+  return element("tr", { class: isChosen ? "of-row chosen" : "of-row" }, about, ...cells.map((cell) => element("td", {}, cell)));
 }
 
 function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPlanned: boolean): HTMLElement {

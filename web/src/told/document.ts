@@ -9,7 +9,7 @@ export interface Told {
   readonly name: string;
   readonly visits: readonly { name: string; date: string; n_fruits: number; n_matched: number }[];
   readonly map_from_page: readonly (readonly number[])[];
-  readonly trees: readonly { name: string; middle: readonly [number, number, number] }[];
+  readonly trees: readonly { name: string; row: string; middle: readonly [number, number, number] }[];
   readonly fruits: {
     readonly ids: string;
     readonly tree: Packed;

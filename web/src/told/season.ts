@@ -15,6 +15,8 @@ export interface Visit {
 export interface Tree {
   readonly name: string;
   readonly label: string;
+  /** Name of its row, blank where the map has one row or none. */
+  readonly row: string;
   readonly middle: readonly [number, number, number];
 }
 
@@ -79,6 +81,11 @@ export interface Season {
   readonly crops: Crops | null;
 }
 
+/** Names of the rows, in their order; none where the map has one row or none. */
+export function rowsOf({ trees }: Season): string[] {
+  return [...new Set(trees.map(({ row }) => row))].filter((row) => row !== "");
+}
+
 /** Takes the document out of the report, or asks the server for it. */
 export async function readSeason(): Promise<Season> {
   const inside = document.getElementById("season");
@@ -96,7 +103,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     name: told.name,
     program: told.program,
     visits: told.visits.map(({ name, date }) => ({ name, time: timeOf(date) })),
-    trees: told.trees.map(({ name, middle }) => ({ name, label: name ? `Tree ${name}` : "No tree", middle })),
+    trees: told.trees.map(({ name, row, middle }) => ({ name, row, label: name ? `Tree ${name}` : "No tree", middle })),
     mapFromPage: told.map_from_page,
     n: ids.length,
     ids,
