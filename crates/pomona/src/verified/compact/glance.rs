@@ -87,7 +87,7 @@ impl<'a, M: Terrain> Glance<'a, M> {
 mod tests {
     use super::*;
     use crate::geometry::Scale;
-    use crate::verified::compact::surroundings::{NEAR, packed};
+    use crate::verified::compact::surroundings::{NEAR, packed, step_of};
     use crate::verified::fixture::visits;
     use crate::verified::hypothesis::DETECTION;
     use crate::verified::seeds::longest;
@@ -106,7 +106,7 @@ mod tests {
         }
         let both = near.iter().zip(offsets(quad[0]).zip(offsets(other)));
         let mixed = both.map(|(row, (own, theirs))| if quad.contains(row) { own } else { theirs });
-        let step = map.spacing / 40.0;
+        let step = step_of(map.spacing);
         Some((which, Neighbourhood::new(&packed(mixed, map.density[quad[0] as usize], step), step)))
     }
 

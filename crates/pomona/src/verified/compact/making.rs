@@ -9,7 +9,7 @@ use super::columns::Column;
 use super::ground::by_bucket;
 use super::seed_blocks::{Anchored, Block, EMPTY, LANES, put};
 use super::shapes::{STEPS, Shape, in_steps, rounded};
-use super::surroundings::{Surroundings, packed};
+use super::surroundings::{Surroundings, packed, step_of};
 use super::{CompactMap, Facts, fingerprint};
 use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
@@ -57,7 +57,7 @@ impl CompactMap {
         let each = COMPANIONS.min(neighbours.each);
         let companions: Vec<u32> =
             (0..points.len()).flat_map(|row| neighbours.of(row)[..each].iter().copied()).collect();
-        let surroundings = surroundings(&points, &neighbours, &density, spacing / STEPS);
+        let surroundings = surroundings(&points, &neighbours, &density, step_of(spacing));
         drop(neighbours);
         let seeds = Seeds { points: &points, companions: &companions, each, step: spacing / STEPS, spacing };
         let cells = seeds.cells();

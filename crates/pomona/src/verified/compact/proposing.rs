@@ -74,6 +74,7 @@ pub(super) fn proposals(
     looks: &[Look],
     step: f64,
 ) -> (Vec<Contender>, Effort) {
+    let near_step = shapes.near_step();
     // Twelve numbers less the six of a pose.
     let most = 2.0 * (RADIUS * model.sigma).powi(2);
     let parts: Vec<(Vec<Contender>, Effort)> = looks
@@ -87,7 +88,7 @@ pub(super) fn proposals(
                 shapes.near(look.shape, (RADIUS * model.sigma / step) as f32, &mut scratch);
                 effort.candidates += scratch.met.len() as u64;
                 for (seed, around) in scratch.met.iter().zip(&scratch.around) {
-                    if !glance.admits(seed.which(), &Neighbourhood::new(around, step)) {
+                    if !glance.admits(seed.which(), &Neighbourhood::new(around, near_step)) {
                         continue;
                     }
                     effort.fitted += 1;

@@ -1,7 +1,7 @@
 //! The seeds of a large map by their shape, a byte for each number of a code.
 
 use super::seed_blocks::{Anchored, Block, LANES, anchored, squared_distances};
-use super::surroundings::Surroundings;
+use super::surroundings::{Surroundings, step_of};
 use super::{CompactMap, Facts};
 use crate::verified::codes::{Code, Run};
 use crate::verified::seeds::{Quad, STARS};
@@ -107,6 +107,11 @@ impl<'a> Shapes<'a> {
             let lanes = (0..LANES).filter(|&lane| distances[lane] <= limit && seeds.contains(&(at * LANES + lane)));
             met.extend(lanes.map(|lane| anchored(block, lane)));
         }
+    }
+
+    /// Metres of a step of what hangs next to fruits.
+    pub(super) fn near_step(&self) -> f64 {
+        step_of(self.facts.spacing)
     }
 
     /// The fruits of a seed.
