@@ -58,7 +58,7 @@ impl Localizer {
     /// # Errors
     /// A cloud or a setting that is wrong.
     pub fn new(map: &FruitCloud, config: Config) -> Result<Self> {
-        Self::with(map, config, |of_search| MapIndex::new(map, Method::Verified, Scale::Metric, of_search))
+        Self::with(map, &config, |of_search| MapIndex::new(map, Method::Verified, Scale::Metric, of_search))
     }
 
     /// Prepares `map`, whose compact index was kept as `bytes`.
@@ -66,12 +66,12 @@ impl Localizer {
     /// # Errors
     /// As [`Self::new`], and bytes that are no index of this map.
     pub fn opened(bytes: &Bytes, map: &FruitCloud, config: Config) -> Result<Self> {
-        Self::with(map, config, |of_search| MapIndex::opened(bytes, map, of_search))
+        Self::with(map, &config, |of_search| MapIndex::opened(bytes, map, of_search))
     }
 
-    fn with(map: &FruitCloud, config: Config, index: impl FnOnce(Config) -> Result<MapIndex>) -> Result<Self> {
+    fn with(map: &FruitCloud, config: &Config, index: impl FnOnce(Config) -> Result<MapIndex>) -> Result<Self> {
         config.validate()?;
-        let mut of_search = config;
+        let mut of_search = *config;
         of_search.verified.false_alarm_rate = config.verified.false_alarm_rate.max(SEARCH_RATE);
         let index = index(of_search)?;
         let config = config.localization;

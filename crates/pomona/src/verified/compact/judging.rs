@@ -114,7 +114,7 @@ impl Case<'_> {
             contenders.sort_unstable_by(by_evidence);
             contenders.truncate(REMEMBERED);
             best = self.of_other_poses(&self.looked_at(contenders.clone(), closely));
-            let answer = self.outstanding(&best).map(|some| self.judged(some, effort));
+            let answer = outstanding(&best).map(|some| self.judged(some, effort));
             if let Some(answer) = answer.filter(|answer| answer.verdict != Verdict::NoMatch) {
                 return answer;
             }
@@ -148,14 +148,6 @@ impl Case<'_> {
         kept
     }
 
-    /// The best contender and its rivals, where it stands out.
-    fn outstanding<'c>(&self, contenders: &'c [Contender]) -> Option<&'c [Contender]> {
-        let best = contenders.first()?.log_odds;
-        let second = contenders.get(1).map_or(0.0, |one| one.log_odds);
-        let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
-        (best > STANDS_OUT + second).then(|| &contenders[..rivals])
-    }
-
     /// The answer that the contenders give, most evidence first.
     fn judged(&self, contenders: &[Contender], effort: Effort) -> Match {
         let rows = self.rows_around(contenders);
@@ -178,6 +170,14 @@ impl Case<'_> {
         rows.dedup();
         rows
     }
+}
+
+/// The best contender and its rivals, where it stands out.
+fn outstanding(contenders: &[Contender]) -> Option<&[Contender]> {
+    let best = contenders.first()?.log_odds;
+    let second = contenders.get(1).map_or(0.0, |one| one.log_odds);
+    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
+    (best > STANDS_OUT + second).then(|| &contenders[..rivals])
 }
 
 fn cut(map: &FruitCloud, rows: &[u32]) -> FruitCloud {

@@ -86,7 +86,9 @@ impl<'a> Shapes<'a> {
             *row = self.starts[row.start] as usize..self.starts[row.end] as usize;
         }
         met.clear();
-        cells.iter().for_each(|seeds| self.scan(shape, limit, seeds, met));
+        for seeds in cells.iter() {
+            self.scan(shape, limit, seeds, met);
+        }
         around.clear();
         around.extend(met.iter().map(|seed| *self.surroundings.get(seed.anchor as usize).unwrap_or(&NOWHERE)));
     }
