@@ -5,7 +5,7 @@ the other. Asked are compact indices: visits of five trees and frames of 40 frui
 from rows that are not in the map; half of all with the vertical known to 2 degrees. Right is a pose within 5 degrees
 and 0.3 m. Every size is a process of its own with two threads; CPU time is of both together. Resident is what the
 process holds after the answers, less what it held before it opened the index and with it the caller's cloud. Writes
-million.csv, million.md and million.png.
+million.csv, million.md and million.png; a run replaces the sizes that it ran and keeps the others.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +25,11 @@ from numpy.typing import NDArray
 from benchmarks.drawn_orchard import FRUITS_OF_A_TREE, SHOWN, Query, drawn_rows, five_trees, frame, visited
 from benchmarks.million_picture import write_picture
 from benchmarks.pose import pose_error
-from benchmarks.results import markdown, write_rows, write_text
+from benchmarks.results import markdown, read_rows, write_rows, write_text
 from pomona import FruitCloud, Index, Match
 
-SIZES = (1_000, 10_000, 100_000, 1_000_000)
+PLACES = {1_000: 200, 10_000: 200, 100_000: 1_000, 1_000_000: 200}
+"""Of each kind, inside and outside, by the fruits of the map."""
 KINDS: dict[str, Callable[[np.random.Generator, NDArray[np.float64]], Query]] = {"visit": five_trees, "frame": frame}
 THREADS = 2
 FIRST_ROW_OUTSIDE = 1000
@@ -36,28 +38,33 @@ TREES_OUTSIDE = 3 * 228
 
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks million", description=__doc__)
-    parser.add_argument("--fruits", type=int, nargs="+", default=SIZES)
-    parser.add_argument("--places", type=int, default=200, help="of each kind, inside and outside")
+    parser.add_argument("--fruits", type=int, nargs="+", default=list(PLACES))
+    parser.add_argument("--places", type=int, help="of each kind, inside and outside")
     parser.add_argument("--child", action="store_true", help="one size, in this process; prints JSON")
     options = parser.parse_args(arguments)
     if options.child:
         json.dump(figures(options.fruits[0], options.places), sys.stdout)
         return
-    rows = []
     for n_fruits in options.fruits:
-        rows.append(in_process(n_fruits, options.places))
-        sys.stderr.write(f"million: {rows[-1]}\n")
-    if tuple(options.fruits) == SIZES:
+        row = in_process(n_fruits, options.places or PLACES.get(n_fruits, 200))
+        sys.stderr.write(f"million: {row}\n")
+        kept = {old["fruits"]: old for old in map(numbers, read_rows("million.csv"))} | {row["fruits"]: row}
+        rows = [kept[n] for n in sorted(kept)]
         write_rows("million.csv", rows)
         write_text("million.md", report(rows))
         write_picture(rows)
     sys.stdout.write(report(rows))
 
 
-def in_process(n_fruits: int, n_places: int) -> dict[str, object]:
+def numbers(row: dict[str, str]) -> dict[str, Any]:
+    """Read a row that was written before."""
+    return {key: int(value) if value.isdigit() else float(value) for key, value in row.items()}
+
+
+def in_process(n_fruits: int, n_places: int) -> dict[str, Any]:
     command = ["-m", "benchmarks", "million", "--child", "--fruits", str(n_fruits), "--places", str(n_places)]
     done = subprocess.run([sys.executable, *command], stdout=subprocess.PIPE, text=True, check=True)
-    row: dict[str, object] = json.loads(done.stdout)
+    row: dict[str, Any] = json.loads(done.stdout)
     return row
 
 
@@ -141,7 +148,7 @@ def resident_mb() -> float:
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * 4096 / 1e6
 
 
-def report(rows: list[dict[str, object]]) -> str:
+def report(rows: list[dict[str, Any]]) -> str:
     header = ["", *(f"{int(str(row['fruits'])):,}" for row in rows)]
     keys = [key for key in rows[0] if key != "fruits"]
     lines = [(key, *(shown(key, row[key]) for row in rows)) for key in keys]

@@ -89,6 +89,22 @@ def test_frames_of_few_fruits_are_numbered_where_nothing_is_timed(tmp_path):
     assert [frame["time_s"] for frame in told["frames"]] == [0.0, 1.0]
 
 
+def test_an_index_is_kept_beside_the_map_and_made_anew_where_the_map_has_changed(tmp_path, drive):
+    index, poses, told = tmp_path / "row.index", tmp_path / "poses.tum", []
+    grown = tmp_path / "grown.csv"
+    grown.write_text(f"{MAP.read_text().rstrip()}\n9999,4.5,0.1,1.2,0.07\n")
+    for map in (MAP, MAP, grown):
+        done = localize(map, *drive, "--index", index, "-o", poses)
+        assert done.returncode == 0, done.stderr
+        assert "4 of 4 frames found" in done.stdout
+        told.append(done.stderr)
+    assert not told[0]
+    assert not told[1]
+    assert f"{index}: " in told[2]
+    assert "made from another map" in told[2]
+    assert "made anew" in told[2]
+
+
 def test_a_recording_without_calibration_is_one_line(tmp_path):
     shutil.copy(DRIVE / "row.mp4", tmp_path / "row.mp4")
     done = localize(MAP, tmp_path / "row.mp4", "-o", tmp_path / "poses.tum")

@@ -85,7 +85,7 @@ def test_another_version_is_made_anew(pair: ScenePair, saved: Path) -> None:
     content = bytearray(saved.read_bytes())
     content[8] = 99
     saved.write_bytes(content)
-    with pytest.warns(PomonaWarning, match="found version 99 of the format, expected 1; it was made anew"):
+    with pytest.warns(PomonaWarning, match="found version 99 of the format, expected 2; it was made anew"):
         Index.open(saved, pair.map)
 
 

@@ -1,12 +1,13 @@
 """Where the camera is in a map: poses, covariances that are honest, tracking, and what cannot be found."""
 
 import gc
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pomona import FruitCloud, Localizer, PomonaError, Verdict
+from pomona import FruitCloud, Index, Localizer, PomonaError, PomonaWarning, Verdict
 from row_drive import Row, drawn_row, pose_at, seen_from, step_to
 
 EMPTY = FruitCloud(positions=np.empty((0, 3)))
@@ -217,3 +218,46 @@ def test_memory_does_not_grow(row, fresh):
         pytest.skip("needs Linux's /proc")
     settled = drive(500)
     assert drive(4000) - settled < 4 << 20
+
+
+def test_an_index_in_a_file_finds_the_same_poses(row, localizer, tmp_path):
+    true, path = pose_at(4.0, turn_deg=7.0), tmp_path / "row.index"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made = Localizer(row.map, threads=1, index=path)
+        opened = Localizer(row.map, threads=1, index=str(path))
+    seen = seen_from(row, true, 1)
+    for found in (made.locate(seen), opened.locate(seen), opened.update(seen)):
+        assert_near(found, true)
+        # From wherever the search starts, the fruits around settle the pose.
+        assert np.abs(found.map_from_camera - localizer.locate(seen).map_from_camera).max() < 1e-3
+
+
+def test_an_index_of_another_map_is_made_anew_and_said(row, tmp_path):
+    path = tmp_path / "row.index"
+    Localizer(row.map.select(np.arange(100)), index=path)
+    with pytest.warns(PomonaWarning, match="made from another map.*; it was made anew"):
+        assert Localizer(row.map, index=path).locate(seen_from(row, pose_at(4.0), 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(Localizer(row.map, index=path)) == len(row.map)
+
+
+def test_fruits_that_are_gone_are_not_in_the_index(row, tmp_path):
+    path, hanging = tmp_path / "row.index", np.arange(len(row.map)) % 5 > 0
+    map = FruitCloud(row.map.positions, extras={"state": tuple(np.where(hanging, "seen", "gone").tolist())})
+    Localizer(map, index=path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = Index.open(path, row.map.positions[hanging]).match(seen_from(row, pose_at(4.0), 1))
+    assert found
+    placed = Localizer(map, index=path).locate(seen_from(row, pose_at(4.0), 1))
+    assert hanging[placed.pairs[:, 1]].all()
+
+
+def test_what_is_no_index_is_not_replaced(row, tmp_path):
+    other = tmp_path / "fruits.csv"
+    other.write_text("x,y,z\n1,2,3\n", encoding="utf-8")
+    with pytest.raises(PomonaError, match="is not the index of a map"):
+        Localizer(row.map, index=other)
+    assert other.read_text(encoding="utf-8") == "x,y,z\n1,2,3\n"

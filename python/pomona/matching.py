@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -20,8 +19,9 @@ from pomona.atomic import whole_file
 from pomona.cards import as_card
 from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
 from pomona.core_settings import core_settings
-from pomona.errors import PomonaError, PomonaWarning
-from pomona.likes import INDEX, is_like
+from pomona.errors import PomonaError
+from pomona.kept_index import out_of_index
+from pomona.likes import INDEX
 from pomona.outputs import Output, require_outputs
 from pomona.threads import capped_threads
 
@@ -185,22 +185,15 @@ class Index:
         PomonaError
             The file is missing or is no index; an array or a setting is wrong.
         """
-        path = Path(path)
-        if not path.is_file():
-            raise PomonaError(f"{path}: is no file, expected one that Index.save wrote")
-        if not is_like(INDEX, path):
-            raise PomonaError(f"{path}: is not {INDEX.name}, expected a file that Index.save wrote")
+        cloud, settings, most = as_cloud(map, "m"), core_settings(config), capped_threads(threads)
+        arrays = core_arrays(cloud)
         index = cls.__new__(cls)
-        index._unit, index._kind, index._map = "m", "verified, metric", as_cloud(map, "m")
-        settings, most = core_settings(config), capped_threads(threads)
-        try:
-            index._core = _core.MapIndex.opened(path, core_arrays(index._map), config=settings, threads=most)
-        except OSError as error:
-            raise PomonaError(f"{path}: {error.strerror}") from None
-        except (ValueError, TypeError, OverflowError) as error:
-            index = cls(index._map, config=config, threads=threads, compact=True)
-            index.save(path)
-            warnings.warn(f"{path}: {error}; it was made anew", PomonaWarning, stacklevel=2)
+        index._unit, index._kind, index._map = "m", "verified, metric", cloud
+        index._core = out_of_index(
+            Path(path),
+            lambda path: _core.MapIndex.opened(path, arrays, config=settings, threads=most),
+            lambda path: cls(cloud, config=config, threads=threads, compact=True).save(path),
+        )
         return index
 
     def save(self, path: str | Path) -> None:

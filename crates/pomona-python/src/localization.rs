@@ -2,12 +2,15 @@
 
 use crate::bundle::{array, wrong};
 use crate::cloud::Arrays;
-use crate::matching::{pool_of, status};
+use crate::matching::{mapped, pool_of, status};
 use crate::pose::{pose, pose_array};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pomona::nalgebra::Vector3;
-use pomona::{Config, Localization, Localizer, Pose};
+use pomona::verified::compact::Bytes;
+use pomona::{Config, FruitCloud, Localization, Localizer, Pose};
 use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Where the camera is, or why nobody can say.
 #[pyclass(name = "Localization", module = "pomona._core", frozen)]
@@ -71,11 +74,15 @@ impl PyLocalizer {
     #[new]
     #[pyo3(signature = (map, *, config, threads=None))]
     fn new(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
-        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-        let pool = threads.map(pool_of).transpose()?;
-        let cloud = map.to_cloud()?;
-        let localizer = py.detach(|| Localizer::new(&cloud, config)).map_err(wrong)?;
-        Ok(Self { localizer, pool })
+        Self::made(py, &map, config, threads, Localizer::new)
+    }
+
+    /// A map whose index is in a file, which is mapped into memory.
+    #[staticmethod]
+    #[pyo3(signature = (path, map, *, config, threads=None))]
+    fn opened(py: Python<'_>, path: PathBuf, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+        let bytes: Bytes = Arc::new(mapped(&path)?);
+        Self::made(py, &map, config, threads, |cloud, config| Localizer::opened(&bytes, cloud, config))
     }
 
     #[pyo3(signature = (seen, *, up=None))]
@@ -110,5 +117,25 @@ impl PyLocalizer {
 
     fn reset(&mut self) {
         self.localizer.reset();
+    }
+}
+
+impl PyLocalizer {
+    fn made(
+        py: Python<'_>,
+        map: &Arrays<'_>,
+        config: &str,
+        threads: Option<usize>,
+        make: impl FnOnce(&FruitCloud, Config) -> pomona::Result<Localizer> + Send,
+    ) -> PyResult<Self> {
+        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
+        let pool = threads.map(pool_of).transpose()?;
+        let cloud = map.to_cloud()?;
+        let make = || make(&cloud, config);
+        let localizer = py.detach(|| match &pool {
+            Some(pool) => pool.install(make),
+            None => make(),
+        });
+        Ok(Self { localizer: localizer.map_err(wrong)?, pool })
     }
 }

@@ -1,7 +1,7 @@
 //! The facade: an index of a map, its answers, the settings.
 
 use crate::cloud::Arrays;
-use memmap2::Mmap;
+use memmap2::{Mmap, MmapOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
 use pomona::verified::compact::Bytes;
@@ -258,10 +258,11 @@ fn config_of(text: &str) -> PyResult<Config> {
     unsafe_code,
     reason = "nobody can promise that no other program writes into the file meanwhile; Pomona replaces it whole"
 )]
-fn mapped(path: &Path) -> PyResult<Mmap> {
+pub fn mapped(path: &Path) -> PyResult<Mmap> {
     let file = File::open(path)?;
     // SAFETY: a file that Pomona writes appears whole under its name and is never written into again.
-    Ok(unsafe { Mmap::map(&file) }?)
+    // All of it is summed when it is opened: one request costs less than a fault a page.
+    Ok(unsafe { MmapOptions::new().populate().map(&file) }?)
 }
 
 /// Threads of their own, at most as many as the machine has cores: more would only wait for each other.

@@ -10,6 +10,7 @@ import typer
 from pomona.cli.localize_options import (
     depth_option,
     detections_option,
+    index_option,
     min_score_option,
     model_option,
     odometry_option,
@@ -18,7 +19,7 @@ from pomona.cli.localize_options import (
 from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
-from pomona.likes import POSES
+from pomona.likes import INDEX, POSES
 
 
 def localize(
@@ -45,6 +46,7 @@ def localize(
     ),
     depth: str = depth_option,
     odometry: bool = odometry_option,
+    index: Annotated[Path | None, Writes(INDEX)] = index_option,
     config: Path | None = config_option,
     every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
     first: int | None = typer.Option(None, "--from", metavar="FRAME", help="First frame to take, by its number."),
@@ -73,7 +75,7 @@ def localize(
     detector = open_detector(detections, model, whole, min_score=min_score)
     refuse_inputs([output], [*whole.inputs(), *detector.inputs])
     taken = selected(whole, every=every, first=first, last=last)
-    localizer = Localizer(orchard, config=overrides, threads=threads)
+    localizer = Localizer(orchard, config=overrides, threads=threads, index=index)
     with localize_output.localizing(taken) as progress:
         way = localized(
             taken, detector, localizer, single=single, depth=depth, odometry=odometry, up=vertical, progress=progress

@@ -13,4 +13,7 @@ min_score_option = typer.Option(None, min=0.0, max=1.0, help="Least confidence o
 depth_option = typer.Option(
     "auto", metavar="auto|stereo|dense|ONNX", help="Depth pictures, else stereo at the fruits; or stereo all over."
 )
+index_option = typer.Option(
+    None, "--index", metavar="FILE", help="Index of a large ORCHARD, which opens at once; made where there is none."
+)
 odometry_option = typer.Option(False, "--odometry", help="Motion from the pictures, even where poses were recorded.")

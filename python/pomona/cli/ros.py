@@ -10,6 +10,7 @@ import typer
 from pomona.cli.localize_options import (
     depth_option,
     detections_option,
+    index_option,
     min_score_option,
     model_option,
     odometry_option,
@@ -18,7 +19,7 @@ from pomona.cli.localize_options import (
 from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Verbs, Writes
-from pomona.likes import REPLAYED
+from pomona.likes import INDEX, REPLAYED
 
 if TYPE_CHECKING:
     from pomona.ros.replay import Replayed
@@ -52,6 +53,7 @@ def ros_replay(
     ),
     depth: str = depth_option,
     odometry: bool = odometry_option,
+    index: Annotated[Path | None, Writes(INDEX)] = index_option,
     config: Path | None = config_option,
     threads: int | None = threads_option,
     json: bool = typer.Option(False, "--json", help="Print JSON."),
@@ -87,6 +89,7 @@ def ros_replay(
             up=parsed_up(up) if up else None,
             config=overrides,
             threads=threads,
+            index=index,
             progress=progress,
         )
     found = localize_output.summary(output, bag, done.localizer, done.way) | _told(done)

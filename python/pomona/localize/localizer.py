@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from pomona.cards import as_card
 from pomona.cloud import Cloud, as_cloud
 from pomona.core_settings import core_settings
 from pomona.errors import PomonaError
+from pomona.kept_index import out_of_index
 from pomona.localize.map_fruits import hanging_rows
-from pomona.matching import Up, Verdict, core_arrays, core_vertical
+from pomona.matching import Index, Up, Verdict, core_arrays, core_vertical
 from pomona.threads import capped_threads
 
 __all__ = ["Localization", "Localizer"]
@@ -88,19 +90,40 @@ class Localizer:
         Values of the core's tables that differ from `pomona.default_config()`; `localization` and `verified` are used.
     threads : int, optional
         Threads of the search from nothing, at most one a core. The answer does not depend on it.
+    index : str or Path, optional
+        File for the index of a large map, which then opens at once: made where there is none, and made anew, with a
+        `PomonaWarning`, where it is of another map or version, or damaged.
 
     Raises
     ------
     PomonaError
-        The map or a setting is wrong.
+        The map or a setting is wrong; something else than an index lies in its place.
     """
 
-    def __init__(self, map: Cloud, *, config: Mapping[str, Any] | None = None, threads: int | None = None) -> None:
+    def __init__(
+        self,
+        map: Cloud,
+        *,
+        config: Mapping[str, Any] | None = None,
+        threads: int | None = None,
+        index: str | Path | None = None,
+    ) -> None:
         cloud = as_cloud(map)
         self._rows = hanging_rows(cloud)
-        settings, threads = core_settings(config), capped_threads(threads)
+        hanging, settings, most = cloud.select(self._rows), core_settings(config), capped_threads(threads)
+        arrays = core_arrays(hanging)
+
+        def make(path: Path) -> None:
+            Index(hanging, config=config, threads=threads, compact=True).save(path)
+
+        def read(path: Path) -> _core.Localizer:
+            return _core.Localizer.opened(path, arrays, config=settings, threads=most)
+
         try:
-            self._core = _core.Localizer(core_arrays(cloud.select(self._rows)), config=settings, threads=threads)
+            if index is None:
+                self._core = _core.Localizer(arrays, config=settings, threads=most)
+            else:
+                self._core = out_of_index(Path(index), read, make, absent=make)
         except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"map: {error}") from None
 

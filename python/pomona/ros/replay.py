@@ -83,6 +83,7 @@ def replay(
     up: Up | None = None,
     config: Mapping[str, Any] | None = None,
     threads: int | None = None,
+    index: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Replayed:
     """Localise a bag in a map, and write it with what a localiser on the robot would have said.
@@ -101,7 +102,7 @@ def replay(
         What the frame of the map is called.
     single, depth, odometry, up, progress : optional
         As in `pomona.localize.following.localize`; `up` also levels the frame of the map where it has no georeference.
-    config, threads : optional
+    config, threads, index : optional
         As in `pomona.Localizer`.
 
     Raises
@@ -111,7 +112,7 @@ def replay(
     """
     require_unused(output)
     bag, maker, fruits = require_bag(recording), MessageMaker(output), as_cloud(orchard)
-    localizer = Localizer(fruits, config=config, threads=threads)
+    localizer = Localizer(fruits, config=config, threads=threads, index=index)
     frames = frames_of_bag(bag, map_frame, map_axes(orchard, up))
     way = localize(bag, detector, localizer, single=single, depth=depth, odometry=odometry, up=up, progress=progress)
     theirs, ours = _Counted(_copied(bag.file)), _Counted(localized_messages(maker, bag, way, frames, fruits))

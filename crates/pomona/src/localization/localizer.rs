@@ -16,6 +16,7 @@ use crate::error::Result;
 use crate::geometry::Scale;
 use crate::matching::{MapIndex, Method};
 use crate::pose::Pose;
+use crate::verified::compact::Bytes;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Fruits in the map below which a pose has no redundancy: three fix it.
@@ -57,10 +58,22 @@ impl Localizer {
     /// # Errors
     /// A cloud or a setting that is wrong.
     pub fn new(map: &FruitCloud, config: Config) -> Result<Self> {
+        Self::with(map, &config, |of_search| MapIndex::new(map, Method::Verified, Scale::Metric, of_search))
+    }
+
+    /// Prepares `map`, whose compact index was kept as `bytes`.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and bytes that are no index of this map.
+    pub fn opened(bytes: &Bytes, map: &FruitCloud, config: Config) -> Result<Self> {
+        Self::with(map, &config, |of_search| MapIndex::opened(bytes, map, of_search))
+    }
+
+    fn with(map: &FruitCloud, config: &Config, index: impl FnOnce(Config) -> Result<MapIndex>) -> Result<Self> {
         config.validate()?;
-        let mut of_search = config;
+        let mut of_search = *config;
         of_search.verified.false_alarm_rate = config.verified.false_alarm_rate.max(SEARCH_RATE);
-        let index = MapIndex::new(map, Method::Verified, Scale::Metric, of_search)?;
+        let index = index(of_search)?;
         let config = config.localization;
         Ok(Self { index, map: KnownFruits::new(map, config.own_m), config, belief: None, window: Window::default() })
     }

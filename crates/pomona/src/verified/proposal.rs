@@ -86,7 +86,12 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     /// the rest (see [`Placement`]'s step): the inertia is the same for all candidates.
     #[inline]
     pub(crate) fn fit(&self, target: &Quad) -> Option<(Placement, f64)> {
-        let fruits = target.map(|row| self.map.place(row));
+        self.fit_on(target.map(|row| self.map.place(row)))
+    }
+
+    /// The same where the fruits of that seed are known.
+    #[inline]
+    pub(super) fn fit_on(&self, fruits: [Vector3<f64>; STARS]) -> Option<(Placement, f64)> {
         let axes = Matrix3::from_columns(&frame_of(&fruits)?);
         let (centroid, fruits) = in_frame(fruits, &axes.transpose());
         let both = || self.fruits.iter().zip(&fruits);
@@ -142,11 +147,17 @@ impl<'a, M: Terrain> Proposer<'a, M> {
         1.0 / STARS as f64 + (turn.trace() * r.norm_squared() - r.dot(&(turn * r))) / 3.0
     }
 
+    /// Variance per axis of the distance to the partner of a fruit at `p`, square metres of the map.
+    #[inline]
+    pub(super) fn variance(&self, p: &Vector3<f64>) -> f64 {
+        self.model.sigma * self.model.sigma * (1.0 + self.looseness(p))
+    }
+
     /// What a fruit says for the pose, as a likelihood ratio.
     #[inline]
     fn ratio(&self, row: u32, pose: &Placement) -> f64 {
         let p = self.query.points[row as usize];
-        let variance = self.model.sigma * self.model.sigma * (1.0 + self.looseness(&p));
+        let variance = self.variance(&p);
         let place = pose.apply(&p);
         match self.map.nearest(&place, GATE * variance.sqrt()) {
             Some((partner, d2)) => self.model.met(d2, variance, self.map.density(partner)),
@@ -156,7 +167,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
 }
 
 /// Likelihood ratio of the fruits beside the seed at which a first look ends: 2.5 nats against the pose.
-const HOPELESS: f64 = 0.082_085;
+pub(super) const HOPELESS: f64 = 0.082_085;
 
 #[cfg(test)]
 mod tests {

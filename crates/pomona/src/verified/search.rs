@@ -231,7 +231,7 @@ pub(crate) enum Starts {
 ///
 /// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet
 /// their neighbours' partners, and the refinement can stay there.
-const TURNS: [f64; 2] = [-0.2, 0.2];
+pub(super) const TURNS: [f64; 2] = [-0.2, 0.2];
 
 /// Share of the reach on which turned starts are compared.
 const NEAR: f64 = 0.75;

@@ -6,7 +6,7 @@
 
 use super::columns::{Bytes, Column};
 use super::ground::n_buckets;
-use super::shapes::{LANES, NUMBERS};
+use super::seed_blocks::LANES;
 use super::{CompactMap, Facts, MOST};
 use crate::cloud::FruitCloud;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 /// On a machine with another order of bytes it reads otherwise.
 const MAGIC: u64 = u64::from_le_bytes(*b"POMONAix");
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Words of 64 bits in the header; its own sum is the last.
 const HEADER: usize = 64;
@@ -25,7 +25,7 @@ const HEADER: usize = 64;
 /// Columns start at multiples of this, bytes.
 const ALIGNED: usize = 64;
 
-const COLUMNS: usize = 10;
+const COLUMNS: usize = 8;
 
 /// Bytes that are summed in one piece.
 const PIECE: usize = 1 << 20;
@@ -66,14 +66,12 @@ impl CompactMap {
         [
             self.rows.bytes(),
             self.points.bytes(),
-            self.density.bytes(),
             self.buckets.bytes(),
             self.companions.bytes(),
+            self.surroundings.bytes(),
             self.starts.bytes(),
             self.common.bytes(),
-            self.codes.bytes(),
-            self.anchors.bytes(),
-            self.labels.bytes(),
+            self.seeds.bytes(),
         ]
     }
 
@@ -89,14 +87,12 @@ impl CompactMap {
             facts,
             rows: Column::Held(bytes.clone(), next()),
             points: Column::Held(bytes.clone(), next()),
-            density: Column::Held(bytes.clone(), next()),
             buckets: Column::Held(bytes.clone(), next()),
             companions: Column::Held(bytes.clone(), next()),
+            surroundings: Column::Held(bytes.clone(), next()),
             starts: Column::Held(bytes.clone(), next()),
             common: Column::Held(bytes.clone(), next()),
-            codes: Column::Held(bytes.clone(), next()),
-            anchors: Column::Held(bytes.clone(), next()),
-            labels: Column::Held(bytes.clone(), next()),
+            seeds: Column::Held(bytes.clone(), next()),
         };
         drop(ranges);
         if end == length { Ok(index) } else { wrong(&format!("found {length} bytes, expected {end}")) }
@@ -104,20 +100,18 @@ impl CompactMap {
 
     /// Whether the columns belong to each other.
     fn is_sound(&self) -> bool {
-        let (fruits, seeds, cells) = (self.rows.get().len(), self.anchors.get().len(), self.facts.cells.len());
+        let (fruits, cells) = (self.rows.get().len(), self.facts.cells.len());
         let starts = self.starts.get();
         fruits <= MOST.min(self.facts.given)
             && self.rows.get().iter().all(|&row| (row as usize) < self.facts.given)
             && self.points.get().len() == fruits
-            && self.density.get().len() == fruits
+            && self.surroundings.get().len() == fruits
             && self.buckets.get().len() == n_buckets(fruits) + 1
             && self.companions.get().len() == fruits * self.facts.each
             && starts.len() == cells + 1
             && starts.is_sorted()
-            && starts[cells] as usize == seeds
+            && self.seeds.get().len() == (starts[cells] as usize).div_ceil(LANES)
             && self.common.get().len() == cells.div_ceil(32)
-            && self.labels.get().len() == seeds
-            && self.codes.get().len() == seeds.div_ceil(LANES) * LANES * NUMBERS
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where the fruits of a large map are: in buckets, by the cells of space.
 
 use super::CompactMap;
+use super::surroundings::{Surroundings, density_of};
 use crate::neighbours::cells::{CellKey, cell_of, hash};
 use crate::verified::proposal::Terrain;
 use nalgebra::{Point3, Vector3};
@@ -8,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 /// What a search asks of the places of fruits. Numbers from a file may be wrong: none is trusted as a row.
 pub(super) struct Ground<'a> {
     points: &'a [[f32; 3]],
-    density: &'a [f32],
+    surroundings: &'a [Surroundings],
     buckets: &'a [u32],
     inverse_cell: f64,
 }
@@ -49,7 +50,7 @@ impl<'a> Ground<'a> {
     pub(super) fn new(map: &'a CompactMap) -> Self {
         Self {
             points: map.points.get(),
-            density: map.density.get(),
+            surroundings: map.surroundings.get(),
             buckets: map.buckets.get(),
             inverse_cell: 1.0 / map.facts.sampled_spacing,
         }
@@ -129,7 +130,7 @@ impl Terrain for Ground<'_> {
 
     #[inline]
     fn density(&self, row: u32) -> f64 {
-        self.density.get(row as usize).map_or(f64::INFINITY, |&density| f64::from(density))
+        self.surroundings.get(row as usize).map_or(f64::INFINITY, density_of)
     }
 
     /// Proposals lie amid crowns.

@@ -1,6 +1,7 @@
 //! What a large map answers: the best proposals, verified on what is cut out of the map around them.
 
 use super::CompactMap;
+use super::closer::closer;
 use super::ground::Ground;
 use super::proposing::{looks, proposals, within_budget};
 use super::shapes::Shapes;
@@ -14,15 +15,29 @@ use crate::verified::decision::{self, MIN_FRUITS, answer_of};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::placement::Placement;
-use crate::verified::search::{Contender, Effort, REACH, Starts, by_evidence, distinct, refined};
+use crate::verified::search::{Contender, Effort, REACH, by_evidence, distinct};
 use crate::verified::size::Diameters;
 use nalgebra::Vector3;
 
-/// Rounds of the search: candidates that each meets, more or less, and contenders that are looked at closely after it.
-const ROUNDS: [(f32, usize); 3] = [(5e4, 32), (2e5, 64), (1e6, 256)];
+/// Rounds of the search: candidates that each meets, more or less, and contenders that are looked at more closely after it.
+const ROUNDS: [(f32, usize); 4] = [(1e4, 32), (5e4, 64), (2e5, 128), (1e6, 256)];
 
 /// Contenders that are verified as a whole.
 const WHOLE: usize = 12;
+
+/// Nats by which the best contender has to stand out of those of other poses to be verified before the last round.
+const STANDS_OUT: f64 = 6.0;
+
+/// Share of its evidence from which on others are verified with it there: as in [`decision`], less grow to no rival.
+const RIVAL: f64 = 0.3;
+
+/// Poses are one where they put the seed of one of them within so many spacings of one place, turned by less than that.
+const SAME_PLACE: f64 = 1.0;
+const SAME_TURN_RAD: f64 = 0.2;
+
+/// Contenders that are verified of those that lay the middle of the query within the reach of a seed's evidence: others show what
+/// chance reaches.
+const OF_ONE_SPOT: usize = 2;
 
 /// Contenders that are remembered from round to round.
 const REMEMBERED: usize = 4096;
@@ -89,64 +104,80 @@ impl Case<'_> {
         let (shapes, step) = (Shapes::new(self.index), self.index.facts.step);
         let looks = looks(self.landscape, &shapes, &self.model, step);
         let (mut rest, mut effort) = (&looks[..], Effort::default());
-        let mut contenders = Vec::new();
-        let mut answer = Match::without_answer(Verdict::NoMatch, Vec::new());
+        let (mut contenders, mut best) = (Vec::new(), Vec::new());
         for (budget, closely) in ROUNDS {
             let (now, later) = rest.split_at(within_budget(rest, budget));
             rest = later;
-            if now.is_empty() {
-                continue;
-            }
             let (more, spent) = proposals(self.landscape, (&self.ground, &shapes), &self.model, now, step);
             effort = effort + spent;
             contenders.extend(more);
             contenders.sort_unstable_by(by_evidence);
             contenders.truncate(REMEMBERED);
-            answer = self.judged(contenders.clone(), closely, effort);
-            if answer.verdict != Verdict::NoMatch {
+            best = self.of_other_poses(&self.looked_at(contenders.clone(), closely));
+            let answer = outstanding(&best).map(|some| self.judged(some, effort));
+            if let Some(answer) = answer.filter(|answer| answer.verdict != Verdict::NoMatch) {
+                return answer;
+            }
+            if rest.is_empty() {
                 break;
             }
         }
-        answer
+        self.judged(&best, effort)
+    }
+
+    /// The best contenders on a closer look.
+    fn looked_at(&self, mut contenders: Vec<Contender>, closely: usize) -> Vec<Contender> {
+        let best = distinct(self.landscape, self.index.facts.spacing, &mut contenders, closely);
+        closer(self.landscape, &self.ground, &self.model, &best)
+    }
+
+    /// Of contenders, most evidence first, those whose pose no better one has; as many as are verified.
+    fn of_other_poses(&self, contenders: &[Contender]) -> Vec<Contender> {
+        let spot = REACH * self.landscape.spacing;
+        let mut kept: Vec<Contender> = Vec::new();
+        for one in contenders {
+            let apart = |other: &Contender| (one.pose.apply(&one.place) - other.pose.apply(&one.place)).norm();
+            let same = |other: &Contender| {
+                apart(other) < SAME_PLACE * self.index.facts.spacing && one.pose.turn_to(&other.pose) < SAME_TURN_RAD
+            };
+            let near = |other: &&Contender| (one.pose.translation - other.pose.translation).norm() < spot;
+            if kept.len() < WHOLE && !kept.iter().any(same) && kept.iter().filter(near).count() < OF_ONE_SPOT {
+                kept.push(*one);
+            }
+        }
+        kept
     }
 
     /// The answer that the contenders give, most evidence first.
-    fn judged(&self, mut contenders: Vec<Contender>, closely: usize, effort: Effort) -> Match {
-        let best = distinct(self.landscape, self.index.facts.spacing, &mut contenders, closely);
-        let mut whole = self.looked_at(&best);
-        let whole = distinct(self.landscape, self.index.facts.spacing, &mut whole, WHOLE);
-        let rows = self.rows_around(&whole, f64::INFINITY);
+    fn judged(&self, contenders: &[Contender], effort: Effort) -> Match {
+        let rows = self.rows_around(contenders);
         let part = cut(self.map, &rows);
         let prepared = VerifiedMap::part(&part, self.index.facts.spacing, self.map.len());
         let sizes = Diameters::new(self.query, &part, self.landscape, &prepared.landscape);
         let search = Search::new(&prepared, self.landscape, sizes, self.request, self.config);
-        let moved: Vec<Contender> = whole.iter().map(|one| one.moved(-prepared.landscape.centre)).collect();
+        let moved: Vec<Contender> = contenders.iter().map(|one| one.moved(-prepared.landscape.centre)).collect();
         in_map(answer_of(&search, search.weigh(&moved, effort)), &rows)
     }
 
-    /// The contenders refined on what is next to their seeds.
-    fn looked_at(&self, contenders: &[Contender]) -> Vec<Contender> {
-        let rows = self.rows_around(contenders, REACH * self.landscape.spacing);
-        let part = Landscape::part(&cut(self.map, &rows), self.index.facts.spacing);
-        let moved: Vec<Contender> = contenders.iter().map(|one| one.moved(-part.centre)).collect();
-        let refined = refined(self.landscape, &part, &moved, &self.model, Starts::Turned);
-        refined.iter().map(|found| Contender::from(found).moved(part.centre)).collect()
-    }
-
-    /// The fruits of the map where the contenders put what of the query is within `reach` of their seeds.
-    fn rows_around(&self, contenders: &[Contender], reach: f64) -> Vec<u32> {
-        let mut rows: Vec<u32> = contenders
-            .iter()
-            .flat_map(|one| {
-                let near = |p: &&Vector3<f64>| (**p - one.place).norm() <= reach;
-                let places = self.landscape.points.iter().filter(near).map(|p| one.pose.apply(p));
-                self.ground.around(places, MARGIN)
-            })
-            .collect();
+    /// The fruits of the map where the contenders put the query.
+    fn rows_around(&self, contenders: &[Contender]) -> Vec<u32> {
+        let places = |one: &Contender| {
+            let pose = one.pose;
+            self.landscape.points.iter().map(move |p| pose.apply(p))
+        };
+        let mut rows: Vec<u32> = contenders.iter().flat_map(|one| self.ground.around(places(one), MARGIN)).collect();
         rows.sort_unstable();
         rows.dedup();
         rows
     }
+}
+
+/// The best contender and its rivals, where it stands out.
+fn outstanding(contenders: &[Contender]) -> Option<&[Contender]> {
+    let best = contenders.first()?.log_odds;
+    let second = contenders.get(1).map_or(0.0, |one| one.log_odds);
+    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
+    (best > STANDS_OUT + second).then(|| &contenders[..rivals])
 }
 
 fn cut(map: &FruitCloud, rows: &[u32]) -> FruitCloud {

@@ -7,7 +7,9 @@
 
 use super::columns::Column;
 use super::ground::by_bucket;
-use super::shapes::{LANES, NUMBERS, STEPS, Shape, in_steps, rounded};
+use super::seed_blocks::{Anchored, Block, EMPTY, LANES, put};
+use super::shapes::{STEPS, Shape, in_steps, rounded};
+use super::surroundings::{Surroundings, packed, step_of};
 use super::{CompactMap, Facts, fingerprint};
 use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
@@ -15,7 +17,7 @@ use crate::neighbours::tree::Tree;
 use crate::verified::chance::local_density;
 use crate::verified::codes::{Cells, Code};
 use crate::verified::landscape::{floor_of, spacing_of};
-use crate::verified::nearest::{Neighbours, single};
+use crate::verified::nearest::{Neighbours, SHARE_OF_ROWS, single};
 use crate::verified::seeds::{COMPANIONS, canonical, sets_of};
 use crate::verified::{SEED_SIGMA, shuffled};
 use nalgebra::Vector3;
@@ -39,8 +41,7 @@ const PORTION: usize = 1 << 15;
 struct Kept {
     cell: u32,
     shape: Shape,
-    anchor: u32,
-    label: u16,
+    seed: Anchored,
 }
 
 impl CompactMap {
@@ -56,11 +57,12 @@ impl CompactMap {
         let each = COMPANIONS.min(neighbours.each);
         let companions: Vec<u32> =
             (0..points.len()).flat_map(|row| neighbours.of(row)[..each].iter().copied()).collect();
+        let surroundings = surroundings(&points, &neighbours, &density, step_of(spacing));
         drop(neighbours);
         let seeds = Seeds { points: &points, companions: &companions, each, step: spacing / STEPS, spacing };
         let cells = seeds.cells();
         let (starts, common) = seeds.counted(&cells);
-        let (codes, anchors, labels) = seeds.placed(&cells, &starts, &common);
+        let kept = seeds.placed(&cells, &starts, &common);
         let facts = Facts {
             given: given.len(),
             fingerprint: fingerprint(given),
@@ -76,14 +78,12 @@ impl CompactMap {
             facts,
             rows: rows.into(),
             points: in_single.into(),
-            density: density.iter().map(|&x| x as f32).collect::<Vec<_>>().into(),
             buckets: buckets.into(),
             companions: Column::Own(companions),
+            surroundings: surroundings.into(),
             starts: starts.into(),
             common: common.into(),
-            codes: codes.into(),
-            anchors: anchors.into(),
-            labels: labels.into(),
+            seeds: kept.into(),
         };
         (index, map)
     }
@@ -149,25 +149,20 @@ impl Seeds<'_> {
     }
 
     /// The seeds that are kept, in the order of cells and, within one, of fruits.
-    fn placed(&self, cells: &Cells, starts: &[u32], common: &[u32]) -> (Vec<u8>, Vec<u32>, Vec<u16>) {
+    fn placed(&self, cells: &Cells, starts: &[u32], common: &[u32]) -> Vec<Block> {
         let count = starts.last().copied().unwrap_or_default() as usize;
-        let mut codes = vec![0u8; count.div_ceil(LANES) * LANES * NUMBERS];
-        let (mut anchors, mut labels) = (vec![0u32; count], vec![0u16; count]);
+        let mut blocks = vec![EMPTY; count.div_ceil(LANES)];
         let mut next = starts.to_vec();
         let rows: Vec<u32> = (0..self.points.len() as u32).collect();
         for portion in rows.chunks(PORTION) {
             let kept: Vec<Vec<Kept>> = portion.par_chunks(256).map(|rows| self.kept(rows, cells, common)).collect();
-            for Kept { cell, shape, anchor, label } in kept.into_iter().flatten() {
-                let seed = next[cell as usize] as usize;
+            for Kept { cell, shape, seed } in kept.into_iter().flatten() {
+                let at = next[cell as usize] as usize;
                 next[cell as usize] += 1;
-                let first = seed / LANES * LANES * NUMBERS + seed % LANES;
-                for (number, value) in shape.into_iter().enumerate() {
-                    codes[first + number * LANES] = value;
-                }
-                (anchors[seed], labels[seed]) = (anchor, label);
+                put(&mut blocks[at / LANES], at % LANES, shape, seed);
             }
         }
-        (codes, anchors, labels)
+        blocks
     }
 
     fn kept(&self, rows: &[u32], cells: &Cells, common: &[u32]) -> Vec<Kept> {
@@ -181,11 +176,20 @@ impl Seeds<'_> {
                 };
                 let which = |row: &u32| near.iter().position(|other| other == row).map_or(0, |at| at as u16 + 1);
                 let label = quad.iter().rev().fold(0, |label, row| label << 4 | which(row));
-                kept.push(Kept { cell, shape, anchor, label });
+                kept.push(Kept { cell, shape, seed: Anchored { anchor, label } });
             });
         }
         kept
     }
+}
+
+/// What hangs next to each fruit.
+fn surroundings(points: &[Vector3<f64>], neighbours: &Neighbours, density: &[f64], step: f64) -> Vec<Surroundings> {
+    let of = |row: usize| {
+        let offsets = neighbours.of(row).iter().map(|&other| points[other as usize] - points[row]);
+        packed(offsets, density[row], step)
+    };
+    (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(of).collect()
 }
 
 /// The largest count of a cell such that all cells with no more have at most `most` together.

@@ -6,20 +6,26 @@
 //!
 //! 1. the map keeps the seeds of rare shape, 48 a fruit on average, and which shapes are common (`making`);
 //! 2. a query looks up its own seeds, those of the rarest shape first, with all labelings that noise could have made, until it
-//!    has met as many candidates as a budget allows (`proposing`);
-//! 3. the map around the best candidates is cut out, and what is cut out is verified as a small map is, against what chance
+//!    has met as many candidates as a budget allows (`proposing`); most are dropped after a look at what hangs next to the
+//!    fruit that they belong to (`glance`), which lies in one line of memory (`surroundings`);
+//! 3. the best of what is left are refined on the index (`closer`);
+//! 4. the map around the best of these is cut out, and what is cut out is verified as a small map is, against what chance
 //!    reaches in the whole one (`judging`).
 //!
 //! The index is a few columns of numbers (`columns`), in memory or in a file that is mapped (`format`). It only proposes:
 //! places, covariances and diameters that decide are the caller's.
 
+mod closer;
 mod columns;
 mod format;
+mod glance;
 mod ground;
 mod judging;
 mod making;
 mod proposing;
+mod seed_blocks;
 mod shapes;
+mod surroundings;
 #[cfg(test)]
 mod tests;
 
@@ -30,6 +36,8 @@ pub(crate) use judging::{pairs_under, search};
 use super::codes::Cells;
 use columns::Column;
 use nalgebra::Vector3;
+use seed_blocks::Block;
+use surroundings::Surroundings;
 
 /// Fruits of a map at the most: rows have 32 bits, and so have seeds.
 pub(crate) const MOST: usize = 10_000_000;
@@ -42,22 +50,18 @@ pub(crate) struct CompactMap {
     rows: Column<u32>,
     /// About the middle of the map, metres.
     points: Column<[f32; 3]>,
-    /// Fruits per cubic metre that chance puts at each fruit.
-    density: Column<f32>,
     /// Number of each bucket's first fruit, one more than there are buckets.
     buckets: Column<u32>,
     /// The nearest others of each fruit, [`Facts::each`] of them.
     companions: Column<u32>,
+    /// What hangs next to each fruit, in one line of memory.
+    surroundings: Column<Surroundings>,
     /// Number of each cell's first seed, one more than there are cells of shapes.
     starts: Column<u32>,
     /// A bit for each cell of shapes: whether it is so common that its seeds are not kept.
     common: Column<u32>,
-    /// Shapes in blocks of [`shapes::LANES`], number by number.
-    codes: Column<u8>,
-    /// The fruit that each seed belongs to.
-    anchors: Column<u32>,
-    /// Four bits for each fruit of a seed: 0 is the anchor, else which of its companions.
-    labels: Column<u16>,
+    /// The seeds, in the order of the cells.
+    seeds: Column<Block>,
 }
 
 /// The numbers of an index that are no column.

@@ -1,7 +1,9 @@
 //! Where in a large map a query may lie: its seeds of the rarest shape, and what they meet.
 
+use super::glance::Glance;
 use super::ground::Ground;
-use super::shapes::{Shape, Shapes, in_steps, rounded};
+use super::shapes::{Scratch, Shape, Shapes, in_steps, rounded};
+use super::surroundings::Neighbourhood;
 use crate::verified::codes::Code;
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
@@ -72,26 +74,32 @@ pub(super) fn proposals(
     looks: &[Look],
     step: f64,
 ) -> (Vec<Contender>, Effort) {
+    let near_step = shapes.near_step();
+    // Twelve numbers less the six of a pose.
+    let most = 2.0 * (RADIUS * model.sigma).powi(2);
     let parts: Vec<(Vec<Contender>, Effort)> = looks
         .par_chunks(SHARE_OF_LOOKS)
         .map(|looks| {
-            let (mut found, mut effort, mut runs) = (Vec::new(), Effort::default(), Vec::new());
+            let (mut found, mut effort, mut scratch) = (Vec::new(), Effort::default(), Scratch::default());
             for look in looks {
                 effort.codes += 1;
                 let Some(proposer) = Proposer::new(query, ground, model, look.quad) else { continue };
-                shapes.within(look.shape, (RADIUS * model.sigma / step) as f32, &mut runs, |target| {
-                    effort.candidates += 1;
-                    let Some((pose, residual)) = proposer.fit(&target) else { return };
-                    if residual > 2.0 * (RADIUS * model.sigma).powi(2) {
-                        return;
+                let glance = Glance::new(&proposer, query, model, look.quad, most);
+                shapes.near(look.shape, (RADIUS * model.sigma / step) as f32, &mut scratch);
+                effort.candidates += scratch.met.len() as u64;
+                for (seed, around) in scratch.met.iter().zip(&scratch.around) {
+                    if !glance.admits(seed.which(), &Neighbourhood::new(around, near_step)) {
+                        continue;
                     }
-                    let Some(pose) = proposer.upright(pose) else { return };
                     effort.fitted += 1;
+                    let Some(target) = shapes.quad(*seed) else { continue };
+                    let Some((pose, _)) = proposer.fit(&target) else { continue };
+                    let Some(pose) = proposer.upright(pose) else { continue };
                     let log_odds = proposer.first_look(&pose);
                     if log_odds > 0.0 {
                         found.push(Contender { pose, log_odds, place: proposer.centroid, key: (look.quad, target) });
                     }
-                });
+                }
             }
             (found, effort)
         })

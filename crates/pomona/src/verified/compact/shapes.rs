@@ -1,11 +1,11 @@
 //! The seeds of a large map by their shape, a byte for each number of a code.
 
+use super::seed_blocks::{Anchored, Block, LANES, anchored, squared_distances};
+use super::surroundings::{Surroundings, step_of};
 use super::{CompactMap, Facts};
 use crate::verified::codes::{Code, Run};
 use crate::verified::seeds::{Quad, STARS};
-
-/// Codes that are measured at once.
-pub(super) const LANES: usize = 16;
+use std::ops::Range;
 
 /// Numbers of a code.
 pub(super) const NUMBERS: usize = 6;
@@ -37,10 +37,9 @@ pub(super) struct Shapes<'a> {
     facts: &'a Facts,
     starts: &'a [u32],
     common: &'a [u32],
-    codes: &'a [u8],
-    anchors: &'a [u32],
-    labels: &'a [u16],
+    seeds: &'a [Block],
     companions: &'a [u32],
+    surroundings: &'a [Surroundings],
 }
 
 impl<'a> Shapes<'a> {
@@ -49,10 +48,9 @@ impl<'a> Shapes<'a> {
             facts: &map.facts,
             starts: map.starts.get(),
             common: map.common.get(),
-            codes: map.codes.get(),
-            anchors: map.anchors.get(),
-            labels: map.labels.get(),
+            seeds: map.seeds.get(),
             companions: map.companions.get(),
+            surroundings: map.surroundings.get(),
         }
     }
 
@@ -76,36 +74,55 @@ impl<'a> Shapes<'a> {
         Some(sum / (1 + 2 * NUMBERS) as f32)
     }
 
-    /// Calls `visit` with every seed whose code is within `radius` of `shape`, both in steps.
-    pub(super) fn within(&self, shape: Shape, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Quad)) {
+    /// Finds the seeds whose shape is within `radius` of `shape`, both in steps, with what hangs next to them.
+    ///
+    /// In turns, each over all that the one before found: so that many waits for memory run at once.
+    pub(super) fn near(&self, shape: Shape, radius: f32, scratch: &mut Scratch) {
         let limit = (radius * radius).min(f32::from(u16::MAX - 1)) as u16;
-        self.facts.cells.near(&shape.map(f32::from), radius, runs, |cells| {
-            let (first, end) = (self.starts[cells.start] as usize, self.starts[cells.end] as usize);
-            for block in first / LANES..end.div_ceil(LANES) {
-                let Some(codes) = self.codes.get(block * LANES * NUMBERS..(block + 1) * LANES * NUMBERS) else { break };
-                let distances = squared_distances(codes, shape);
-                if distances.iter().all(|&distance| distance > limit) {
-                    continue;
-                }
-                for (lane, _) in distances.iter().enumerate().filter(|(_, distance)| **distance <= limit) {
-                    let seed = block * LANES + lane;
-                    if let Some(quad) = self.quad(seed).filter(|_| (first..end).contains(&seed)) {
-                        visit(quad);
-                    }
-                }
+        let Scratch { runs, cells, met, around } = scratch;
+        cells.clear();
+        self.facts.cells.near(&shape.map(f32::from), radius, runs, |row| cells.push(row));
+        for row in cells.iter_mut() {
+            *row = self.starts[row.start] as usize..self.starts[row.end] as usize;
+        }
+        met.clear();
+        for seeds in cells.iter() {
+            self.scan(shape, limit, seeds, met);
+        }
+        around.clear();
+        around.extend(met.iter().map(|seed| *self.surroundings.get(seed.anchor as usize).unwrap_or(&NOWHERE)));
+    }
+
+    /// Those of a row of seeds that are within the limit.
+    #[inline]
+    fn scan(&self, shape: Shape, limit: u16, seeds: &Range<usize>, met: &mut Vec<Anchored>) {
+        if seeds.is_empty() {
+            return;
+        }
+        let first = seeds.start / LANES;
+        let blocks = self.seeds.get(first..seeds.end.div_ceil(LANES)).unwrap_or_default();
+        for (at, block) in (first..).zip(blocks) {
+            let distances = squared_distances(block, shape);
+            if distances.iter().all(|&distance| distance > limit) {
+                continue;
             }
-        });
+            let lanes = (0..LANES).filter(|&lane| distances[lane] <= limit && seeds.contains(&(at * LANES + lane)));
+            met.extend(lanes.map(|lane| anchored(block, lane)));
+        }
+    }
+
+    /// Metres of a step of what hangs next to fruits.
+    pub(super) fn near_step(&self) -> f64 {
+        step_of(self.facts.spacing)
     }
 
     /// The fruits of a seed.
     #[inline]
-    fn quad(&self, seed: usize) -> Option<Quad> {
-        let (anchor, label) = (*self.anchors.get(seed)?, *self.labels.get(seed)?);
-        let first = anchor as usize * self.facts.each;
+    pub(super) fn quad(&self, seed: Anchored) -> Option<Quad> {
+        let first = seed.anchor as usize * self.facts.each;
         let near = self.companions.get(first..first + self.facts.each)?;
-        let mut quad = [anchor; STARS];
-        for (place, row) in quad.iter_mut().enumerate() {
-            let which = usize::from(label >> (4 * place) & 15);
+        let mut quad = [seed.anchor; STARS];
+        for (row, which) in quad.iter_mut().zip(seed.which()) {
             if which > 0 {
                 *row = *near.get(which - 1)?;
             }
@@ -114,15 +131,15 @@ impl<'a> Shapes<'a> {
     }
 }
 
-/// Up to the largest number of 16 bits.
-#[inline]
-fn squared_distances(codes: &[u8], shape: Shape) -> [u16; LANES] {
-    let mut sums = [0u16; LANES];
-    for (numbers, own) in codes.chunks_exact(LANES).zip(shape) {
-        for (sum, &number) in sums.iter_mut().zip(numbers) {
-            let apart = u16::from(number.abs_diff(own));
-            *sum = sum.saturating_add(apart * apart);
-        }
-    }
-    sums
+/// What a search has found, and buffers of it that are used again.
+#[derive(Default)]
+pub(super) struct Scratch {
+    runs: Vec<Run>,
+    /// Rows of cells, then of the seeds in them.
+    cells: Vec<Range<usize>>,
+    pub(super) met: Vec<Anchored>,
+    pub(super) around: Vec<Surroundings>,
 }
+
+/// What hangs next to a fruit that is not there.
+const NOWHERE: Surroundings = [0; size_of::<Surroundings>()];

@@ -118,9 +118,16 @@ fn spoil(index: &mut CompactMap, seed: u64) {
     match seed % 6 {
         0 => index.buckets = every(index.buckets.get()),
         1 => index.companions = every(index.companions.get()),
-        2 => index.anchors = every(index.anchors.get()),
+        2 => {
+            index.seeds = Column::Own(
+                index.seeds.get().iter().map(|block| block.map(|plane| plane.map(|byte| byte ^ wild as u8))).collect(),
+            )
+        }
         3 => index.starts = every(index.starts.get()),
-        4 => index.labels = Column::Own(index.labels.get().iter().map(|label| label ^ wild as u16).collect()),
+        4 => {
+            let spoiled = |around: &Surroundings| around.map(|byte| byte ^ wild as u8);
+            index.surroundings = Column::Own(index.surroundings.get().iter().map(spoiled).collect());
+        }
         _ => index.points = Column::Own(index.points.get().iter().map(|p| p.map(|x| f32::NAN * x)).collect()),
     }
 }

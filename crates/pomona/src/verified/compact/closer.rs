@@ -1,0 +1,112 @@
+//! A closer look at a contender: its pose refined on the places in the index, and what the fruits around its seed say then.
+//!
+//! It does what [`crate::verified::hypothesis::refine`] does, without the map's side of the evidence and without what only a
+//! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
+
+use crate::verified::hypothesis::{Evidence, GATE, Model};
+use crate::verified::landscape::Landscape;
+use crate::verified::nearest::single;
+use crate::verified::placement::{Moments, Placement};
+use crate::verified::proposal::Terrain;
+use crate::verified::search::{Contender, REACH, TURNS, by_evidence};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Steps of a refinement: a turned start is at its end then.
+const STEPS: usize = 5;
+
+/// Sum of weights of pairs that fix a pose.
+const FIXES: f64 = 3.5;
+
+/// One in so many, the best, is started turned too.
+const TURNED: usize = 4;
+
+/// Contenders that are worth a thread of their own.
+const SHARE: usize = 4;
+
+/// The contenders as they are on a closer look, most evidence first.
+pub(super) fn closer<M: Terrain + Sync>(
+    query: &Landscape,
+    map: &M,
+    model: &Model,
+    contenders: &[Contender],
+) -> Vec<Contender> {
+    let from = |one: &Contender, starts: &mut dyn Iterator<Item = Placement>| {
+        let region = Region::around(query, one.place);
+        let refined = starts.filter_map(|start| region.refined(map, model, start));
+        let best = refined.max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|(pose, log_odds)| Contender { pose, log_odds, ..*one })
+    };
+    let straight = |one: &Contender| from(one, &mut std::iter::once(one.pose));
+    let mut closer: Vec<Contender> = contenders.par_iter().with_min_len(SHARE).filter_map(straight).collect();
+    closer.sort_unstable_by(by_evidence);
+    let turned = |one: &mut Contender| {
+        let more = from(one, &mut one.pose.turned_by_each(&one.place, &TURNS));
+        *one = more.filter(|more| more.log_odds > one.log_odds).unwrap_or(*one);
+    };
+    let best = contenders.len().div_ceil(TURNED).min(closer.len());
+    closer[..best].par_iter_mut().with_min_len(SHARE).for_each(turned);
+    closer.sort_unstable_by(by_evidence);
+    closer
+}
+
+/// The fruits of the query around a seed.
+struct Region {
+    place: Vector3<f64>,
+    fruits: Vec<Vector3<f64>>,
+    reach: f64,
+}
+
+impl Region {
+    fn around(query: &Landscape, place: Vector3<f64>) -> Self {
+        let (reach, mut rows) = (REACH * query.spacing, Vec::new());
+        query.tree.within(&single(&place), reach as f32, |row, _| rows.push(row));
+        rows.sort_unstable();
+        Self { place, fruits: rows.iter().map(|&row| query.points[row as usize]).collect(), reach }
+    }
+
+    /// A pose improved on the fruits, and their evidence.
+    fn refined(&self, map: &impl Terrain, model: &Model, start: Placement) -> Option<(Placement, f64)> {
+        let mut pose = start;
+        // As well as a seed gives it: see the refinement of a hypothesis.
+        let (mut freedom, mut inertia, mut centroid) = (0.25, 0.1 * self.reach * self.reach, self.place);
+        for _ in 0..STEPS {
+            let variance = |p: &Vector3<f64>| {
+                model.sigma * model.sigma * (1.0 + freedom + (p - centroid).norm_squared() / inertia)
+            };
+            let (moments, _) = self.paired(map, model, &pose, variance);
+            if moments.weight < FIXES {
+                return None;
+            }
+            pose = moments.step(&pose, model.scale, 0.0)?;
+            centroid = moments.centroid();
+            freedom = 1.0 / moments.weight;
+            inertia = moments.weight * moments.spread().trace() * 2.0 / 3.0;
+        }
+        let variance =
+            |p: &Vector3<f64>| model.sigma * model.sigma * (1.0 + freedom + (p - centroid).norm_squared() / inertia);
+        Some((pose, self.paired(map, model, &pose, variance).1))
+    }
+
+    /// Sums over the pairs of a pose, and the evidence of all fruits.
+    fn paired(
+        &self,
+        map: &impl Terrain,
+        model: &Model,
+        pose: &Placement,
+        variance: impl Fn(&Vector3<f64>) -> f64,
+    ) -> (Moments, f64) {
+        let (mut moments, mut evidence) = (Moments::default(), Evidence::default());
+        for p in &self.fruits {
+            let variance = variance(p);
+            let Some((row, d2)) = map.nearest(&pose.apply(p), GATE * variance.sqrt()) else {
+                evidence.multiply(model.missed(1.0));
+                continue;
+            };
+            let met = model.met(d2, variance, map.density(row));
+            evidence.multiply(met);
+            moments.add(p, &map.place(row), 1.0 - (1.0 - model.detection) / met);
+        }
+        (moments, evidence.log_odds())
+    }
+}
