@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.pose import pose_error
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import pomona
 from pomona import FruitCloud
+from pomona.evaluate import score_pairs
 from pomona.matching import Match
 from pomona.synth.clouds import scene_pair
 
@@ -76,6 +78,27 @@ def dozen(seed: int) -> list[FruitCloud]:
         fruits = np.r_[tree[kept] + random.normal(0.0, 0.02, (10, 3)), random.uniform(low, high, (1, 3))]
         visits.append(FruitCloud(fruits @ turn.T, ids=(*map(str, kept), side)))
     return visits
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_opposite_sides_with_one_fruit_in_seven_in_common_are_found(seed: int) -> None:
+    """Of four neighbours hardly ever all are seen from both sides."""
+    pair = scene_pair("opposite15", seed)
+    match = pomona.match(pair.query, pair.map)
+    assert match.status == "Found"
+    assert match.map_from_query is not None
+    assert pose_error(match.map_from_query, pair.map_from_query, pair.query.positions).success
+
+
+def test_a_branch_that_sank_is_followed_to_its_tip() -> None:
+    """20 cm at the tips: the means of neighbours, which hang nearer the stem, fall short there."""
+    pairs = [scene_pair("sag20", seed) for seed in (0, 3)]
+    matches = [pomona.match(pair.query, pair.map) for pair in pairs]
+    scores = [
+        score_pairs(match.pairs.tolist(), pair.query.ids or (), pair.map.ids or ())
+        for match, pair in zip(matches, pairs, strict=True)
+    ]
+    assert min(score.recall for score in scores) > 0.81 < min(score.precision for score in scores)
 
 
 def test_a_dozen_fruits_are_found_as_often_as_they_can_be_told() -> None:

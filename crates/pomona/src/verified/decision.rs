@@ -4,9 +4,10 @@ use super::acceptance::VerifiedConfig;
 use super::case::{Finding, Findings, Log, SETTLED, Search, Stages, VerifiedMap};
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
-use super::growth::{grow, hold};
+use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
+use super::offsets;
 use super::placement::Placement;
 use super::search::{Contender, Effort, Starts, of_some_fruits, refined, round};
 use super::seeds::{self, Seed};
@@ -44,6 +45,12 @@ const FEW_SEEDS: u64 = 1500;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
+
+/// Rows laid along rows that are held against each other over all of the query.
+const LAID: usize = 3;
+
+/// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
+const LEAST_LAID: f64 = 16.0;
 
 /// A pose with this many times the evidence needed is no local optimum.
 const SURE: f64 = 6.0;
@@ -126,6 +133,9 @@ impl<'a> Search<'a> {
             if !findings.accepted.is_empty() {
                 break;
             }
+        }
+        if findings.accepted.is_empty() {
+            self.lay_along(&mut findings, &mut log);
         }
         if findings.accepted.is_empty() {
             findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
@@ -245,6 +255,24 @@ impl<'a> Search<'a> {
             findings.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
         }
         grown
+    }
+
+    /// Asks the offsets of all fruits, where too few are in common for any seed.
+    fn lay_along(&self, findings: &mut Findings<'a>, log: &mut Log) {
+        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model, &|pose| self.admits(pose));
+        log.refined += hypotheses.len();
+        let few = Model { detection: offsets::FEW_AGAIN, ..self.model };
+        let grown = |seed: &Hypothesis| lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few });
+        for seed in hypotheses.iter().take(LAID).filter(|seed| seed.log_odds > LEAST_LAID) {
+            if !findings.accepted.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
+                log.grown += 1;
+                findings.accepted.push(Finding::new(grown(seed), *seed));
+            }
+        }
+        self.sift(findings, log);
+        if !findings.accepted.is_empty() {
+            self.doubt(findings, &[], log);
+        }
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {

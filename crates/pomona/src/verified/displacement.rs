@@ -57,3 +57,115 @@ pub(super) fn displacement(
     let ratio = noise / shared;
     (sum / (total + ratio), noise / (total + ratio))
 }
+
+/// Neighbours that tell where a fruit has moved, at the most.
+const TELLING: usize = 12;
+
+/// How far a displacement reaches, in spacings of the query: along a branch.
+const REACH: f64 = 1.5;
+
+/// The pairs that were met are those that moved least, the more so the more neighbours move together beside the noise: the
+/// others are taken to move with more of the variance that these share, up to so many times as much.
+const FARTHER: f64 = 10.0;
+const FARTHEST: f64 = 8.0;
+
+/// The neighbours of a fruit whose residuals are known.
+#[derive(Default)]
+struct Telling {
+    count: usize,
+    places: [Vector3<f64>; TELLING],
+    residuals: [Vector3<f64>; TELLING],
+    /// Noise over the variance of the displacement.
+    noise: [f64; TELLING],
+}
+
+/// What a Gaussian process makes of the neighbours' residuals at a fruit, the fruit itself left out; and the variance left.
+///
+/// Correlations fall with the distance as `exp(-d^2 / 2 (REACH a)^2)`. A mean of the neighbours falls short where all of them
+/// are nearer the stem; this goes on as far as they say, and says how unsure it is where they are far.
+pub(super) fn carried_on(
+    query: &Landscape,
+    row: usize,
+    (shared, noise): (f64, f64),
+    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)>,
+) -> (Vector3<f64>, f64) {
+    if shared <= 0.0 {
+        return (Vector3::zeros(), 0.0);
+    }
+    let variance = shared * (1.0 + FARTHER * shared / noise).min(FARTHEST);
+    let mut told = Telling::default();
+    let known = query.neighbours(row).iter().filter_map(|&other| Some((other, residual(other as usize)?)));
+    for (other, (residual, weight)) in known.take(TELLING) {
+        told.places[told.count] = query.points[other as usize];
+        told.residuals[told.count] = residual;
+        told.noise[told.count] = noise / (variance * weight);
+        told.count += 1;
+    }
+    let precision = -0.5 / (REACH * query.spacing).powi(2);
+    let (mean, share) = told.at(&query.points[row], precision);
+    (mean, variance * (1.0 - share).max(0.0))
+}
+
+impl Telling {
+    /// Mean at a place, and the share of the variance that is told.
+    ///
+    /// With K the correlations and the noise, and k those with the place, `k K^-1 r` and `k K^-1 k`, by the Cholesky factor of K.
+    fn at(&self, place: &Vector3<f64>, precision: f64) -> (Vector3<f64>, f64) {
+        let correlation = |p: &Vector3<f64>, q: &Vector3<f64>| (precision * (p - q).norm_squared()).exp();
+        let mut factor = [[0.0f64; TELLING]; TELLING];
+        let (mut solved, mut residuals) = ([0.0; TELLING], [Vector3::zeros(); TELLING]);
+        let (mut mean, mut share) = (Vector3::zeros(), 0.0);
+        for i in 0..self.count {
+            for j in 0..=i {
+                let before: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+                let own = if i == j { self.noise[i] } else { 0.0 };
+                let left = correlation(&self.places[i], &self.places[j]) + own - before;
+                factor[i][j] = if i == j { left.max(LEAST_PIVOT).sqrt() } else { left / factor[j][j] };
+            }
+            let row = &factor[i];
+            let before: f64 = (0..i).map(|k| row[k] * solved[k]).sum();
+            solved[i] = (correlation(place, &self.places[i]) - before) / row[i];
+            let before: Vector3<f64> = (0..i).map(|k| residuals[k] * row[k]).sum();
+            residuals[i] = (self.residuals[i] - before) / row[i];
+            mean += residuals[i] * solved[i];
+            share += solved[i] * solved[i];
+        }
+        (mean, share)
+    }
+}
+
+/// Two fruits at one place say the same.
+const LEAST_PIVOT: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::fixture::visits;
+
+    #[test]
+    fn a_bend_goes_on_beyond_the_fruits_that_tell_of_it() {
+        let query = Landscape::new(&visits(0.02).0);
+        let bend = |p: &Vector3<f64>| Vector3::z() * (0.2 * p.x);
+        let noise = 0.002f64.powi(2);
+        let (mut carried, mut averaged) = (0.0, 0.0);
+        for row in 0..query.len() {
+            let own = query.points[row];
+            // Only what lies before the fruit is known.
+            let known = |other: usize| (query.points[other].x < own.x).then(|| (bend(&query.points[other]), 1.0));
+            if (0..query.len()).filter(|&other| known(other).is_some()).count() < 50 {
+                continue;
+            }
+            carried += (carried_on(&query, row, (1e-3, noise), known).0 - bend(&own)).norm();
+            averaged += (displacement(&query, row, (1e-3, noise), known).0 - bend(&own)).norm();
+        }
+        assert!(carried < 0.7 * averaged, "{carried} {averaged}");
+    }
+
+    #[test]
+    fn nothing_is_told_where_nobody_is_near_or_nothing_is_shared() {
+        let query = Landscape::new(&visits(0.02).0);
+        let (mean, left) = carried_on(&query, 0, (1e-3, 1e-4), |_| None);
+        assert!(mean.norm() < 1e-12 && (left - FARTHEST * 1e-3).abs() < 1e-12);
+        assert_eq!(carried_on(&query, 0, (0.0, 1e-4), |_| Some((Vector3::x(), 1.0))), (Vector3::zeros(), 0.0));
+    }
+}

@@ -9,6 +9,7 @@ use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
 use super::placement::Landing;
 use super::placement::{Moments, Placement};
+use super::sight::unseen;
 use nalgebra::Vector3;
 
 /// Growth ends at the latest after this many steps from cell to cell beyond the extent of the cloud.
@@ -22,6 +23,9 @@ const RIGID_ROUNDS: usize = 6;
 
 /// Rounds of pairing and fitting when the pose is known for the whole query.
 const WHOLE_ROUNDS: usize = 4;
+
+/// The same once those that only one visit sees are left out.
+const LAY_ROUNDS: usize = 2;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
@@ -58,6 +62,8 @@ pub(crate) struct Growth<'a> {
     pub(super) predictions: Vec<Option<Landing>>,
     pub(super) partners: Vec<Option<Partner>>,
     pub(super) owner: Vec<Option<u32>>,
+    /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
+    pub(super) unseen: [Vec<bool>; 2],
     pub(super) patch_places: Vec<Vector3<f64>>,
     /// The pose is known to hold everywhere and the noise is given.
     pub(super) whole: bool,
@@ -108,6 +114,21 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
     growth
 }
 
+/// Pairs under a pose of the whole query that few of its fruits say: those that only one visit sees are left out, and
+/// cells that say nothing fall out in the end.
+pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothesis, model: &Model) -> Growth<'a> {
+    let mut growth = hold(query, map, whole, model);
+    growth.unseen = unseen(query, map, &growth.pose);
+    growth.forget_unseen();
+    for _ in 0..LAY_ROUNDS {
+        growth.refit();
+        growth.predict();
+        growth.pair_up();
+    }
+    growth.whole = false;
+    growth
+}
+
 impl<'a> Growth<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Self {
         let cut = query.cut();
@@ -134,6 +155,7 @@ impl<'a> Growth<'a> {
             predictions: vec![None; query.len()],
             partners: vec![None; query.len()],
             owner: vec![None; map.len()],
+            unseen: Default::default(),
             patch_places: vec![Vector3::zeros(); query.len()],
             whole: false,
             widening: 1.0,
@@ -159,6 +181,17 @@ impl<'a> Growth<'a> {
             }
         }
         !new.is_empty()
+    }
+
+    /// Takes the partners of fruits that only one visit sees.
+    fn forget_unseen(&mut self) {
+        for row in (0..self.query.len()).filter(|&row| self.unseen[0][row]) {
+            self.predictions[row] = None;
+            if let Some(partner) = self.partners[row].take() {
+                self.owner[partner.row as usize] = None;
+            }
+        }
+        self.pair_up();
     }
 
     /// Fruits of the reached cells.

@@ -9,6 +9,8 @@
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
 //!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
+//!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
+//!    what only one visit sees is left out (`sight`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
 //!
@@ -34,6 +36,7 @@ mod growth;
 mod hypothesis;
 mod landscape;
 mod nearest;
+mod offsets;
 mod outlier;
 mod overlap;
 mod pairing;
@@ -44,9 +47,11 @@ mod scatter;
 mod search;
 mod seeds;
 mod settlement;
+mod sight;
 mod size;
 mod support;
 mod vertical;
+mod votes;
 
 pub use acceptance::VerifiedConfig;
 pub(crate) use case::{SEED_SIGMA, VerifiedMap};

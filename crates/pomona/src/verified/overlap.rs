@@ -76,8 +76,9 @@ impl Growth<'_> {
             .points
             .iter()
             .zip(&self.owner)
-            .filter(|(_, owner)| owner.is_none())
-            .map(|(p, _)| self.pose.apply_inverse(p))
+            .enumerate()
+            .filter(|(row, (_, owner))| owner.is_none() && !self.unseen[1].get(*row).is_some_and(|&unseen| unseen))
+            .map(|(_, (p, _))| self.pose.apply_inverse(p))
             .filter(|place| self.cut.index.get(&key_of(place, self.edge)).is_some_and(|&cell| self.cells[cell].reached))
             .map(|place| self.query.support(&place))
             .collect()

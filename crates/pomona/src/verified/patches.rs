@@ -89,7 +89,11 @@ impl Growth<'_> {
         };
         let footings: Vec<Option<Footing>> = self.cells.iter().zip(&self.wide).map(footing).collect();
         let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
+        let unseen = &self.unseen[0];
         let at = |row: usize| {
+            if unseen.get(row).is_some_and(|&unseen| unseen) {
+                return None;
+            }
             let cell = self.cut.cell_of[row] as usize;
             let footing = footings[cell]?;
             let p = self.query.points[row];

@@ -11,7 +11,7 @@
 //!    the common pose as firmly as the clouds show that they move together.
 
 use super::cut::{Cell, Cut, key_of, surroundings, total};
-use super::displacement::{displacement, shared_by_neighbours};
+use super::displacement::{carried_on, shared_by_neighbours};
 use super::evidence::evidence;
 use super::growth::{Growth, Partner};
 use super::landscape::Landscape;
@@ -29,6 +29,9 @@ use rayon::prelude::*;
 
 /// Turns: the noise stands after the first, the patches after the second.
 const TURNS: usize = 3;
+
+/// The same where neighbours move together: what a branch shows near its stem leads on to its tip, a few fruits a turn.
+const MOST_TURNS: usize = 8;
 
 /// Pairs that hold a patch to its surroundings where neighbours do not differ from them together, and at the least.
 const HOLDS: (f64, f64) = (0.5, 50.0);
@@ -77,13 +80,22 @@ struct Settlement<'a> {
     shared: f64,
     targets: Vec<Target>,
     predictions: Vec<Option<Landing>>,
+    /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
+    unseen: [&'a [bool]; 2],
+}
+
+fn is_among(rows: &[bool], row: usize) -> bool {
+    rows.get(row).is_some_and(|&told| told)
 }
 
 /// Settles what `growth` found; `noise_m` is the relative noise where it is known.
 pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diameters>) -> Settled {
     let mut settlement = Settlement::new(growth, noise_m);
     let mut cue = None;
-    for _ in 0..TURNS {
+    for turn in 0..MOST_TURNS {
+        if turn >= TURNS && settlement.shared <= 0.0 {
+            break;
+        }
         settlement.predict();
         settlement.measure();
         let marginals = settlement.marginals(cue.as_ref());
@@ -134,6 +146,7 @@ impl<'a> Settlement<'a> {
             shared: growth.shared,
             targets: growth.partners.iter().map(|partner| partner.as_ref().map(target)).collect(),
             predictions: vec![None; growth.query.len()],
+            unseen: growth.unseen.each_ref().map(Vec::as_slice),
         }
     }
 
@@ -158,7 +171,10 @@ impl<'a> Settlement<'a> {
                 })
             })
             .collect();
-        let at = |row: usize| footings[self.cut.cell_of[row] as usize].map(|footing| self.prediction(row, &footing));
+        let at = |row: usize| {
+            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !is_among(self.unseen[0], row))?;
+            Some(self.prediction(row, &footing))
+        };
         self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
     }
 
@@ -169,7 +185,7 @@ impl<'a> Settlement<'a> {
         // The patch follows its surroundings in the measure in which it is held to them.
         let looseness = near.looseness(&p) + near.share_held(self.holds[0]) * wide.looseness(&p);
         let noise = self.sigma * self.sigma;
-        let (shift, unexplained) = displacement(self.query, row, (self.shared, noise), |other| self.residual(other));
+        let (shift, unexplained) = carried_on(self.query, row, (self.shared, noise), |other| self.residual(other));
         let mut place = self.cells[self.cut.cell_of[row] as usize].pose.apply(&p) + shift;
         if let Some((residual, weight)) = self.residual(row) {
             // Of a linear fit: the residual without the own partner is r / (1 - h), h the leverage.
@@ -214,12 +230,15 @@ impl<'a> Settlement<'a> {
 
     /// What the overlap says for the pose, nats.
     fn evidence(&self) -> f64 {
-        let support = |p: &Vector3<f64>| {
+        let support = |(row, p): (usize, &Vector3<f64>)| {
+            if is_among(self.unseen[1], row) {
+                return 0.0;
+            }
             let place = self.pose.apply_inverse(p);
             let cell = self.cut.index.get(&key_of(&place, self.edge));
             if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support(&place) } else { 0.0 }
         };
-        let there: Vec<f64> = self.map.points.iter().map(support).collect();
+        let there: Vec<f64> = self.map.points.iter().enumerate().map(support).collect();
         evidence(self.query, self.map, &self.predictions, &self.pose, &there)
     }
 

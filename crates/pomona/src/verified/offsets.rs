@@ -1,0 +1,133 @@
+//! Poses of rows laid along rows, from the offsets between all their fruits.
+//!
+//! Visits to opposite sides of a row have the fruits in the middle of the canopy in common, one in seven or fewer: of four
+//! neighbours hardly ever all, and no seed survives. But rows lie along rows. Their principal axes give the turn up to
+//! half-turns and some degrees, and under the right turn every fruit in common has the same offset from its partner. So the
+//! offsets between all fruits are counted ([`super::votes`]). What stands out is looked at, and the best is refined on all
+//! fruits at once, under the share that is seen again where ordinary shares have found nothing.
+
+use super::hypothesis::{Evidence, GATE, Hypothesis, Model, Scratch, refine};
+use super::landscape::Landscape;
+use super::placement::Placement;
+use super::votes::{Peak, Rows};
+use crate::geometry::Scale;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Share of fruits seen again, where ordinary shares have found nothing.
+pub(super) const FEW_AGAIN: f64 = 0.25;
+
+/// Poses that are looked at, and how many of them are refined.
+const LOOKED_AT: usize = 64;
+const REFINED: usize = 12;
+
+/// Two peaks within so many spacings, and turned by less than so many radians, are one.
+const SAME: f64 = 0.5;
+const SAME_TURN_RAD: f64 = 0.06;
+
+/// Noise of a peak, in that of a pair: its cell is wider than the noise.
+const WIDE: f64 = 2.5;
+
+/// Poses that are worth a thread of their own.
+const SHARE_OF_POSES: usize = 8;
+
+/// Poses by what the fruits under them say, most evidence first.
+pub(super) fn hypotheses(
+    query: &Landscape,
+    map: &Landscape,
+    model: &Model,
+    admits: &(impl Fn(&Placement) -> bool + Sync),
+) -> Vec<Hypothesis> {
+    let model = Model { detection: FEW_AGAIN, ..*model };
+    if model.scale == Scale::Free {
+        return Vec::new();
+    }
+    let Some(rows) = Rows::new(query, map) else { return Vec::new() };
+    let wide = Model { sigma: WIDE * model.sigma, ..model };
+    let mut looks: Vec<(f64, Placement)> = distinct(rows.peaks(admits), map.spacing)
+        .par_iter()
+        .with_min_len(SHARE_OF_POSES)
+        .map(|pose| (look(query, map, &wide, pose), *pose))
+        .collect();
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    looks.truncate(REFINED);
+    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+    let refined = |scratch: &mut Scratch, (_, pose): &(f64, Placement)| {
+        refine(query, map, pose, &Vector3::zeros(), reach, &model, scratch)
+    };
+    let mut found: Vec<Hypothesis> =
+        looks.par_iter().with_min_len(SHARE_OF_POSES).map_init(Scratch::default, refined).flatten_iter().collect();
+    found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+    found
+}
+
+/// The best peaks, one of each pose.
+fn distinct(mut peaks: Vec<Peak>, spacing: f64) -> Vec<Placement> {
+    peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
+    let mut kept: Vec<Placement> = Vec::new();
+    for Peak { pose, .. } in peaks {
+        let same = |other: &Placement| {
+            (other.translation - pose.translation).norm() < SAME * spacing && other.turn_to(&pose) < SAME_TURN_RAD
+        };
+        if kept.len() < LOOKED_AT && !kept.iter().any(same) {
+            kept.push(pose);
+        }
+    }
+    kept
+}
+
+/// What the fruits of the query meet under a pose, nats.
+fn look(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement) -> f64 {
+    let variance = model.sigma * model.sigma;
+    let mut evidence = Evidence::default();
+    for p in &query.points {
+        let place = pose.apply(p);
+        evidence.multiply(match map.nearest(&place, GATE * model.sigma) {
+            Some((partner, d2)) => model.met(d2, variance, map.density[partner as usize]),
+            None => model.missed(map.support(&place)),
+        });
+    }
+    evidence.log_odds()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::FruitCloud;
+    use crate::verified::fixture::Dice;
+    use nalgebra::{Point3, Rotation3};
+
+    /// A row of 6 x 2.6 x 0.6 m; a visit to either side of it sees a fruit the surer the nearer it hangs, 17 % both.
+    fn sides() -> [FruitCloud; 2] {
+        let mut dice = Dice(3);
+        let mut seen = [Vec::new(), Vec::new()];
+        for _ in 0..500 {
+            let fruit = Vector3::new(6.0 * dice.uniform(), 2.6 * dice.uniform(), 0.6 * dice.uniform() - 0.3);
+            for (visit, side) in seen.iter_mut().zip([-1.0, 1.0]) {
+                if dice.uniform() < 1.0 / (1.0 + (-side * fruit.z / 0.06).exp()) {
+                    visit.push(fruit + dice.normal() * 0.02);
+                }
+            }
+        }
+        let turn = Rotation3::new(Vector3::new(0.7, -1.9, 0.4));
+        let moved = |p: &Vector3<f64>| Point3::from(turn * p + Vector3::new(3.0, -1.0, 2.0));
+        let [query, map] = seen;
+        [query.iter().map(moved).collect(), map.into_iter().map(Point3::from).collect()].map(FruitCloud::from_positions)
+    }
+
+    #[test]
+    fn opposite_sides_are_laid_on_each_other_by_what_the_middle_shows() {
+        let [query, map] = sides().map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: 0.55, scale: Scale::Metric, vertical: None };
+        let found = hypotheses(&query, &map, &model, &|_| true);
+        let turn = Rotation3::new(Vector3::new(0.7, -1.9, 0.4)).inverse();
+        let best = found.first().expect("something stands out").pose;
+        for p in &query.points {
+            let place = turn * (p + query.centre - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
+            assert!((best.apply(p) - place).norm() < 0.1);
+        }
+        let free = Model { scale: Scale::Free, ..model };
+        assert!(hypotheses(&query, &map, &free, &|_| true).is_empty());
+        assert!(hypotheses(&query, &map, &model, &|_| false).is_empty());
+    }
+}

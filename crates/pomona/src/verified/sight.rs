@@ -1,0 +1,40 @@
+//! Which fruits of two rows hang where both visits see.
+//!
+//! A visit sees one side of a row, and fades in depth. Of two from opposite sides each shows fruits that the other could not
+//! have shown, and they say nothing against a pose. How far each sees is told by the pose itself: in a depth of the row
+//! where one visit shows many fruits and the other hardly any, the other does not see.
+
+use super::hypothesis::gaussian;
+use super::landscape::Landscape;
+use super::placement::Placement;
+use super::votes::axes_of;
+use nalgebra::Vector3;
+
+/// A visit that shows less than this share of the other's fruits in a depth does not see there.
+const LEAST: f64 = 0.1;
+
+/// Standard deviation of the depths over which fruits are counted, in spacings: 7 cm in an orchard.
+const WIDTH: f64 = 0.25;
+
+/// Fruits of the query, and of the map, that hang where the other visit does not see; none where the map is no row.
+pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Placement) -> [Vec<bool>; 2] {
+    let Some(axes) = axes_of(map) else { return [vec![false; query.len()], vec![false; map.len()]] };
+    let depth = |place: &Vector3<f64>| place.dot(&axes.column(2));
+    let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.apply(p)).collect();
+    // Trees that only one visit shows say nothing about how far the other sees.
+    let both = [
+        here.iter().filter(|place| map.support(place) > 0.0).map(depth).collect::<Vec<f64>>(),
+        map.points.iter().filter(|p| query.support(&pose.apply_inverse(p)) > 0.0).map(depth).collect(),
+    ];
+    let variance = (WIDTH * map.spacing).powi(2);
+    let shown =
+        |depths: &[f64], at: f64| depths.iter().map(|depth| gaussian((depth - at).powi(2), variance)).sum::<f64>();
+    let hidden = |place: &Vector3<f64>, own: &[f64], other: &[f64]| {
+        let at = depth(place);
+        shown(other, at) < LEAST * shown(own, at)
+    };
+    [
+        here.iter().map(|place| hidden(place, &both[0], &both[1])).collect(),
+        map.points.iter().map(|place| hidden(place, &both[1], &both[0])).collect(),
+    ]
+}

@@ -1,0 +1,239 @@
+//! Votes for the offset between two rows: every fruit of the query laid on every fruit of the map.
+//!
+//! A generalised Hough transform. For each turn that the principal axes of two rows leave, the offsets of all fruits are
+//! counted in cells. Crowns on crowns raise whole regions of them; fruits on fruits raise one.
+
+use super::landscape::Landscape;
+use super::placement::Placement;
+use super::seeds::shuffled;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use rayon::prelude::*;
+
+/// Fewer fruits have no principal axes to go by.
+const MIN_FRUITS: usize = 100;
+
+/// A row is so many times as long as it is high, and as high as it is deep, at the least: else the axes do not say which is
+/// which.
+const LEAST_RATIO: f64 = 1.2;
+
+/// Pairs of fruits that are counted for each turn; of larger clouds some fruits are taken.
+const MOST_PAIRS: usize = 60_000;
+
+/// Clouds with more pairs than this are left alone: with so few of their fruits too little in common would be asked.
+const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
+
+/// Steps either way, and their width in radians, of the turns about the axis across the row and about the one along it:
+/// the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
+const ACROSS: (i32, f64) = (6, 0.044);
+const ALONG: (i32, f64) = (1, 0.07);
+
+/// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
+const CELL: [f64; 3] = [0.45, 0.45, 0.6];
+
+/// How far rows are laid off each other's middles, in the sum of their standard deviations along each axis: along the row as far
+/// as half of them overlap, up by what their crowns' parts differ, in depth by a crown.
+const REACHES: [f64; 3] = [1.5, 0.8, 2.0];
+
+/// Cells of a block; its mean and that of the blocks around say what crowns on crowns give.
+const BLOCK: [usize; 3] = [4, 4, 2];
+
+/// Standard deviations by which a cell exceeds its surroundings at the least.
+const OUTSTANDING: f64 = 4.0;
+
+/// Votes that a cell has at the least: a pair of clusters gives two.
+const LEAST_VOTES: u16 = 3;
+
+/// Votes beside those expected, so that a cell does not stand out by one where none are.
+const LEAST_EXPECTED: f64 = 0.3;
+
+/// A pose whose cell stands out, by so many standard deviations.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peak {
+    pub(super) height: f64,
+    pub(super) pose: Placement,
+}
+
+/// Two rows, each in the frame of its axes: along, up, in depth.
+pub(super) struct Rows {
+    axes: [Matrix3<f64>; 2],
+    query: Vec<Vector3<f64>>,
+    /// In cells, number by number.
+    map: [Vec<f32>; 3],
+    edges: Vector3<f64>,
+    /// Cells to either side of no offset, and all of them.
+    half: [f32; 3],
+    size: [usize; 3],
+    blocks: [usize; 3],
+}
+
+/// Votes of all cells, and the sums of blocks.
+struct Counts {
+    cells: Vec<u16>,
+    blocks: Vec<f32>,
+    /// Cells that one fruit votes for.
+    voted: Vec<u32>,
+}
+
+impl Rows {
+    /// `None` where the clouds are no rows, or too large.
+    pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
+        let pairs = query.len() * map.len();
+        if query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
+            return None;
+        }
+        let axes = [axes_of(query)?, axes_of(map)?];
+        let share = (MOST_PAIRS as f64 / pairs as f64).sqrt().min(1.0);
+        let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
+        let edges = Vector3::from(CELL) * map.spacing;
+        let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
+        let half = [0, 1, 2].map(|i| reach(i).ceil() as f32 + 1.0);
+        let size = half.map(|half| 2 * half as usize + 1);
+        let blocks = [0, 1, 2].map(|i| size[i].div_ceil(BLOCK[i]));
+        let map = [0, 1, 2].map(|i| map_points.iter().map(|p| (p[i] / edges[i]) as f32).collect());
+        Some(Self { axes, query, map, edges, half, size, blocks })
+    }
+
+    /// Poses that stand out, turn by turn, of those that are admitted.
+    pub(super) fn peaks(&self, admits: &(impl Fn(&Placement) -> bool + Sync)) -> Vec<Peak> {
+        let turns: Vec<Matrix3<f64>> =
+            turns().filter(|turn| admits(&self.placement(turn, &Vector3::zeros()))).collect();
+        turns
+            .par_iter()
+            .map_init(|| self.no_counts(), |counts, turn| self.peaks_of(turn, counts))
+            .flatten_iter()
+            .collect()
+    }
+
+    fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Placement {
+        let [query, map] = &self.axes;
+        Placement { rotation: map * turn * query.transpose(), translation: map * offset, scale: 1.0 }
+    }
+
+    fn no_counts(&self) -> Counts {
+        Counts {
+            cells: vec![0; self.size.iter().product()],
+            blocks: vec![0.0; self.blocks.iter().product()],
+            voted: vec![0; self.map[0].len()],
+        }
+    }
+
+    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<Peak> {
+        self.count(turn, counts);
+        self.sum_up(counts);
+        let [_, high, deep] = self.size;
+        let standing_out = |(place, _): (usize, &u16)| {
+            let at = [place / deep / high, place / deep % high, place % deep];
+            let inside = at.iter().zip(self.size).all(|(&at, size)| at > 0 && at + 1 < size);
+            let (height, offset) = inside.then(|| self.height(counts, place, at))?;
+            (height > OUTSTANDING).then(|| Peak { height, pose: self.placement(turn, &offset) })
+        };
+        counts.cells.iter().enumerate().filter(|(_, votes)| **votes >= LEAST_VOTES).filter_map(standing_out).collect()
+    }
+
+    /// Counts the offsets of all fruits of the map from all of the query.
+    fn count(&self, turn: &Matrix3<f64>, Counts { cells, voted, .. }: &mut Counts) {
+        cells.fill(0);
+        let [long, high, deep] = self.size.map(|cells| cells as u32);
+        let [along, up, depth] = &self.map;
+        for p in &self.query {
+            let p = turn * p;
+            let [x, y, z] = [0, 1, 2].map(|i| self.half[i] + 0.5 - (p[i] / self.edges[i]) as f32);
+            for (((place, a), u), d) in voted.iter_mut().zip(along).zip(up).zip(depth) {
+                let (along, up, depth) = ((a + x) as u32, (u + y) as u32, (d + z) as u32);
+                // What lies below the first cell counts for it: cells at the rim stand for nothing.
+                let inside = along < long && up < high && depth < deep;
+                *place = if inside { (along * high + up) * deep + depth } else { u32::MAX };
+            }
+            for &place in &*voted {
+                if let Some(votes) = cells.get_mut(place as usize) {
+                    *votes = votes.saturating_add(1);
+                }
+            }
+        }
+    }
+
+    /// Sums of the blocks, each a mean with those around.
+    fn sum_up(&self, Counts { cells, blocks: sums, .. }: &mut Counts) {
+        let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
+        sums.fill(0.0);
+        for (line, cells) in cells.chunks(deep).enumerate() {
+            let first = (line / high / BLOCK[0] * up + line % high / BLOCK[1]) * back;
+            for (sum, cells) in sums[first..].iter_mut().zip(cells.chunks(BLOCK[2])) {
+                *sum += cells.iter().map(|&votes| f32::from(votes)).sum::<f32>();
+            }
+        }
+        let strides = [up * back, back, 1];
+        (0..3).for_each(|i| smooth(sums, strides[i], self.blocks[i]));
+    }
+
+    /// Standard deviations by which a cell with its neighbours exceeds its surroundings, and the offset that it stands for.
+    fn height(&self, Counts { cells, blocks, .. }: &Counts, place: usize, at: [usize; 3]) -> (f64, Vector3<f64>) {
+        let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
+        let votes = |place: usize| f64::from(cells[place]);
+        let (mut sum, mut aside) = (4.0 * votes(place), Vector3::zeros());
+        for (i, stride) in [high * deep, deep, 1].into_iter().enumerate() {
+            let [below, above] = [votes(place - stride), votes(place + stride)];
+            sum += below + above;
+            aside[i] = above - below;
+        }
+        let [x, y, z] = [0, 1, 2].map(|i| at[i] / BLOCK[i]);
+        let expected = f64::from(blocks[(x * up + y) * back + z]) / BLOCK.iter().product::<usize>() as f64;
+        let height = (0.1 * sum - expected) / (expected + LEAST_EXPECTED).sqrt();
+        let cell = Vector3::from_fn(|i, _| at[i] as f64 - f64::from(self.half[i]));
+        (height, (cell + aside / sum).component_mul(&self.edges))
+    }
+}
+
+/// Turns of a row laid along a row, in the frames of their axes.
+fn turns() -> impl Iterator<Item = Matrix3<f64>> {
+    let half_turns = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let steps = |(count, step): (i32, f64)| (-count..=count).map(move |i| f64::from(i) * step);
+    let of = move |signs: [f64; 3]| {
+        steps(ACROSS).flat_map(move |across| {
+            steps(ALONG).map(move |along| {
+                let turn = Rotation3::new(Vector3::x() * along) * Rotation3::new(Vector3::z() * across);
+                turn.into_inner() * Matrix3::from_diagonal(&Vector3::from(signs))
+            })
+        })
+    };
+    half_turns.into_iter().flat_map(of)
+}
+
+/// Mean of each of `count` values a `stride` apart with its neighbours, the own one twice.
+fn smooth(values: &mut [f32], stride: usize, count: usize) {
+    for first in (0..values.len()).filter(|place| (place / stride).is_multiple_of(count)) {
+        let mut before = 0.0;
+        for step in 0..count {
+            let place = first + step * stride;
+            let (own, after) = (values[place], if step + 1 < count { values[place + stride] } else { 0.0 });
+            values[place] = 0.25 * (before + 2.0 * own + after);
+            before = own;
+        }
+    }
+}
+
+/// Principal axes, the longest first, as a proper rotation; `None` where they are no row's.
+pub(super) fn axes_of(cloud: &Landscape) -> Option<Matrix3<f64>> {
+    let scatter = cloud.points.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose()) / cloud.len() as f64;
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let extents = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
+    let [along, up] = [order[0], order[1]].map(|i| eigen.eigenvectors.column(i).into_owned());
+    let axes = Matrix3::from_columns(&[along, up, along.cross(&up)]);
+    let told = extents[0] > LEAST_RATIO * extents[1] && extents[1] > LEAST_RATIO * extents[2];
+    (told && axes.iter().all(|x| x.is_finite())).then_some(axes)
+}
+
+/// Standard deviation along an axis.
+fn extent(points: &[Vector3<f64>], axis: usize) -> f64 {
+    (points.iter().map(|p| p[axis] * p[axis]).sum::<f64>() / points.len().max(1) as f64).sqrt()
+}
+
+/// A share of the fruits in the frame of the axes, in a fixed shuffled order.
+fn some_of(cloud: &Landscape, axes: &Matrix3<f64>, share: f64) -> Vec<Vector3<f64>> {
+    let mut rows: Vec<u32> = (0..cloud.len() as u32).collect();
+    rows.sort_unstable_by_key(|&row| shuffled(u64::from(row)));
+    rows.truncate((share * cloud.len() as f64).round() as usize);
+    rows.iter().map(|&row| axes.tr_mul(&cloud.points[row as usize])).collect()
+}
