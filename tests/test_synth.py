@@ -124,6 +124,25 @@ def test_other_rows_have_the_statistics_they_are_named_for(name: str) -> None:
         assert row.positions[:, 1].std() < 0.08
 
 
+def test_a_v_trellis_has_two_walls_that_lean_apart() -> None:
+    shape = CELLS["vtrellis-noov"].row
+    row = grow_row(np.random.default_rng(3), 6, shape)
+    wall_m = shape.reach_depth_m / 2 + np.tan(shape.lean_rad) * row.positions[:, 2]
+    across_m = row.positions[:, 1]
+    assert np.quantile(np.abs(np.abs(across_m) - wall_m), 0.95) < 0.2
+    assert 0.3 < (across_m > 0).mean() < 0.7
+
+
+def test_a_cone_is_narrower_above_and_bears_in_tiers() -> None:
+    shape = CELLS["cone-noov"].row
+    row = grow_row(np.random.default_rng(3), 30, shape)
+    away_m = np.linalg.norm(row.positions[:, :2] - np.outer(row.tree * shape.spacing_m, [1.0, 0.0]), axis=1)
+    height_m = row.positions[:, 2]
+    assert away_m[height_m > 2.0].mean() < 0.7 * away_m[height_m < 1.0].mean()
+    from_tier_m = np.abs(height_m[:, None] - shape.wires_m).min(axis=1)
+    assert np.median(from_tier_m) < 0.06 < 0.35 / 4
+
+
 def test_a_free_scale_turns_the_query_into_other_units() -> None:
     scales = [scene_pair("sim3", seed).scale for seed in range(20)]
     assert 0.5 <= min(scales) < 0.8

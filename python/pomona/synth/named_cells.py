@@ -210,8 +210,32 @@ PLANTINGS = {
         scatter_m=(0.06, 0.09),
         fruits_per_tree=(50, 90),
     ),
+    "vtrellis": RowShape(
+        wood="leaning",
+        wires_m=(0.5, 0.9, 1.3, 1.7, 2.1),
+        lean_rad=0.35,
+        spacing_m=1.0,
+        reach_along_m=0.5,
+        reach_depth_m=0.2,
+        scatter_m=(0.05, 0.06),
+        flatness=(1.0, 1.0, 0.6),
+        fruits_per_tree=(40, 70),
+        height_m=2.3,
+    ),
+    "cone": RowShape(
+        wood="tiers",
+        wires_m=(0.5, 0.85, 1.2, 1.55, 1.9, 2.25, 2.6),
+        spacing_m=1.0,
+        branches=(21, 28),
+        reach_along_m=0.6,
+        reach_depth_m=0.6,
+        scatter_m=(0.04, 0.06),
+        fruits_per_tree=(30, 50),
+        height_m=2.8,
+    ),
 }
-"""How trees are trained: walls of wires, a cordon with bunches below, roofs, thin trees and hedges."""
+"""How trees are trained: walls of wires, upright or as a V, a cordon with bunches below, roofs, thin trees, some with
+branches in tiers, and hedges."""
 
 PLANTING_CELLS = tuple(
     cell

@@ -1,8 +1,8 @@
 """A row of fruit trees as a statistical model: where its fruits hang.
 
-Row frame: x along the row, y in depth (across it), z up, metres; tree i stands at x = i * spacing. Three kinds
-of wood bear the fruits: free branches of a tree, arms tied along wires (trellis, vine), and canes laid over a roof
-(pergola, kiwifruit).
+Row frame: x along the row, y in depth (across it), z up, metres; tree i stands at x = i * spacing. Five kinds
+of wood bear the fruits: free branches of a tree, branches in tiers of a cone (slender spindle), arms tied along wires
+(trellis, vine), the same on two walls that lean apart (V trellis), and canes laid over a roof (pergola, kiwifruit).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Wood = Literal["branches", "arms", "roof"]
+Wood = Literal["branches", "tiers", "arms", "leaning", "roof"]
 
 # Candidate places tried for one fruit before it is left out of its cluster.
 _TRIES = 16
@@ -46,9 +46,12 @@ class RowShape:
     flatness
         Factors of the scatter along the row, in depth and upwards.
     wood
-        Free branches; arms along wires, both ways from the trunk; canes over a roof, both ways across the row.
+        Free branches; branches in tiers, shorter towards the top; arms along wires, both ways from the trunk, on one
+        wall or on two that lean apart; canes over a roof, both ways across the row.
     wires_m
-        Heights of the wires, or of the roof.
+        Heights of the wires, of the tiers, or of the roof.
+    lean_rad
+        By how much each of two walls leans.
     below_m
         How far clusters hang below arms and canes, at least and at most.
     """
@@ -66,6 +69,7 @@ class RowShape:
     flatness: tuple[float, float, float] = (1.0, 1.0, 1.0)
     wood: Wood = "branches"
     wires_m: tuple[float, ...] = ()
+    lean_rad: float = 0.0
     below_m: tuple[float, float] = (0.0, 0.0)
 
 
@@ -128,8 +132,10 @@ def _branches(
     rng: np.random.Generator, number: int, shape: RowShape
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Roots on the trunk at random heights, tips on the ellipse of the reach, up to 0.3 m higher."""
-    if shape.wood == "arms":
+    if shape.wood in ("arms", "leaning"):
         return _arms(number, shape)
+    if shape.wood == "tiers":
+        return _tiers(rng, number, shape)
     if shape.wood == "roof":
         return _canes(rng, number, shape)
     count = int(rng.integers(shape.branches[0], shape.branches[1] + 1))
@@ -145,11 +151,26 @@ def _branches(
 
 
 def _arms(number: int, shape: RowShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two arms along every wire, from the trunk to halfway to the next."""
-    heights = np.repeat(shape.wires_m, 2)
-    roots = np.stack([np.full(len(heights), number * shape.spacing_m), np.zeros(len(heights)), heights], axis=1)
-    along = np.tile([-shape.reach_along_m, shape.reach_along_m], len(shape.wires_m))
+    """Two arms along every wire, from the trunk to halfway to the next; of two walls, `reach_depth_m` apart below."""
+    sides = (-1.0, 1.0) if shape.wood == "leaning" else (0.0,)
+    heights = np.repeat(np.tile(shape.wires_m, len(sides)), 2)
+    away = shape.reach_depth_m / 2.0 + np.tan(shape.lean_rad) * heights
+    across = np.repeat(sides, 2 * len(shape.wires_m)) * away
+    roots = np.stack([np.full(len(heights), number * shape.spacing_m), across, heights], axis=1)
+    along = np.tile([-shape.reach_along_m, shape.reach_along_m], len(heights) // 2)
     return roots, roots + along[:, None] * [1.0, 0.0, 0.0]
+
+
+def _tiers(rng: np.random.Generator, number: int, shape: RowShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Branches all around at the height of each tier, the shorter the higher."""
+    count = int(rng.integers(shape.branches[0], shape.branches[1] + 1))
+    heights = np.tile(shape.wires_m, -(-count // len(shape.wires_m)))[:count]
+    roots = np.stack([np.full(count, number * shape.spacing_m), np.zeros(count), heights], axis=1)
+    azimuth = rng.uniform(0.0, 2.0 * np.pi, count)
+    reach = [shape.reach_along_m, shape.reach_depth_m] * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+    tips = roots.copy()
+    tips[:, :2] += reach * (1.0 - heights / (shape.height_m + 0.4))[:, None]
+    return roots, tips
 
 
 def _canes(rng: np.random.Generator, number: int, shape: RowShape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
