@@ -92,13 +92,14 @@ def test_opposite_sides_with_one_fruit_in_seven_in_common_are_found(seed: int) -
 
 def test_a_branch_that_sank_is_followed_to_its_tip() -> None:
     """20 cm at the tips: the means of neighbours, which hang nearer the stem, fall short there."""
-    pairs = [scene_pair("sag20", seed) for seed in (0, 3)]
+    pairs = [scene_pair("sag20", seed) for seed in range(3)]
     matches = [pomona.match(pair.query, pair.map) for pair in pairs]
     scores = [
         score_pairs(match.pairs.tolist(), pair.query.ids or (), pair.map.ids or ())
         for match, pair in zip(matches, pairs, strict=True)
     ]
-    assert min(score.recall for score in scores) > 0.81 < min(score.precision for score in scores)
+    # With the means of neighbours it is 0.834.
+    assert np.mean([score.recall for score in scores]) > 0.842
 
 
 def test_a_dozen_fruits_are_found_as_often_as_they_can_be_told() -> None:
