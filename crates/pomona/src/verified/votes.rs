@@ -34,6 +34,9 @@ const CELL: [f64; 3] = [0.45, 0.45, 0.6];
 /// as half of them overlap, up by what their crowns' parts differ, in depth by a crown.
 const REACHES: [f64; 3] = [1.5, 0.8, 2.0];
 
+/// A cell has 2 to the power of this many parts.
+const PARTS_BITS: u32 = 10;
+
 /// Cells of a block; its mean and that of the blocks around say what crowns on crowns give.
 const BLOCK: [usize; 3] = [4, 4, 2];
 
@@ -57,8 +60,8 @@ pub(super) struct Peak {
 pub(super) struct Rows {
     axes: [Matrix3<f64>; 2],
     query: Vec<Vector3<f64>>,
-    /// In cells, number by number.
-    map: [Vec<f32>; 3],
+    /// In parts of a cell, number by number: whole numbers, of which a processor adds many at once.
+    map: [Vec<i32>; 3],
     edges: Vector3<f64>,
     /// Cells to either side of no offset, and all of them.
     half: [f32; 3],
@@ -89,7 +92,7 @@ impl Rows {
         let half = [0, 1, 2].map(|i| reach(i).ceil() as f32 + 1.0);
         let size = half.map(|half| 2 * half as usize + 1);
         let blocks = [0, 1, 2].map(|i| size[i].div_ceil(BLOCK[i]));
-        let map = [0, 1, 2].map(|i| map_points.iter().map(|p| (p[i] / edges[i]) as f32).collect());
+        let map = [0, 1, 2].map(|i| map_points.iter().map(|p| parts(p[i] / edges[i])).collect());
         Some(Self { axes, query, map, edges, half, size, blocks })
     }
 
@@ -137,10 +140,10 @@ impl Rows {
         let [along, up, depth] = &self.map;
         for p in &self.query {
             let p = turn * p;
-            let [x, y, z] = [0, 1, 2].map(|i| self.half[i] + 0.5 - (p[i] / self.edges[i]) as f32);
+            let [x, y, z] = [0, 1, 2].map(|i| parts(f64::from(self.half[i]) + 0.5 - p[i] / self.edges[i]));
             for (((place, a), u), d) in voted.iter_mut().zip(along).zip(up).zip(depth) {
-                let (along, up, depth) = ((a + x) as u32, (u + y) as u32, (d + z) as u32);
-                // What lies below the first cell counts for it: cells at the rim stand for nothing.
+                // What lies below the first cell is beyond the last one as a number without a sign.
+                let (along, up, depth) = (cell(a.wrapping_add(x)), cell(u.wrapping_add(y)), cell(d.wrapping_add(z)));
                 let inside = along < long && up < high && depth < deep;
                 *place = if inside { (along * high + up) * deep + depth } else { u32::MAX };
             }
@@ -182,6 +185,15 @@ impl Rows {
         let cell = Vector3::from_fn(|i, _| at[i] as f64 - f64::from(self.half[i]));
         (height, (cell + aside / sum).component_mul(&self.edges))
     }
+}
+
+/// A length in cells as whole parts of one.
+fn parts(cells: f64) -> i32 {
+    (cells * f64::from(1 << PARTS_BITS)).floor() as i32
+}
+
+fn cell(parts: i32) -> u32 {
+    (parts >> PARTS_BITS) as u32
 }
 
 /// Turns of a row laid along a row, in the frames of their axes.
