@@ -121,7 +121,7 @@ fn spoil(index: &mut CompactMap, seed: u64) {
         2 => {
             index.seeds = Column::Own(
                 index.seeds.get().iter().map(|block| block.map(|plane| plane.map(|byte| byte ^ wild as u8))).collect(),
-            )
+            );
         }
         3 => index.starts = every(index.starts.get()),
         4 => {
