@@ -97,14 +97,15 @@ mod tests {
     use crate::verified::fixture::Dice;
     use nalgebra::{Point3, Rotation3};
 
-    /// A row of 6 x 2.6 x 0.6 m; a visit to either side of it sees a fruit the surer the nearer it hangs, 17 % both.
+    /// A row of 6 x 2.6 x 0.6 m; a visit to either side of it sees a fruit the surer the nearer it hangs, four in ten of
+    /// those of one visit in both.
     fn sides() -> [FruitCloud; 2] {
         let mut dice = Dice(3);
         let mut seen = [Vec::new(), Vec::new()];
         for _ in 0..500 {
             let fruit = Vector3::new(6.0 * dice.uniform(), 2.6 * dice.uniform(), 0.6 * dice.uniform() - 0.3);
             for (visit, side) in seen.iter_mut().zip([-1.0, 1.0]) {
-                if dice.uniform() < 1.0 / (1.0 + (-side * fruit.z / 0.06).exp()) {
+                if dice.uniform() < 1.0 / (1.0 + (-side * fruit.z / 0.2).exp()) {
                     visit.push(fruit + dice.normal() * 0.02);
                 }
             }
