@@ -1,6 +1,7 @@
 """The index of a map in a file beside it: what it answers, and what becomes of files that are not its own."""
 
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -99,6 +100,41 @@ def test_what_is_no_index_stays_as_it_is(pair: ScenePair, tmp_path: Path) -> Non
     assert other.read_text(encoding="utf-8") == "x,y,z\n1,2,3\n"
     with pytest.raises(PomonaError, match="is no file"):
         Index.open(tmp_path / "absent.index", pair.map)
+
+
+FULL = """
+import resource, sys
+from pomona import Index, PomonaError
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+try:
+    Index.open(sys.argv[1], sys.argv[2])
+except PomonaError as error:
+    print(error)
+"""
+"""Files may become no larger than 10 kB here."""
+
+
+def test_a_damaged_index_that_cannot_be_made_anew_says_both(pair: ScenePair, saved: Path, tmp_path: Path) -> None:
+    pair.map.write(tmp_path / "map.csv")
+    saved.write_bytes(saved.read_bytes()[:-1])
+    damaged = saved.read_bytes()
+    command = [sys.executable, "-c", FULL, str(saved), str(tmp_path / "map.csv")]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert told.count("\n") == 1
+    assert re.search(r"map\.index: .*; it cannot be made anew: .*File too large", told)
+    assert saved.read_bytes() == damaged
+
+
+@pytest.mark.parametrize("count", [0, 3, 4, 500])
+@pytest.mark.parametrize("spread", [0.0, 1.0])
+def test_maps_without_a_constellation_have_an_index_too(tmp_path: Path, count: int, spread: float) -> None:
+    """Few fruits, all on one spot, or all in a line."""
+    cloud = FruitCloud(np.arange(count)[:, np.newaxis] * np.array([spread, 0.0, 0.0]))
+    Index(cloud, compact=True).save(tmp_path / "map.index")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        opened = Index.open(tmp_path / "map.index", cloud)
+    assert opened.match(cloud).status in ("TooFew", "NoMatch", "Ambiguous")
 
 
 def test_only_a_compact_index_is_saved(pair: ScenePair, tmp_path: Path) -> None:

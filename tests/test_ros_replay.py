@@ -209,6 +209,13 @@ def test_a_frame_map_of_the_bag_keeps_its_name(tmp_path):
     }
 
 
+@pytest.mark.parametrize("name", ["", " ", "/a b\n"])
+def test_a_frame_that_no_robot_could_name_is_refused(replayed, tmp_path, name):
+    output = tmp_path / "out.mcap"
+    flags = ("--map", MAP, "--detections", replayed.bag.boxes, "--map-frame", name)
+    refused(replay(replayed.bag.path, output, *flags), output, "--map-frame: found ", "expected a name of letters")
+
+
 def test_no_frame_found_is_a_result(tmp_path):
     bag = make_robot_bag(tmp_path / "in")
     rows = np.random.default_rng(1).uniform(0, (6, 1, 2), (300, 3))

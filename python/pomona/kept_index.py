@@ -34,7 +34,7 @@ def out_of_index(
     Raises
     ------
     PomonaError
-        The file is missing or is no index.
+        The file is missing or is no index, or of no use where nothing can be written in its place.
     """
     if absent is not None and not path.exists():
         absent(path)
@@ -47,6 +47,9 @@ def out_of_index(
     except OSError as error:
         raise PomonaError(f"{path}: {error.strerror}") from None
     except ValueError as error:
-        make(path)
+        try:
+            make(path)
+        except PomonaError as failure:
+            raise PomonaError(f"{path}: {error}; it cannot be made anew: {failure}") from None
         warnings.warn(f"{path}: {error}; it was made anew", PomonaWarning, stacklevel=3)
     return read(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
@@ -16,6 +17,7 @@ from pomona.errors import PomonaError
 from pomona.localize import Localizer, Way
 from pomona.localize.following import Progress, localize
 from pomona.matching import Up
+from pomona.reading import shown
 from pomona.recording import Recording
 from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.message_file import Message, MessageFile
@@ -111,6 +113,8 @@ def replay(
         When the recording is no bag or was replayed already, there is something at `output`, or it cannot be written.
     """
     require_unused(output)
+    if not re.fullmatch(r"[\w./-]+", map_frame):
+        raise PomonaError(f"--map-frame: found {shown(map_frame)}, expected a name of letters, digits and _ . / -")
     bag, maker, fruits = require_bag(recording), MessageMaker(output), as_cloud(orchard)
     localizer = Localizer(fruits, config=config, threads=threads, index=index)
     frames = frames_of_bag(bag, map_frame, map_axes(orchard, up))

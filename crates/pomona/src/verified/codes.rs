@@ -77,7 +77,9 @@ impl Cells {
             let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
             (at(beyond), at(values.len().saturating_sub(1 + beyond)))
         });
-        let widest = extents.iter().fold(f32::MIN_POSITIVE, |widest, (low, high)| widest.max(high - low));
+        // Of codes that are all the same, or none, the finest edge is a number too.
+        let least = f32::MIN_POSITIVE / FINEST;
+        let widest = extents.iter().fold(least, |widest, (low, high)| widest.max(high - low));
         let cells = |(low, high): (f32, f32), edge: f32| ((high - low) / edge).ceil().max(1.0) as u32;
         let mut edge = widest;
         loop {

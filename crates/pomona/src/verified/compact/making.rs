@@ -47,7 +47,9 @@ struct Kept {
 impl CompactMap {
     /// The index of a cloud, and the conditioned cloud in its order.
     pub(crate) fn new(given: &FruitCloud, mut map: Conditioned) -> (Self, Conditioned) {
-        let (order, buckets) = by_bucket(&map.cloud.positions, map.spacing());
+        // Fruits on one spot, or none, have no spacing; a file tells numbers that divide from those that do not.
+        let sampled_spacing = map.spacing().max(f64::MIN_POSITIVE).min(f64::MAX);
+        let (order, buckets) = by_bucket(&map.cloud.positions, sampled_spacing);
         map.reorder(&order);
         let points: Vec<Vector3<f64>> = map.cloud.positions.iter().map(|p| p.coords).collect();
         let in_single: Vec<[f32; 3]> = points.iter().map(single).collect();
@@ -67,7 +69,7 @@ impl CompactMap {
             given: given.len(),
             fingerprint: fingerprint(given),
             middle: map.middle(),
-            sampled_spacing: map.spacing(),
+            sampled_spacing,
             spacing,
             step: seeds.step,
             each,
