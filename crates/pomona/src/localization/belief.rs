@@ -74,7 +74,12 @@ impl Belief {
 
     /// Standard deviation of the place along its worst axis, metres.
     pub fn sigma_m(&self) -> f64 {
-        self.covariance.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt()
+        worst(&self.covariance, 0)
+    }
+
+    /// Standard deviation of the turn about its worst axis, radians.
+    pub fn sigma_rad(&self) -> f64 {
+        worst(&self.covariance, 3)
     }
 }
 
@@ -83,6 +88,10 @@ const STEPS: u8 = 10;
 
 /// Distance at which a turn counts like a step, metres: that of the fruits.
 const LEVER_M: f64 = 2.0;
+
+fn worst(covariance: &Matrix6<f64>, from: usize) -> f64 {
+    covariance.fixed_view::<3, 3>(from, from).symmetric_eigenvalues().max().max(0.0).sqrt()
+}
 
 fn extent(covariance: &Matrix6<f64>) -> f64 {
     let trace = |from: usize| (from..from + 3).map(|axis| covariance[(axis, axis)]).sum::<f64>();

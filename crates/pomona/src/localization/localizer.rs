@@ -28,6 +28,9 @@ const MATCHED: (f64, f64) = (0.02, 0.02);
 /// A pose that is known no better than this is none, metres: false are those beyond 0.3.
 const LOST_M: f64 = 0.1;
 
+/// The same of a direction that motion alone tells, radians: false are those beyond 5 degrees.
+const LOST_RAD: f64 = 0.03;
+
 /// Least probability of a reported pair; a wrong pair costs a third of what a right one is worth.
 const MIN_PROBABILITY: f64 = 0.25;
 
@@ -145,7 +148,7 @@ impl Localizer {
         let fruits = self.window.fruits(self.config.enough_fruits);
         let found = self.search(&fruits, &cloud_of(&fruits), up)?;
         let poor = self.window.newest() < self.config.enough_fruits && found.verdict != Verdict::Found;
-        let carried = predicted.filter(|belief| poor && belief.sigma_m() < LOST_M);
+        let carried = predicted.filter(|belief| poor && belief.sigma_m() < LOST_M && belief.sigma_rad() < LOST_RAD);
         Ok(carried.map_or(found, |belief| Localization {
             verdict: Verdict::Found,
             pose: Some(belief.pose),
