@@ -48,7 +48,7 @@ impl CompactMap {
     /// The index of a cloud, and the conditioned cloud in its order.
     pub(crate) fn new(given: &FruitCloud, mut map: Conditioned) -> (Self, Conditioned) {
         // Fruits on one spot, or none, have no spacing; a file tells numbers that divide from those that do not.
-        let sampled_spacing = map.spacing().max(f64::MIN_POSITIVE).min(f64::MAX);
+        let sampled_spacing = if map.spacing().is_normal() { map.spacing() } else { f64::MIN_POSITIVE };
         let (order, buckets) = by_bucket(&map.cloud.positions, sampled_spacing);
         map.reorder(&order);
         let points: Vec<Vector3<f64>> = map.cloud.positions.iter().map(|p| p.coords).collect();
