@@ -204,13 +204,13 @@ def test_the_same_map_gives_the_same_growth(row: GrownRow, grown: SeasonGrowth) 
 
 
 def test_the_families_are_told_apart_where_sizes_tell() -> None:
-    """Two hundred fruits without noise to speak of, over a whole season."""
+    """Two hundred fruits without noise to speak of, over a season in which growth ends; slower ends are also strays."""
     times = np.linspace(140.0, 260.0, 9)
     rng = np.random.default_rng(3)
-    sizes = np.exp(4.3 + 0.06 * rng.normal(size=(200, 1)) + FAMILIES["logistic"].log_size(0.04 * (times - 140.0)))
+    sizes = np.exp(4.3 + 0.06 * rng.normal(size=(200, 1)) + FAMILIES["logistic"].log_size(0.09 * (times - 140.0)))
     table = SizeTable.of(sizes + rng.normal(0.0, 0.2, sizes.shape), np.zeros(200, np.int64), times)
     evidence = {name: fit_shape(table, family).log_evidence for name, family in FAMILIES.items()}
-    assert max(evidence, key=evidence.__getitem__) == "logistic"
+    assert evidence.pop("logistic") > max(evidence.values()) + 10.0
 
 
 def test_a_size_of_another_fruit_is_put_aside(tmp_path: Path, row: GrownRow, grown: SeasonGrowth) -> None:
