@@ -174,6 +174,7 @@ class _Driver:
                 path.unlink(missing_ok=True)
 
     def _fail(self, step: FarmStep, why: str) -> None:
+        why = "; ".join((why, *self.kept.pop(step.name, ())))
         line = self.lines.get(step.name) or Line(step.name, step.kind, "", self.keys.settings[step.name])
         self._write(replace(line, key="", failure=why))
         self._tell(step, Fate.failed, why)
