@@ -24,7 +24,7 @@ from benchmarks.results import markdown, shared_data, write_rows, write_text
 from pomona.growth.season_growth import growth_of
 from pomona.synth.seasons import SEASONS
 
-SEEDS, SEEDS_OUTSIDE = 4, 3
+SEEDS, SEEDS_OUTSIDE = 20, 10
 SAME, DIFFERENT = "all the same", "that differ"
 YEARS = (SAME, DIFFERENT, *OUTSIDE)
 
