@@ -10,6 +10,7 @@ NAMES = (
     "robustness",
     "cells",
     "false_alarms",
+    "chance",
     "units",
     "detector",
     "stereo",

@@ -4,12 +4,13 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from benchmarks import cells, cells_report, false_alarms, kinect, results, season
+from benchmarks import cells, cells_report, chance, false_alarms, kinect, results, season
 from benchmarks.disturb import dropped, moved, with_false_points
 from benchmarks.oracle import GATE_CHI2, assign_in_gate, gated_pairs, oracle_pairs
 from benchmarks.pose import pose_error
 from scipy.spatial.transform import Rotation
 
+import pomona
 from pomona.cloud import FruitCloud
 from pomona.evaluate import PairScore, score_pairs
 from pomona.synth.clouds import scene_pair
@@ -176,3 +177,38 @@ def test_false_alarms_go_on_where_the_last_run_stopped(tmp_path, monkeypatch: py
     false_alarms.main(["--cells", "vine-noov", "--pairs", "1", "--anew"])
     assert drawn[-1] == ("vine-noov", 0, 3e-4)
     assert "vine-noov" in (tmp_path / "false_alarms.md").read_text(encoding="utf-8")
+
+
+def test_the_law_of_chance_is_fitted_to_searches_that_follow_it() -> None:
+    rng = np.random.default_rng(3)
+    sizes = rng.integers(5, 12, 8000)
+    poses = np.exp(sizes.astype(float))
+    nats = 4.0 + 1.5 * np.log(poses) + rng.gumbel(0.0, 2.0, len(poses))
+    # What is below the tail does not count, however it is spread.
+    nats -= rng.exponential(3.0, len(nats)) * (nats < 5.0 + 1.5 * np.log(poses))
+    b, c, d = chance.fitted(sizes.astype(str), poses, nats)
+    assert (b, c, d) == (pytest.approx(4.0, abs=0.7), pytest.approx(2.0, abs=0.15), pytest.approx(1.5, abs=0.08))
+    for rate in (0.2, 0.01):
+        above = np.mean(nats > chance.threshold((b, c, d), poses, rate))
+        assert above == pytest.approx(1.0 - np.exp(-rate), abs=0.02)
+
+
+def test_the_law_of_the_code_is_that_of_its_thresholds() -> None:
+    pair = scene_pair("single-noov", 0)
+    config = {"verified": {"false_alarm_rate": 1e-6}}
+    stages = dict(pomona.match(pair.query, pair.map, config=config, threads=1).stages)
+    poses = np.array(stages["query_fruits"] * stages["map_fruits"])
+    assert chance.threshold(chance.law_in_the_code(), poses, 1e-6) == pytest.approx(stages["threshold_nats"])
+
+
+def test_chance_is_reported_beside_the_code(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nats = np.random.default_rng(4).gumbel(20.0, 2.0, 20)
+    found = [{"size": "noov", "seed": seed, "poses": 1e3 * (1 + seed), "nats": nats[seed]} for seed in range(20)]
+    monkeypatch.setattr(results, "FOLDER", tmp_path)
+    monkeypatch.setattr(chance, "RESAMPLED", 5)
+    monkeypatch.setattr(chance, "searched", lambda cell, seed: found[seed] if cell.name == "noov" and seed else None)
+    monkeypatch.setattr(chance, "law_in_the_code", lambda: (1.25, 2.25, 3.25))
+    chance.main(["--pairs", "20"])
+    assert len(results.read_rows("chance.csv")) == 19
+    report = (tmp_path / "chance.md").read_text(encoding="utf-8")
+    assert all(told in report for told in ("19 of 20", "1.25", "2.25", "3.25"))

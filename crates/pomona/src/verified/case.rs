@@ -171,7 +171,10 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a finding has enough evidence: as it grew or once it is settled, every fruit predicted without its own partner,
-    /// and the other of the two at least `kept` of it.
+    /// and the other of the two at least `kept` of it; so too what it grew to, every pair counted as far as it is believed.
+    ///
+    /// Where fruits hang on wires or in cones, a wrong pose lays rows of fruits along rows of fruits, and many lie somewhat
+    /// nearer than strangers do. That adds up, but once each is asked who is who, most pairs are likelier wrong than right.
     pub(super) fn holds(&self, finding: &mut Finding, kept: f64, log: &mut Log) -> bool {
         let (grown, least) = (finding.overlap.log_odds, kept * log.threshold);
         if grown <= least {
@@ -180,7 +183,14 @@ impl<'a> Search<'a> {
         let settled = self.settle(finding);
         log.settled = log.settled.max(settled);
         log.settled_threshold = least;
-        settled > least && grown.max(settled) > log.threshold
+        settled > least && grown.max(settled) > log.threshold && grown * self.believed(finding) > least
+    }
+
+    /// Mean probability of the pairs that a settled finding would report; 0 where there is none.
+    fn believed(&self, finding: &Finding) -> f64 {
+        let Some(settled) = &finding.settled else { return 0.0 };
+        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        pairs.iter().map(|pair| pair.probability).sum::<f64>() / pairs.len().max(1) as f64
     }
 
     /// Looks closely at a finding, over all that it reaches; returns its evidence.

@@ -129,20 +129,19 @@ impl Cells {
         let [across @ .., along] = &self.axes;
         for axis in across {
             let value = code[axis.number];
-            let range = axis.cell(value - radius, inverse_edge)..=axis.cell(value + radius, inverse_edge);
+            let whole = runs.len();
             // Every run splits into those of its cells that are near enough.
-            for at in 0..runs.len() {
-                let Run { first, gap } = runs[at];
-                runs[at].gap = f32::INFINITY;
-                for cell in range.clone() {
-                    let own = axis.gap(value, cell, self.edge);
+            for cell in axis.cell(value - radius, inverse_edge)..=axis.cell(value + radius, inverse_edge) {
+                let own = axis.gap(value, cell, self.edge);
+                for at in 0..whole {
+                    let Run { first, gap } = runs[at];
                     let gap = gap + own * own;
                     if gap <= limit {
                         runs.push(Run { first: first * axis.cells + cell, gap });
                     }
                 }
             }
-            runs.retain(|run| run.gap <= limit);
+            runs.drain(..whole);
         }
         let value = code[along.number];
         for run in runs.iter() {

@@ -16,6 +16,7 @@ use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::matching::Request;
+use rayon::prelude::*;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 pub(super) const MIN_FRUITS: usize = 5;
@@ -241,20 +242,48 @@ impl<'a> Search<'a> {
     /// Grows the best hypotheses that no finding explains yet; returns how many.
     pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
         let mut grown = 0;
-        let threshold = self.threshold();
-        for seed in hypotheses {
-            let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > threshold);
-            let best = accepted.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
-            if grown as usize == GROWN || seed.log_odds < RIVAL_SEED * best {
-                break; // hypotheses come with most evidence first
+        let mut left = hypotheses;
+        while grown < GROWN {
+            // What one of them explains of the next is thrown away: the others do not depend on how many grow at once.
+            let (some, after) = self.worth_growing(left, findings, rayon::current_num_threads().min(GROWN - grown));
+            if some.is_empty() {
+                break;
             }
-            if findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
-                continue;
+            left = after;
+            let new: Vec<Finding> = some
+                .par_iter()
+                .map(|seed| Finding::new(grow(self.query, self.map, seed, &self.model), **seed))
+                .collect();
+            for finding in new {
+                if !self.worth_growing(&[finding.seed], findings, 1).0.is_empty() {
+                    grown += 1;
+                    findings.push(finding);
+                }
             }
-            grown += 1;
-            findings.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
         }
-        grown
+        grown as u32
+    }
+
+    /// The first `most` hypotheses that no finding explains yet, and those after them; none where they are too weak to be rivals.
+    fn worth_growing<'h>(
+        &self,
+        hypotheses: &'h [Hypothesis],
+        findings: &[Finding],
+        most: usize,
+    ) -> (Vec<&'h Hypothesis>, &'h [Hypothesis]) {
+        let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > self.threshold());
+        let least = RIVAL_SEED * accepted.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
+        let mut some: Vec<&Hypothesis> = Vec::new();
+        for (at, seed) in hypotheses.iter().enumerate() {
+            // Hypotheses come with most evidence first.
+            if some.len() == most || seed.log_odds < least {
+                return (some, &hypotheses[at..]);
+            }
+            if !findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
+                some.push(seed);
+            }
+        }
+        (some, &[])
     }
 
     /// Asks the offsets of all fruits, where too few are in common for any seed.

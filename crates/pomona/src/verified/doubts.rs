@@ -9,6 +9,7 @@ use super::placement::Landing;
 use super::placement::{Moments, Placement};
 use super::search::{Contender, Starts, refined};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -126,24 +127,17 @@ impl<'a> Search<'a> {
     /// A seed half a metre wide is turned by a few degrees by its noise. In a crown where fruits hang 8 cm apart the
     /// fruits a metre away then meet their neighbours, and the refinement can settle there.
     pub(super) fn polish(&self, finding: &mut Finding<'a>) {
-        let mut scratch = Scratch::default();
         for _ in 0..POLISHES {
             let Overlap { pose, middle, sigma, .. } = finding.overlap;
             let model = Model { sigma, ..self.model };
-            let best = std::iter::once(pose)
-                .chain(pose.turned_by_each(&middle, &POLISH_TURNS))
-                .filter_map(|start| {
-                    refine(
-                        self.query,
-                        self.map,
-                        &start,
-                        &middle,
-                        POLISH_REACH * self.query.spacing,
-                        &model,
-                        &mut scratch,
-                    )
-                })
-                .max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
+            let starts: Vec<Placement> =
+                std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS)).collect();
+            let reach = POLISH_REACH * self.query.spacing;
+            let refined = |scratch: &mut Scratch, start: &Placement| {
+                refine(self.query, self.map, start, &middle, reach, &model, scratch)
+            };
+            let refined: Vec<_> = starts.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
+            let best = refined.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
             let Some(seed) = best else { return };
             let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
             if better.overlap.log_odds < finding.overlap.log_odds + 0.5 || !self.admits(&better.overlap.pose) {

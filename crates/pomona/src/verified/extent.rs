@@ -7,8 +7,10 @@
 use super::hypothesis::{DETECTION, Hypothesis, gaussian};
 use super::landscape::Landscape;
 use super::placement::{Moments, Placement};
+use super::votes::HALF_TURNS;
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use rayon::prelude::*;
 
 /// Standard deviations of the annealing, in spacings of the map: from the width of a branch down by a factor 0.75.
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
@@ -18,7 +20,7 @@ pub(crate) fn hypothesis(
     query: &Landscape,
     map: &Landscape,
     scale: Scale,
-    admits: &impl Fn(&Placement) -> bool,
+    admits: &(impl Fn(&Placement) -> bool + Sync),
 ) -> Option<Hypothesis> {
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
@@ -28,16 +30,14 @@ pub(crate) fn hypothesis(
         Scale::Metric => 1.0,
         Scale::Free => extent_map / extent_query,
     };
-    let (pose, first) = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]
-        .into_iter()
-        .map(|signs| {
-            let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
-            let rotation = turned * axes_query.transpose();
-            anneal(query, map, Placement { rotation, translation: Vector3::zeros(), scale: ratio }, scale)
-        })
-        .filter(|pose| admits(pose))
-        .map(|pose| (pose, fine_structure(query, map, &pose, SCREENING * map.spacing)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let annealed = |signs: [f64; 3]| {
+        let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
+        let rotation = turned * axes_query.transpose();
+        let pose = anneal(query, map, Placement { rotation, translation: Vector3::zeros(), scale: ratio }, scale);
+        admits(&pose).then(|| (pose, fine_structure(query, map, &pose, SCREENING * map.spacing)))
+    };
+    let found: Vec<_> = HALF_TURNS.into_par_iter().filter_map(annealed).collect();
+    let (pose, first) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     if first < 0.5 * threshold(query) {
         return None;
     }

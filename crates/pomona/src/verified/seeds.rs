@@ -6,7 +6,6 @@
 
 use super::codes::{Code, CodeGrid};
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -142,7 +141,7 @@ pub(crate) fn without_scale(code: &Code) -> Code {
 pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
-        .with_min_len(SHARE_OF_ROWS)
+        .with_min_len(SHARE_OF_FRUITS)
         .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), row as u32))
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
@@ -200,8 +199,9 @@ pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], row: u32) ->
     sets
 }
 
-/// Seeds that are worth a thread of their own.
+/// Seeds that are worth a thread of their own, and fruits whose seeds are.
 const SHARE_OF_SEEDS: usize = 4096;
+const SHARE_OF_FRUITS: usize = 32;
 
 /// The seeds of the map, searchable by code.
 #[derive(Debug, Clone)]

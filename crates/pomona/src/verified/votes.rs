@@ -27,6 +27,9 @@ const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
 const ACROSS: (i32, f64) = (6, 0.044);
 const ALONG: (i32, f64) = (1, 0.07);
 
+/// Signs of the axes that principal axes leave open, those of turns.
+pub(super) const HALF_TURNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+
 /// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
 const CELL: [f64; 3] = [0.45, 0.45, 0.6];
 
@@ -45,6 +48,9 @@ const OUTSTANDING: f64 = 4.0;
 
 /// Votes that a cell has at the least: a pair of clusters gives two.
 const LEAST_VOTES: u16 = 3;
+
+/// Votes of a cell count four times, and those of the six next to it once.
+const WEIGHTS: f64 = 10.0;
 
 /// Votes beside those expected, so that a cell does not stand out by one where none are.
 const LEAST_EXPECTED: f64 = 0.3;
@@ -69,10 +75,16 @@ pub(super) struct Rows {
     blocks: [usize; 3],
 }
 
-/// Votes of all cells, and the sums of blocks.
+/// Votes of all cells, and what is asked of them.
 struct Counts {
+    /// In the last one what lies outside of all. A cell never has more votes than there are pairs.
     cells: Vec<u16>,
+    /// Sums of blocks, each a mean with those around.
     blocks: Vec<f32>,
+    /// For each line of blocks in depth, cell by cell: what the weighted votes in and next to a cell must exceed.
+    asked: Vec<u16>,
+    /// Votes of the lines of one such line of blocks together.
+    line: Vec<u16>,
     /// Cells that one fruit votes for.
     voted: Vec<u32>,
 }
@@ -113,9 +125,12 @@ impl Rows {
     }
 
     fn no_counts(&self) -> Counts {
+        let ([_, _, deep], [along, up, _]) = (self.size, self.blocks);
         Counts {
-            cells: vec![0; self.size.iter().product()],
+            cells: vec![0; self.size.iter().product::<usize>() + 1],
             blocks: vec![0.0; self.blocks.iter().product()],
+            asked: vec![0; along * up * deep],
+            line: vec![0; deep],
             voted: vec![0; self.map[0].len()],
         }
     }
@@ -123,19 +138,30 @@ impl Rows {
     fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<Peak> {
         self.count(turn, counts);
         self.sum_up(counts);
-        let [_, high, deep] = self.size;
-        let standing_out = |(place, _): (usize, &u16)| {
-            let at = [place / deep / high, place / deep % high, place % deep];
-            let inside = at.iter().zip(self.size).all(|(&at, size)| at > 0 && at + 1 < size);
-            let (height, offset) = inside.then(|| self.height(counts, place, at))?;
-            (height > OUTSTANDING).then(|| Peak { height, pose: self.placement(turn, &offset) })
-        };
-        counts.cells.iter().enumerate().filter(|(_, votes)| **votes >= LEAST_VOTES).filter_map(standing_out).collect()
+        self.ask(counts);
+        let [long, high, deep] = self.size;
+        let mut peaks = Vec::new();
+        for (x, y) in (1..long - 1).flat_map(|x| (1..high - 1).map(move |y| (x, y))) {
+            let first = (x * high + y) * deep;
+            let asked = &counts.asked[(x / BLOCK[0] * self.blocks[1] + y / BLOCK[1]) * deep..][..deep];
+            if !self.stands_out(&counts.cells, first, asked) {
+                continue;
+            }
+            for z in 1..deep - 1 {
+                let sum = self.weighted(&counts.cells, first + z);
+                if sum > asked[z] && counts.cells[first + z] >= LEAST_VOTES {
+                    let (height, offset) = self.height(counts, first + z, [x, y, z]);
+                    peaks.push(Peak { height, pose: self.placement(turn, &offset) });
+                }
+            }
+        }
+        peaks
     }
 
     /// Counts the offsets of all fruits of the map from all of the query.
     fn count(&self, turn: &Matrix3<f64>, Counts { cells, voted, .. }: &mut Counts) {
         cells.fill(0);
+        let outside = cells.len() as u32 - 1;
         let [long, high, deep] = self.size.map(|cells| cells as u32);
         let [along, up, depth] = &self.map;
         for p in &self.query {
@@ -145,46 +171,88 @@ impl Rows {
                 // What lies below the first cell is beyond the last one as a number without a sign.
                 let (along, up, depth) = (cell(a.wrapping_add(x)), cell(u.wrapping_add(y)), cell(d.wrapping_add(z)));
                 let inside = along < long && up < high && depth < deep;
-                *place = if inside { (along * high + up) * deep + depth } else { u32::MAX };
+                // A cell of its own for those outside: where a fourth are, a processor that guesses is wrong too often.
+                *place = if inside { (along * high + up) * deep + depth } else { outside };
             }
-            for &place in &*voted {
-                if let Some(votes) = cells.get_mut(place as usize) {
-                    *votes = votes.saturating_add(1);
-                }
-            }
+            voted.iter().for_each(|&place| cells[place as usize] += 1);
         }
     }
 
     /// Sums of the blocks, each a mean with those around.
-    fn sum_up(&self, Counts { cells, blocks: sums, .. }: &mut Counts) {
-        let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
-        sums.fill(0.0);
-        for (line, cells) in cells.chunks(deep).enumerate() {
-            let first = (line / high / BLOCK[0] * up + line % high / BLOCK[1]) * back;
-            for (sum, cells) in sums[first..].iter_mut().zip(cells.chunks(BLOCK[2])) {
-                *sum += cells.iter().map(|&votes| f32::from(votes)).sum::<f32>();
+    fn sum_up(&self, Counts { cells, blocks: sums, line, .. }: &mut Counts) {
+        let ([long, high, deep], [along, up, back]) = (self.size, self.blocks);
+        for (i, sums) in sums.chunks_exact_mut(back).enumerate() {
+            let [x, y] = [i / up * BLOCK[0], i % up * BLOCK[1]];
+            line.fill(0);
+            for x in x..long.min(x + BLOCK[0]) {
+                let lines = cells[(x * high + y) * deep..].chunks_exact(deep);
+                for cells in lines.take(BLOCK[1].min(high - y)) {
+                    line.iter_mut().zip(cells).for_each(|(sum, votes)| *sum += votes);
+                }
+            }
+            for (sum, votes) in sums.iter_mut().zip(line.chunks(BLOCK[2])) {
+                *sum = f32::from(votes.iter().sum::<u16>());
             }
         }
-        let strides = [up * back, back, 1];
-        (0..3).for_each(|i| smooth(sums, strides[i], self.blocks[i]));
+        for (stride, count) in [(up * back, along), (back, up), (1, back)] {
+            smooth(sums, stride, count);
+        }
+    }
+
+    /// What cells must exceed to stand out of their blocks.
+    fn ask(&self, Counts { blocks, asked, .. }: &mut Counts) {
+        for (asked, blocks) in asked.chunks_exact_mut(self.size[2]).zip(blocks.chunks_exact(self.blocks[2])) {
+            for (asked, &sum) in asked.chunks_mut(BLOCK[2]).zip(blocks) {
+                let expected = expected(sum);
+                asked.fill((WEIGHTS * (expected + OUTSTANDING * (expected + LEAST_EXPECTED).sqrt())) as u16);
+            }
+        }
+    }
+
+    /// Whether any cell of the line in depth that begins at `first` may have more votes than are asked of it: of many cells
+    /// at once, for hardly any has.
+    fn stands_out(&self, cells: &[u16], first: usize, asked: &[u16]) -> bool {
+        let [_, high, deep] = self.size;
+        let most = deep - 2;
+        let line = |first: usize| &cells[first..][..most];
+        let (here, middle) = (line(first + 1), first + 1);
+        let around = [middle - 1, middle + 1, middle - deep, middle + deep, middle - high * deep, middle + high * deep];
+        let [a, b, c, d, e, f] = around.map(line);
+        let asked = &asked[1..][..most];
+        let mut over = 0;
+        for z in 0..most {
+            let next = [a[z], b[z], c[z], d[z], e[z], f[z]].into_iter().fold(0, u16::saturating_add);
+            let twice = here[z].saturating_add(here[z]);
+            over |= next.saturating_add(twice).saturating_add(twice).saturating_sub(asked[z]);
+        }
+        over > 0
+    }
+
+    /// Votes of a cell, four times, and of the six next to it.
+    fn weighted(&self, cells: &[u16], place: usize) -> u16 {
+        let [_, high, deep] = self.size;
+        let next = |stride: usize| cells[place - stride].saturating_add(cells[place + stride]);
+        let sum = [1, deep, high * deep].map(next).into_iter().fold(0, u16::saturating_add);
+        (0..4).fold(sum, |sum, _| sum.saturating_add(cells[place]))
     }
 
     /// Standard deviations by which a cell with its neighbours exceeds its surroundings, and the offset that it stands for.
     fn height(&self, Counts { cells, blocks, .. }: &Counts, place: usize, at: [usize; 3]) -> (f64, Vector3<f64>) {
         let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
+        let sum = f64::from(self.weighted(cells, place));
         let votes = |place: usize| f64::from(cells[place]);
-        let (mut sum, mut aside) = (4.0 * votes(place), Vector3::zeros());
-        for (i, stride) in [high * deep, deep, 1].into_iter().enumerate() {
-            let [below, above] = [votes(place - stride), votes(place + stride)];
-            sum += below + above;
-            aside[i] = above - below;
-        }
+        let aside = Vector3::from([high * deep, deep, 1]).map(|stride| votes(place + stride) - votes(place - stride));
         let [x, y, z] = [0, 1, 2].map(|i| at[i] / BLOCK[i]);
-        let expected = f64::from(blocks[(x * up + y) * back + z]) / BLOCK.iter().product::<usize>() as f64;
-        let height = (0.1 * sum - expected) / (expected + LEAST_EXPECTED).sqrt();
+        let expected = expected(blocks[(x * up + y) * back + z]);
+        let height = (sum / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
         let cell = Vector3::from_fn(|i, _| at[i] as f64 - f64::from(self.half[i]));
         (height, (cell + aside / sum).component_mul(&self.edges))
     }
+}
+
+/// Votes of a cell that the sum of its block, a mean with those around, lets expect.
+fn expected(sum: f32) -> f64 {
+    f64::from(sum) / BLOCK.iter().product::<usize>() as f64
 }
 
 /// A length in cells as whole parts of one.
@@ -198,7 +266,6 @@ fn cell(parts: i32) -> u32 {
 
 /// Turns of a row laid along a row, in the frames of their axes.
 fn turns() -> impl Iterator<Item = Matrix3<f64>> {
-    let half_turns = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
     let steps = |(count, step): (i32, f64)| (-count..=count).map(move |i| f64::from(i) * step);
     let of = move |signs: [f64; 3]| {
         steps(ACROSS).flat_map(move |across| {
@@ -208,18 +275,19 @@ fn turns() -> impl Iterator<Item = Matrix3<f64>> {
             })
         })
     };
-    half_turns.into_iter().flat_map(of)
+    HALF_TURNS.into_iter().flat_map(of)
 }
 
 /// Mean of each of `count` values a `stride` apart with its neighbours, the own one twice.
 fn smooth(values: &mut [f32], stride: usize, count: usize) {
-    for first in (0..values.len()).filter(|place| (place / stride).is_multiple_of(count)) {
-        let mut before = 0.0;
-        for step in 0..count {
-            let place = first + step * stride;
-            let (own, after) = (values[place], if step + 1 < count { values[place + stride] } else { 0.0 });
-            values[place] = 0.25 * (before + 2.0 * own + after);
-            before = own;
+    for values in values.chunks_exact_mut(stride * count) {
+        for first in 0..stride {
+            let mut before = 0.0;
+            for place in (first..values.len()).step_by(stride) {
+                let (own, after) = (values[place], values.get(place + stride).copied().unwrap_or(0.0));
+                values[place] = 0.25 * (before + 2.0 * own + after);
+                before = own;
+            }
         }
     }
 }
