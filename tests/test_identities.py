@@ -10,6 +10,7 @@ import pytest
 from pomona import _core
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
 from pomona.identity.links import links_of
+from pomona.identity.lives import SHARE_FALSE
 from pomona.identity.places import looked_at, towards_camera
 from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import all_sights
@@ -133,7 +134,8 @@ def test_a_false_point_ages_out() -> None:
     conclusion = season(shows)
     number_of = of_fruits(shows, conclusion)
     assert conclusion.states[number_of[0]] in ("missed", "gone")
-    assert conclusion.lives.false[number_of[0]] > 0.5
+    # Not surer than that: a fruit deep in the leaves may be seen once and missed four times, too.
+    assert conclusion.lives.false[number_of[0]] > 8 * SHARE_FALSE
     assert conclusion.states[number_of[1]] == "new"
     assert conclusion.lives.false[number_of[2]] == 0.0
 

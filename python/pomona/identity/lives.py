@@ -23,9 +23,19 @@ SHARE_FALSE = 0.05
 
 BELIEF_FALSE = 50.0
 
-SAID_GONE = 0.52
-"""Probability from which a fruit is called gone: a little more than even, as of the living no more than one in fifty
-shall be called so."""
+CHANCES_OF_SEEING = np.array([0.62, 0.20, 0.25, 0.35, 0.45, 0.55, 0.65, 0.78, 0.88, 0.95, 0.98])
+"""Of a fruit that hangs where a visit looks, by its `visibility_classes`: what to believe before the season says its
+own. Low where a fruit was hardly seen before: those that hide for good are seldom among the fruits that tell."""
+
+BELIEF_SEEING = 20.0
+"""Looks that this belief is worth."""
+
+MOST_SEEING = 0.985
+"""A detector misses fruits that hang free, too."""
+
+SAID_GONE = 0.35
+"""Probability from which a fruit is called gone. Below even, for nine in ten of those that are gone shall be found, and
+of those that hang one in fifty may be called so: fruits that hung deep in the leaves leave more doubt than that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +54,7 @@ class Lives:
     false: NDArray[np.float64]
 
 
-def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
+def lives_of(seen: NDArray[np.bool_], in_view: NDArray[np.bool_], classes: NDArray[np.int64]) -> Lives:
     r"""Weigh for each fruit that it has gone against that it hides.
 
     Of a fruit last seen by visit $l$ the others after it say, with the chance $m_v$ that visit $v$ misses it and the
@@ -52,45 +62,69 @@ def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
     $h_t \prod_{v=l+1}^{t-1} (1 - h_v)\, m_v$, or hangs with $\prod_{v>l} (1 - h_v)\, m_v$.
     A fruit that one visit saw alone may be none: false points are as many as the share $f$ of the visit's fruits,
     real ones that only this visit would see as many as there are fruits, those that no visit saw among them, times
-    the chance of that. $h$ and $f$ are those that explain all fruits best.
+    the chance of that. $h$, $f$ and the chances of seeing are those that explain all fruits best: the looks that missed
+    a fruit after it was last seen count as far as it hung then. Were they left out, fruits would seem easier to see
+    than they are, as those that hide for long would not be among them.
 
     Parameters
     ----------
-    seen : (K, V)
+    seen, in_view : (K, V)
         As in `Looks`.
-    missing : (K, V)
-        `chances_of_missing`.
+    classes : (K, V)
+        `visibility_classes`.
     """
-    n_fruits, n_visits = seen.shape
+    n_visits = seen.shape[1]
     order = np.arange(n_visits)
     first, last = seen.argmax(axis=1), n_visits - 1 - seen[:, ::-1].argmax(axis=1)
-    logs = np.log(missing)
-    hidden = np.zeros((n_fruits, n_visits + 1))
-    hidden[:, 1:] = np.cumsum(np.where(order > last[:, None], logs, 0.0), axis=1)
-    only_here = np.where(order < first[:, None], logs, 0.0).sum(axis=1) + np.log1p(-missing[np.arange(n_fruits), first])
-    is_single = seen.sum(axis=1) == 1
-    # For each fruit that some visit saw there are those that all of them missed.
-    seen_at_all = -np.expm1(logs.sum(axis=1))
-    n_seen = seen.sum(axis=0)
-    leaving = np.full(n_visits, SHARE_GONE)
-    share_false = SHARE_FALSE
-    false = np.where(is_single, SHARE_FALSE, 0.0)
+    later = order > first[:, None]
+    seen_later = np.bincount(classes[seen & later], minlength=len(CHANCES_OF_SEEING))
+    is_single, n_seen = seen.sum(axis=1) == 1, seen.sum(axis=0)
+    leaving, share_false = np.full(n_visits, SHARE_GONE), SHARE_FALSE
+    false, chances = np.where(is_single, SHARE_FALSE, 0.0), CHANCES_OF_SEEING
     for _ in range(ROUNDS):
-        ends, log_evidence = _ends(leaving, first, last, hidden)
-        n_real = np.sum((1.0 - false) / seen_at_all)
+        logs = np.where(in_view, np.log1p(-chances)[classes], 0.0)
+        ends, log_evidence = _ends(leaving, first, last, logs)
+        n_real = np.sum((1.0 - false) / _seen_at_all(logs))
         n_false_here = share_false * n_seen[first]
-        n_real_here = n_real * np.exp(only_here + log_evidence)
+        n_real_here = n_real * np.exp(_only_here(first, logs) + log_evidence)
         false = np.where(is_single, n_false_here / (n_false_here + n_real_here), 0.0)
         share_false = (false.sum() + BELIEF_FALSE * SHARE_FALSE) / (n_seen.sum() + BELIEF_FALSE)
         leaving = _leaving(ends, first, 1.0 - false)
+        looked = (later & in_view) * _hanging(ends, last) * (1.0 - false)[:, None]
+        chances = _chances(seen_later, np.bincount(classes.ravel(), looked.ravel(), len(CHANCES_OF_SEEING)))
     return Lives(gone=1.0 - ends[:, -1], false=false)
 
 
+def _seen_at_all(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the chance that some visit sees each fruit, (K,): beside one that is seen are those that all missed."""
+    return -np.expm1(logs.sum(axis=1))
+
+
+def _only_here(first: NDArray[np.int64], logs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the log chance that the visits before miss each fruit and the first one sees it, (K,)."""
+    before = np.where(np.arange(logs.shape[1]) < first[:, None], logs, 0.0).sum(axis=1)
+    return np.asarray(before + np.log(-np.expm1(logs[np.arange(len(first)), first])))
+
+
+def _hanging(ends: NDArray[np.float64], last: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the probability that each fruit hangs on each visit from its first on, (K, V)."""
+    goes_later = np.cumsum(ends[:, :0:-1], axis=1)[:, ::-1]
+    return np.where(np.arange(ends.shape[1] - 1) > last[:, None], goes_later, 1.0)
+
+
+def _chances(n_seen: NDArray[np.int64], n_looked: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the chance of seeing a fruit of each class, (C,)."""
+    learnt = (n_seen + BELIEF_SEEING * CHANCES_OF_SEEING) / (n_looked + BELIEF_SEEING)
+    return np.asarray(np.minimum(learnt, MOST_SEEING))
+
+
 def _ends(
-    leaving: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64], hidden: NDArray[np.float64]
+    leaving: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64], logs_missing: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return probabilities of going before each visit, the last column for never, (K, V + 1); and log evidence."""
-    n_visits = len(leaving)
+    n_fruits, n_visits = logs_missing.shape
+    hidden = np.zeros((n_fruits, n_visits + 1))
+    hidden[:, 1:] = np.cumsum(np.where(np.arange(n_visits) > last[:, None], logs_missing, 0.0), axis=1)
     stayed = np.concatenate([[0.0], np.cumsum(np.log1p(-leaving))])
     logs = hidden + stayed - stayed[first + 1][:, None]
     logs[:, :n_visits] += np.log(leaving)

@@ -1,4 +1,4 @@
-"""How likely a visit is to miss a fruit that hangs where it looks: what leaves hide from one side stays hidden."""
+"""Where each visit looked and how well it saw what is there: what leaves hide from one side stays hidden."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ from numpy.typing import NDArray
 from pomona.identity.places import looked_at, surroundings_of, towards_camera
 from pomona.identity.visits import SeenVisit, Sights
 
-__all__ = ["Looks", "chances_of_missing", "looks_of"]
+__all__ = ["SHARES_OF_VIEWS", "Looks", "looks_of", "visibility_classes"]
 
 SAME_SIDE = 0.5
 """Cosine of the angle between two looks at a fruit, 60 degrees, under which one tells of the other."""
-
-FADING = 0.6
-"""What an older look from the same side still counts, for each newer one."""
 
 AROUND = 25
 """Fruits with which the views of one are compared: those that as many frames could see."""
@@ -25,17 +22,9 @@ AROUND = 25
 MOST_VIEWS = 0.85
 """Quantile of their views that is all views."""
 
-SHARES_OF_VIEWS = np.array([0.08, 0.18, 0.30, 0.42, 0.55, 0.70])
-"""Between the classes of fruits by how well earlier looks saw them, as ranks in the visit."""
-
-CHANCES_OF_SEEING = np.array([0.62, 0.30, 0.50, 0.65, 0.78, 0.88, 0.95, 0.98])
-"""Of a fruit never looked at from this side, and of the classes; what to believe before the season says its own."""
-
-BELIEF = 20.0
-"""Looks that this belief is worth."""
-
-MOST_CHANCE = 0.985
-"""Of seeing: a detector misses fruits that hang free, too."""
+SHARES_OF_VIEWS = np.array([0.02, 0.05, 0.10, 0.15, 0.22, 0.30, 0.42, 0.55, 0.70])
+"""Between the classes of fruits by how well the looks before saw them, as ranks in the visit. Fine where they are
+small: a fruit that one look of five saw and one that one of two saw are far from alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,23 +100,14 @@ def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[which])
 
 
-def chances_of_missing(looks: Looks) -> NDArray[np.float64]:
-    """Return for each fruit and visit, (K, V), how likely it is missed if it hangs there; 1 where nobody looked."""
-    classes = _classes(looks)
-    n_visits = looks.seen.shape[1]
-    order = np.arange(n_visits)
-    first = looks.seen.argmax(axis=1)[:, None]
-    last = n_visits - 1 - looks.seen[:, ::-1].argmax(axis=1)[:, None]
-    # Between two sights a fruit hung there for sure.
-    hung = looks.in_view & (order > first) & (order < last)
-    n_seen = np.bincount(classes[hung & looks.seen], minlength=len(CHANCES_OF_SEEING))
-    n_hung = np.bincount(classes[hung], minlength=len(CHANCES_OF_SEEING))
-    chances = np.minimum((n_seen + BELIEF * CHANCES_OF_SEEING) / (n_hung + BELIEF), MOST_CHANCE)
-    return np.where(looks.in_view, 1.0 - chances[classes], 1.0)
+def visibility_classes(looks: Looks) -> NDArray[np.int64]:
+    """Return how well each fruit can be seen on each visit, by what the visits before that looked from its side saw.
 
-
-def _classes(looks: Looks) -> NDArray[np.int64]:
-    """Return the class of each fruit on each visit, (K, V), by the visits before that looked from the same side."""
+    Returns
+    -------
+    (K, V) int64
+        0 where none has; else 1 and more, the place of the mean of `Looks.views` among `SHARES_OF_VIEWS`.
+    """
     n_fruits, n_visits = looks.seen.shape
     classes = np.zeros((n_fruits, n_visits), np.int64)
     for visit in range(n_visits):
@@ -136,8 +116,8 @@ def _classes(looks: Looks) -> NDArray[np.int64]:
             cosines = np.einsum("ki,ki->k", looks.towards[:, before], looks.towards[:, visit])
             # What is not known is NaN, and counts as the same side.
             tells = looks.in_view[:, before] & ~(cosines < SAME_SIDE)
-            views = np.where(tells, FADING * views + looks.views[:, before], views)
-            looks_before = np.where(tells, FADING * looks_before + 1.0, looks_before)
+            views += np.where(tells, looks.views[:, before], 0.0)
+            looks_before += tells
         shares = views / np.maximum(looks_before, 1.0)
         known = 1 + np.searchsorted(SHARES_OF_VIEWS, shares, side="right")
         classes[:, visit] = np.where(looks_before > 0, known, 0)
