@@ -60,7 +60,6 @@ function beside(page: Page, large: HTMLElement, otherwise: HTMLElement): HTMLEle
 
 function rowCard(page: Page): HTMLElement {
   const row = rowView(page);
-  row.orbit.see("free");
   const below = element("div", { class: "row-foot" }, legend(page), filtered(page), timeSlider(page));
   return element("section", { class: "card row-card", "aria-label": "The row" }, rowTools(page, row.orbit), row.root, below);
 }

@@ -31,7 +31,17 @@ export class Orbit {
   private whole: View | null = null;
   private aspect = 2;
 
-  constructor(private readonly extent: Extent) {}
+  constructor(
+    private readonly extent: Extent,
+    view: View,
+  ) {
+    this.see(view);
+  }
+
+  /** Whether somebody has moved the camera since it last showed the whole row. */
+  get isSteered(): boolean {
+    return this.whole === null;
+  }
 
   /** The whole row stays in the picture until somebody moves the camera. */
   setAspect(aspect: number): void {
@@ -51,8 +61,8 @@ export class Orbit {
       const [up, nearer] = [inwards * sinE + dz * cosE, dz * sinE - inwards * cosE];
       return nearer + MARGIN * Math.max(Math.abs(right) / this.aspect, Math.abs(up)) / slope;
     });
-    this.looking.set({ target, azimuth, elevation, distance: Math.max(...distances) });
     this.whole = view;
+    this.looking.set({ target, azimuth, elevation, distance: Math.max(...distances) });
   }
 
   turn(byAzimuth: number, byElevation: number): void {
