@@ -30,7 +30,7 @@ export function rowView(page: Page): RowView {
   stage.canvas.tabIndex = 0;
   stage.canvas.setAttribute("role", "application");
   stage.canvas.setAttribute("aria-label", "The row in 3D. The table of fruits has the same facts. Arrows move, A D W S turn, plus and minus zoom, 1 side, 2 above, 3 aslant.");
-  root.append(treeLabels(page, stage));
+  root.append(treeLabels(page, stage, extent.low[2]));
 
   const paint = rowPainter(page, stage);
   watchAll([selected, page.time], () => mark(page, stage));

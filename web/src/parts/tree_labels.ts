@@ -2,7 +2,6 @@
 import { element } from "../elements";
 import type { Page } from "../page";
 import type { OnCanvas, Stage } from "../scene/stage";
-import { extentOf } from "../scene/extent";
 
 const BELOW_M = 0.45;
 /** CSS pixels of a label: its edges and each letter, at most as in the style sheet; its height; and between two of them. */
@@ -12,8 +11,9 @@ const MOST_PX = 160;
 const HEIGHT_PX = 24;
 const GAP_PX = 4;
 
-export function treeLabels({ season, filter }: Page, stage: Stage): HTMLElement {
-  const z = extentOf(season).low[2] - BELOW_M;
+/** Below the lowest fruits. */
+export function treeLabels({ season, filter }: Page, stage: Stage, lowest: number): HTMLElement {
+  const z = lowest - BELOW_M;
   const named = season.trees.map((tree, i) => ({ tree, i })).filter(({ tree }) => tree.name);
   const labels = named.map(({ tree, i }) => {
     const pick = (): void => filter.set({ ...filter.value, tree: filter.value.tree === i ? null : i });
