@@ -1,10 +1,10 @@
 """The page with many fruits: bytes of a report, and how long a picture of the row takes without a graphics card.
 
 Rows of fruits at random places with curves of growth on ten dates, and a picture of 48 px of each, are told as a map is
-told. Chromium draws with SwiftShader, on the processor alone; each frame turns the camera or goes on by a day, and lasts
-until the next one can be read. Behind it are the processor time of all of the browser, and the share of the fruits that
-were drawn: who is late draws fewer while they move. Idle is nobody touching it for some seconds. Writes page.csv and
-page.md.
+told. Chromium draws with SwiftShader, on the processor alone; each frame turns the camera or goes on by a day, and
+lasts until the next one can be read. Behind it are the processor time of all of the browser, and the share of the
+fruits that were drawn: who is late draws fewer while they move. Idle is nobody touching it for some seconds. Writes
+page.csv and page.md.
 """
 
 import argparse
@@ -122,7 +122,7 @@ def idle(page: Page) -> str:
 
 
 def timed(page: Page, how: str, n: int) -> str:
-    """Median of the frames, the processor time of all of the browser's processes for each, and the share of the fruits."""
+    """Median of the frames, processor time of all of the browser's processes for each, share of the fruits."""
     page.evaluate("window.points = window.frames = 0")
     before = cpu_s()
     times = page.evaluate(TURN, how)

@@ -43,7 +43,10 @@ def chromium() -> Iterator[object]:
 
 @contextmanager
 def opened(browser: Any, address: str, script: str = "", **settings: Any) -> Iterator[Any]:
-    """A page that has drawn its row; nothing may have gone wrong by the end, and nobody else have been asked. The script runs before its own."""
+    """A page that has drawn its row; nothing may have gone wrong by the end, and nobody else have been asked.
+
+    The script runs before the page's own.
+    """
     context = browser.new_context(**{"viewport": {"width": 1280, "height": 860}, **settings})
     page = context.new_page()
     page.add_init_script(script)
