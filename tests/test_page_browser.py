@@ -320,7 +320,7 @@ def test_what_is_gone_has_no_size_now(browser: Any, row: GrownRow, tmp_path: Pat
         page.get_by_role("tab", name="Fruits").click()
         page.get_by_label("State").select_option("gone")
         (cells,) = shown_rows(page)
-        assert cells[3].endswith(" %")
+        assert cells[3].endswith("\N{NO-BREAK SPACE}%")
         assert set(cells[5:]) == {"\N{EN DASH}"}
         page.locator(".lines .line").first.click()
         card = page.locator(".fruit-card").first

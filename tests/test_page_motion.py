@@ -30,9 +30,9 @@ WATCHED = """{
   const own = WebGL2RenderingContext.prototype;
   const { drawElements, clear, bufferSubData } = own;
   window.drawn = window.uploaded = 0;
-  own.clear = function (...how) { window.drawn = 0; window.cleared = true; return clear.apply(this, how); };
-  own.drawElements = function (...how) { if (how[1] > 1) window.drawn += how[1]; return drawElements.apply(this, how); };
-  own.bufferSubData = function (...how) { window.uploaded += how[2].byteLength; return bufferSubData.apply(this, how); };
+  own.clear = function (...how) { window.drawn = 0; window.cleared = true; clear.apply(this, how); };
+  own.drawElements = function (...how) { if (how[1] > 1) window.drawn += how[1]; drawElements.apply(this, how); };
+  own.bufferSubData = function (...how) { window.uploaded += how[2].byteLength; bufferSubData.apply(this, how); };
 }"""
 
 TURN = """async (frames) => {
@@ -55,9 +55,13 @@ GO_TO_DAY = """async (day) => {
   return window.uploaded;
 }"""
 
-KEYS = (
-    "keys => keys.map((key) => document.querySelector('canvas').dispatchEvent(new KeyboardEvent('keydown', { key })))"
-)
+KEYS = """keys => {
+  const canvas = document.querySelector("canvas");
+  for (const key of keys) canvas.dispatchEvent(new KeyboardEvent("keydown", { key }));
+}"""
+
+FARTHER = ["-"] * 4
+"""The whole row stays in the picture while it turns."""
 
 
 @pytest.fixture(scope="module")
@@ -95,12 +99,14 @@ def unlike(one: np.ndarray, other: np.ndarray) -> float:
 
 def test_what_is_in_time_is_drawn_in_full(browser: Any, address: str) -> None:
     with opened(browser, address, watched(33)) as page:
+        page.evaluate(KEYS, FARTHER)
         at_rest(page)
         assert set(page.evaluate(TURN, 40)) == {N}
 
 
 def test_what_is_late_is_thinned_until_it_rests(browser: Any, address: str) -> None:
     with opened(browser, address, watched(80)) as page:
+        page.evaluate(KEYS, FARTHER)
         before = at_rest(page)
         counts = page.evaluate(TURN, 40)
         assert counts[0] == N

@@ -4,7 +4,7 @@ import { factsOf } from "../facts";
 import type { Page } from "../page";
 import { watchAll } from "../signal";
 import { steer } from "../scene/gestures";
-import { ground } from "../scene/ground";
+import { ground, withGround } from "../scene/ground";
 import { Orbit } from "../scene/orbit";
 import { fruitAt } from "../scene/picking";
 import { extentOf } from "../scene/extent";
@@ -23,7 +23,7 @@ export interface RowView {
 export function rowView(page: Page): RowView {
   const { season, selected } = page;
   const extent = extentOf(season);
-  const orbit = new Orbit(extent, "free");
+  const orbit = new Orbit(withGround(extent), "free");
   const tip = element("div", { class: "tip", role: "status", hidden: true });
   const root = element("div", { class: "row-view" }, tip);
   const stage = new Stage(root, orbit, season.n);

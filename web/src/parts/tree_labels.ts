@@ -46,8 +46,8 @@ interface Place {
 
 /** Below its tree, as far as it would reach out of the picture pushed into it; null where the tree is not in the picture. */
 function placed({ width, height }: Stage, at: OnCanvas | null, widthPx: number): Place | null {
-  if (at === null || at.x < 0 || at.x > width || at.y < 0 || at.y > height - HEIGHT_PX) return null;
-  return { x: Math.max(widthPx / 2, Math.min(width - widthPx / 2, at.x)), y: at.y, widthPx };
+  if (at === null || at.x < 0 || at.x > width || at.y < 0 || at.y > height) return null;
+  return { x: Math.max(widthPx / 2, Math.min(width - widthPx / 2, at.x)), y: Math.min(height - HEIGHT_PX, at.y), widthPx };
 }
 
 function areApart(one: Place, other: Place): boolean {

@@ -33,8 +33,8 @@ export function twoDates(page: Page): HTMLElement {
   if (history.times.length < 2) return element("p", { class: "notice" }, "Two dates need a second visit.");
   const last = history.times.length - 1;
   const dates: Dates = { first: new Signal(last - 1), second: new Signal(last) };
-  const said = element("p", { class: "soft", role: "status" });
-  const head = element("div", { class: "row-tools" }, pick(page, "Date above", dates.first), pick(page, "Date below", dates.second), key());
+  const said = element("p", { class: "soft below", role: "status" });
+  const head = element("div", { class: "row-tools" }, pick(page, "above", dates.first), pick(page, "below", dates.second), key());
   const holder = element("div", { class: "row-view tall" });
   const root = element("section", { class: "card row-card", "aria-label": "Two dates" }, head, holder, said);
 
@@ -67,11 +67,11 @@ export function twoDates(page: Page): HTMLElement {
   return root;
 }
 
-function pick({ season }: Page, label: string, chosen: Signal<number>): HTMLElement {
+function pick({ season }: Page, where: string, chosen: Signal<number>): HTMLElement {
   const options = season.visits.map((visit, v) => element("option", { value: v }, fullDay(visit.time)));
-  const select = element("select", { "aria-label": label, change: () => chosen.set(Number(select.value)) }, ...options);
+  const select = element("select", { "aria-label": `Date ${where}`, change: () => chosen.set(Number(select.value)) }, ...options);
   chosen.watch((v) => (select.value = String(v)));
-  return select;
+  return element("span", { class: "date" }, element("span", { class: "label", "aria-hidden": "true" }, where), select);
 }
 
 function key(): HTMLElement {
