@@ -3,8 +3,8 @@
 Rows of fruits at random places with curves of growth on ten dates, and a picture of 48 px of each, are told as a map is
 told. Chromium draws with SwiftShader, on the processor alone; each frame turns the camera or goes on by a day, and
 lasts until the next one can be read. Behind it are the processor time of all of the browser, and the share of the
-fruits that were drawn: who is late draws fewer while they move. Idle is nobody touching it for some seconds. Writes
-page.csv and page.md.
+fruits that were drawn: none that are out of the picture, and who is late draws fewer while they move. Idle is nobody
+touching it for some seconds. Writes page.csv and page.md.
 """
 
 import argparse

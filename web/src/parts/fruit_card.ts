@@ -56,7 +56,7 @@ function steps({ selected, season }: Page, fruit: number): HTMLElement {
 function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
   const { season } = page;
   const lines: [string, Child][] = [
-    ["State", `${said(page, fruit, facts)}, ${percent(facts.stateProbability)} sure`],
+    ["State", `${said(page, fruit, facts)}, ${percent(facts.stateProbability)}\u00a0sure`],
   ];
   if (!Number.isNaN(facts.sizeMm)) lines.push(["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)]);
   if (!Number.isNaN(facts.rate)) {
