@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,3 +39,27 @@ def chromium() -> Iterator[object]:
         browser = driver.chromium.launch(executable_path=str(CHROMIUM), args=list(FLAGS))
         yield browser
         browser.close()
+
+
+@contextmanager
+def opened(browser: Any, address: str, script: str = "", **settings: Any) -> Iterator[Any]:
+    """A page that has drawn its row; nothing may have gone wrong by the end, and nobody else have been asked.
+
+    The script runs before the page's own.
+    """
+    context = browser.new_context(**{"viewport": {"width": 1280, "height": 860}, **settings})
+    page = context.new_page()
+    page.add_init_script(script)
+    wrong: list[str] = []
+    asked: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text) if said.type in ("error", "warning") else None)
+    page.on("dialog", lambda dialog: (wrong.append(dialog.message), dialog.dismiss()))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address)
+    page.wait_for_selector("canvas")
+    yield page
+    context.close()
+    own = re.compile(rf"{re.escape(address)}|data:|blob:")
+    assert [text for text in wrong if "GPU stall" not in text] == []
+    assert [url for url in asked if not own.match(url)] == []

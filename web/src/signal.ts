@@ -24,16 +24,3 @@ export class Signal<T> {
 export function watchAll(signals: readonly { watch(watcher: () => void): void }[], watcher: () => void): void {
   for (const signal of signals) signal.watch(watcher);
 }
-
-/** Runs something once in the next frame, however often it is asked for until then. */
-export function onceAFrame(work: () => void): () => void {
-  let waits = false;
-  return () => {
-    if (waits) return;
-    waits = true;
-    requestAnimationFrame(() => {
-      waits = false;
-      work();
-    });
-  };
-}

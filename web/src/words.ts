@@ -8,7 +8,7 @@ export const number = (value: number, digits: number): string =>
   Number.isFinite(value) ? value.toFixed(digits).replace(/^-(0(\.0+)?)$/, "$1") : UNKNOWN;
 export const whole = (value: number): string => (Number.isFinite(value) ? WHOLE.format(value) : UNKNOWN);
 export const mm = (value: number): string => (Number.isFinite(value) ? `${value.toFixed(1)} mm` : UNKNOWN);
-export const percent = (share: number): string => (Number.isFinite(share) ? `${Math.round(100 * share)} %` : UNKNOWN);
+export const percent = (share: number): string => (Number.isFinite(share) ? `${Math.round(100 * share)}\u00a0%` : UNKNOWN);
 export const day = (time: number): string => DAY.format(time);
 export const fullDay = (time: number): string => FULL_DAY.format(time);
 export const fruits = (n: number): string => (n === 1 ? "1 fruit" : `${whole(n)} fruits`);

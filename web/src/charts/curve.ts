@@ -61,7 +61,7 @@ function optionsOf(width: number): uPlot.Options {
     height: HEIGHT_PX,
     legend: none,
     cursor: none,
-    padding: [8, 8, 0, 0],
+    padding: [8, 20, 0, 0],
     scales: { x: { time: false } },
     axes: [
       { ...axis, space: 64, size: 28, values: (_chart, seconds) => seconds.map((second) => day(1000 * second)) },

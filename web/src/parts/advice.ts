@@ -41,7 +41,7 @@ function harvest({ growth }: Season): string[] {
   const then = growth.classes.filter((one) => Date.parse(one.date) >= (growth.harvest ?? 0));
   const sum = (of: (one: SizeClass) => number): number => then.reduce((total, one) => total + of(one), 0);
   const best = then.reduce((most, one) => (one.n_fruits > most.n_fruits ? one : most), then[0]);
-  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${day(growth.harvest)}`];
+  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${day(growth.harvest).replace(" ", "\u00a0")}`];
   const share = best ? best.n_fruits / sum((one) => one.n_fruits) : 0;
   if (best) lines.push(`${percent(share)} of fruits will measure ${between(best)}`);
   return lines;

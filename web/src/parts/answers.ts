@@ -42,7 +42,7 @@ function howBig({ season }: Page): HTMLElement {
   const middle = `eight of ten: ${number(quantile(sizes, 0.1), 0)} to ${number(quantile(sizes, 0.9), 0)} mm`;
   if (!season.growth || !all) return answer("How big", number(mean(sizes), 1), "mm on average", line(middle));
   const now = season.growth.nVisits - 1;
-  const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90 %)`;
+  const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90\u00a0%)`;
   return answer("How big", number(all.mean_mm[now], 1), "mm on average", line(sure), line(middle));
 }
 
@@ -50,7 +50,7 @@ function howFast({ season }: Page): HTMLElement {
   const growth = season.growth;
   if (!growth) return answer("How fast", "–", "", line(season.noGrowth ?? ""));
   const [low, rate, high] = growth.blocks[0].rate_mm_per_day;
-  const sure = line(`${number(low, 2)} to ${number(high, 2)} mm (90 %)`);
+  const sure = line(`${number(low, 2)} to ${number(high, 2)} mm (90\u00a0%)`);
   const last = growth.times.length - 1;
   const then = growth.harvest === null ? line("--harvest DATE foretells a day") : line(
     `${day(growth.harvest)}: ${mm(growth.blocks[0].mean_mm[last])}, ${number(growth.blocks[0].low_mm[last], 1)} to ${number(growth.blocks[0].high_mm[last], 1)}`,

@@ -22,6 +22,7 @@ export function filterBar(page: Page): HTMLElement {
   const action = element("select", { "aria-label": "To do", change: () => change({ action: action.value as Filter["action"] }) }, element("option", { value: "" }, "All to do"), ...actions);
   const from = sizeInput("From mm", (fromMm) => change({ fromMm }));
   const below = sizeInput("Below mm", (belowMm) => change({ belowMm }));
+  const between = element("span", { class: "sizes" }, from, element("span", { "aria-hidden": "true" }, "–"), below);
   const count = element("output", { class: "soft" });
   const clear = element("button", { type: "button", click: () => filter.set(ANY) }, "Clear");
   const save = element("button", { type: "button", class: "save", click: () => saveCsv(page) }, "Save CSV");
@@ -31,10 +32,10 @@ export function filterBar(page: Page): HTMLElement {
     [row.value, tree.value] = [now.row, now.tree === null ? "" : String(now.tree)];
     [state.value, action.value] = [now.state, now.action];
     if (isAny(now)) text.value = from.value = below.value = "";
-    clear.disabled = isAny(now);
+    clear.hidden = isAny(now);
     count.textContent = `${whole(passing(page).length)} of ${fruits(season.n)}`;
   });
-  const bar = [text, row, tree, state, action, from, element("span", { "aria-hidden": "true" }, "–"), below, clear, count, save];
+  const bar = [text, row, tree, state, action, between, clear, count, save];
   return element("form", { class: "filter-bar", role: "search", submit: (event: Event) => event.preventDefault() }, ...bar);
 }
 

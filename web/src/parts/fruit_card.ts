@@ -56,7 +56,7 @@ function steps({ selected, season }: Page, fruit: number): HTMLElement {
 function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
   const { season } = page;
   const lines: [string, Child][] = [
-    ["State", `${SAID[facts.state]}, ${percent(facts.stateProbability)} sure`],
+    ["State", `${said(page, fruit, facts)}, ${percent(facts.stateProbability)}\u00a0sure`],
   ];
   if (!Number.isNaN(facts.sizeMm)) lines.push(["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)]);
   if (!Number.isNaN(facts.rate)) {
@@ -74,8 +74,14 @@ function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
   return element("dl", {}, ...lines.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
 }
 
+/** What was seen before and is in no picture of the last visit has not hidden: it keeps its state. */
+function said({ history }: Page, fruit: number, { state }: Facts): string {
+  const isUnseen = history.last[fruit] < history.times.length - 1;
+  return isUnseen && (state === "seen" || state === "new") ? "out of view on the last visit" : SAID[state];
+}
+
 function withRange(middle: number, low: number, high: number): string {
-  return Number.isNaN(low) ? mm(middle) : `${mm(middle)}, 90 %: ${number(low, 1)} to ${number(high, 1)}`;
+  return Number.isNaN(low) ? mm(middle) : `${mm(middle)} (${number(low, 1)} to ${number(high, 1)})`;
 }
 
 /** Every date: what was measured, and how sure it is that it was this fruit. */

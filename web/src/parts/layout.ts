@@ -29,7 +29,7 @@ export function layOut(root: HTMLElement, page: Page): void {
       { name: "dates", title: "Two dates", build: () => [beside(page, twoDates(page), hint("Choose a fruit: the same one is marked on both dates."))] },
       { name: "sizes", title: "Sizes", build: () => [sizeClasses(page, true)] },
       { name: "thinning", title: "Thinning", build: () => [thinning(page, (tab) => chosen.set(tab))] },
-      { name: "calipers", title: "Calipers", build: () => [beside(page, calipers(page), hint("Click a dot for its fruit."))] },
+      { name: "calipers", title: "Calipers", build: () => [page.season.calipers ? beside(page, calipers(page), hint("Click a dot for its fruit.")) : calipers(page)] },
     ],
     chosen,
   );
@@ -60,7 +60,6 @@ function beside(page: Page, large: HTMLElement, otherwise: HTMLElement): HTMLEle
 
 function rowCard(page: Page): HTMLElement {
   const row = rowView(page);
-  row.orbit.see("free");
   const below = element("div", { class: "row-foot" }, legend(page), filtered(page), timeSlider(page));
   return element("section", { class: "card row-card", "aria-label": "The row" }, rowTools(page, row.orbit), row.root, below);
 }

@@ -21,7 +21,7 @@ export function sizeClasses(page: Page, isLong: boolean): HTMLElement {
     "section",
     { class: "card sizes" },
     title,
-    key(days),
+    isLong ? null : key(days),
     isLong ? element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Sizes" }, longTable(days)) : bars(days),
     element("p", { class: "soft" }, hint),
   );

@@ -23,13 +23,16 @@ export function timeSlider({ history, time }: Page): HTMLElement {
   const marks = history.times.map((moment) => drawing("line", { x1: share(moment), x2: share(moment), y1: 0, y2: 6 }));
   const later = drawing("rect", { x: share(last), width: 100 - share(last), y: 2, height: 2, class: "later" });
   const ticks = drawing("svg", { viewBox: "0 0 100 6", preserveAspectRatio: "none", "aria-hidden": "true" }, later, ...marks);
+  let told = "";
   time.watch((now) => {
-    input.value = String(Math.round((now - start) / DAY_MS));
-    const visit = history.visitAt(now);
-    const isForetold = now > last + DAY_MS / 2;
-    const what = isForetold ? "foretold" : `visit ${visit + 1} of ${history.times.length}`;
-    said.replaceChildren(element("strong", {}, fullDay(now)), ` ${what}`);
-    input.setAttribute("aria-valuetext", `${fullDay(now)}, ${what}`);
+    const days = String(Math.round((now - start) / DAY_MS));
+    if (input.value !== days) input.value = days;
+    const what = now > last + DAY_MS / 2 ? "foretold" : `visit ${history.visitAt(now) + 1} of ${history.times.length}`;
+    const day = fullDay(now);
+    if (told === day + what) return; // a text is laid out anew even where it says the same
+    told = day + what;
+    said.replaceChildren(element("strong", {}, day), ` ${what}`);
+    input.setAttribute("aria-valuetext", `${day}, ${what}`);
   });
   if (end === start) return element("div", { class: "time-slider" }, said);
   play(player, time, start, end);

@@ -1,15 +1,16 @@
 /** Two dates, one over the other: the same fruits joined by lines, the others told apart. */
 import type { Rgb } from "../colours";
 import { element, replaceAll } from "../elements";
+import { paintOnceAFrame } from "../frames";
 import type { Page } from "../page";
 import { extentOf } from "../scene/extent";
 import { steer } from "../scene/gestures";
 import { Orbit } from "../scene/orbit";
 import { fruitAt } from "../scene/picking";
-import { LOOKS } from "../scene/spheres";
+import { LOOKS } from "../scene/moment";
 import { Stage } from "../scene/stage";
 import type { Ink, Stroke } from "../scene/strokes";
-import { onceAFrame, Signal, watchAll } from "../signal";
+import { Signal, watchAll } from "../signal";
 import { inkRgb, repaint } from "../theme";
 import { fruits, fullDay, number } from "../words";
 
@@ -32,8 +33,8 @@ export function twoDates(page: Page): HTMLElement {
   if (history.times.length < 2) return element("p", { class: "notice" }, "Two dates need a second visit.");
   const last = history.times.length - 1;
   const dates: Dates = { first: new Signal(last - 1), second: new Signal(last) };
-  const said = element("p", { class: "soft", role: "status" });
-  const head = element("div", { class: "row-tools" }, pick(page, "Date above", dates.first), pick(page, "Date below", dates.second), key());
+  const said = element("p", { class: "soft below", role: "status" });
+  const head = element("div", { class: "row-tools" }, pick(page, "above", dates.first), pick(page, "below", dates.second), key());
   const holder = element("div", { class: "row-view tall" });
   const root = element("section", { class: "card row-card", "aria-label": "Two dates" }, head, holder, said);
 
@@ -41,7 +42,7 @@ export function twoDates(page: Page): HTMLElement {
   const half = (extent.high[2] - extent.low[2] + GAP_M) / 2;
   const [low, high] = [[...extent.low], [...extent.high]] as [[number, number, number], [number, number, number]];
   [low[2], high[2]] = [low[2] - half, high[2] + half];
-  const orbit = new Orbit({ low, high });
+  const orbit = new Orbit({ low, high }, "side");
   const stage = new Stage(holder, orbit, 2 * season.n);
   stage.canvas.tabIndex = 0;
   stage.canvas.setAttribute("role", "application");
@@ -54,8 +55,7 @@ export function twoDates(page: Page): HTMLElement {
       page.selected.set(found === null ? null : found % season.n);
     },
   });
-  orbit.see("side");
-  const paint = onceAFrame(() => {
+  const paint = paintOnceAFrame(() => {
     const counts = compare(page, stage, dates, half);
     replaceAll(said, summary(page, dates, counts));
   });
@@ -67,11 +67,11 @@ export function twoDates(page: Page): HTMLElement {
   return root;
 }
 
-function pick({ season }: Page, label: string, chosen: Signal<number>): HTMLElement {
+function pick({ season }: Page, where: string, chosen: Signal<number>): HTMLElement {
   const options = season.visits.map((visit, v) => element("option", { value: v }, fullDay(visit.time)));
-  const select = element("select", { "aria-label": label, change: () => chosen.set(Number(select.value)) }, ...options);
+  const select = element("select", { "aria-label": `Date ${where}`, change: () => chosen.set(Number(select.value)) }, ...options);
   chosen.watch((v) => (select.value = String(v)));
-  return select;
+  return element("span", { class: "date" }, element("span", { class: "label", "aria-hidden": "true" }, where), select);
 }
 
 function key(): HTMLElement {
@@ -101,7 +101,7 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
   const [a, b] = [dates.first.value, dates.second.value];
   const [placeA, placeB] = [history.placeAt(history.times[a]), history.placeAt(history.times[b])];
   const [sizeA, sizeB] = [history.sizeAt(history.times[a]), history.sizeAt(history.times[b])];
-  const { positions, diameters, colours } = stage.fruits;
+  const { positions, diameters, colours } = stage.fruits.from;
   const counts: Counts = { both: 0, first: 0, second: 0, growthMm: 0, measured: 0 };
   const strokes: Stroke[] = [];
   const tree = page.filter.value.tree;
@@ -132,7 +132,7 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
     counts.growthMm += grown;
     counts.measured++;
   }
-  stage.fruits.changed();
+  stage.fruits.rest();
   stage.lines.set(strokes);
   stage.redraw();
   return counts;

@@ -8,6 +8,9 @@ const BELOW_M = 0.35;
 const BESIDE_M = 0.5;
 const MOST_MARKS = 200;
 
+/** The box around the fruits and their ground. */
+export const withGround = ({ low, high }: Extent): Extent => ({ low: [low[0], low[1], low[2] - BELOW_M], high });
+
 export function ground({ trees }: Season, { low, high }: Extent): Stroke[] {
   const z = low[2] - BELOW_M;
   const [y0, y1] = [low[1] - BESIDE_M, high[1] + BESIDE_M];

@@ -19,6 +19,8 @@ export interface Looking {
 export const FIELD_OF_VIEW_DEG = 28;
 const STRAIGHT_DOWN = Math.PI / 2 - 1e-3;
 const MARGIN = 1.04;
+/** Times that the box is fitted: each puts its middle nearer to the middle of the picture. */
+const CENTRINGS = 6;
 const ANGLES: Record<View, readonly [number, number]> = {
   side: [0, 0.1],
   above: [0, STRAIGHT_DOWN],
@@ -31,7 +33,17 @@ export class Orbit {
   private whole: View | null = null;
   private aspect = 2;
 
-  constructor(private readonly extent: Extent) {}
+  constructor(
+    private readonly extent: Extent,
+    view: View,
+  ) {
+    this.see(view);
+  }
+
+  /** Whether somebody has moved the camera since it last showed the whole row. */
+  get isSteered(): boolean {
+    return this.whole === null;
+  }
 
   /** The whole row stays in the picture until somebody moves the camera. */
   setAspect(aspect: number): void {
@@ -42,17 +54,28 @@ export class Orbit {
   /** Shows the whole row: from as near as its box fits into the picture. */
   see(view: View): void {
     const [azimuth, elevation] = ANGLES[view];
-    const target = middleOf(this.extent);
+    let looking: Looking = { target: middleOf(this.extent), azimuth, elevation, distance: 0 };
+    for (let i = 0; i < CENTRINGS; i++) looking = this.fitted(looking);
+    this.whole = view;
+    this.looking.set(looking);
+  }
+
+  /** As near as the corners of the box fit, with their middle in the middle of the picture: what is nearer looks larger. */
+  private fitted({ target, azimuth, elevation }: Looking): Looking {
     const [sinA, cosA, sinE, cosE] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
     const slope = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
-    const distances = cornersOf(this.extent).map(([x, y, z]) => {
+    const corners = cornersOf(this.extent).map(([x, y, z]) => {
       const [dx, dy, dz] = [x - target[0], y - target[1], z - target[2]];
       const [right, inwards] = [dx * cosA + dy * sinA, dy * cosA - dx * sinA];
       const [up, nearer] = [inwards * sinE + dz * cosE, dz * sinE - inwards * cosE];
-      return nearer + MARGIN * Math.max(Math.abs(right) / this.aspect, Math.abs(up)) / slope;
+      return { right, up, nearer };
     });
-    this.looking.set({ target, azimuth, elevation, distance: Math.max(...distances) });
-    this.whole = view;
+    const needed = corners.map(({ right, up, nearer }) => nearer + MARGIN * Math.max(Math.abs(right) / this.aspect, Math.abs(up)) / slope);
+    const distance = Math.max(...needed);
+    const across = middleOfSpan(corners.map(({ right, nearer }) => right / (distance - nearer)));
+    const upwards = middleOfSpan(corners.map(({ up, nearer }) => up / (distance - nearer)));
+    const looking = { target, azimuth, elevation, distance };
+    return { ...looking, target: besides(looking, across * distance, upwards * distance) };
   }
 
   turn(byAzimuth: number, byElevation: number): void {
@@ -64,17 +87,10 @@ export class Orbit {
 
   /** Moves the target to the right and upwards in the picture, in shares of its height. */
   shift(right: number, up: number): void {
-    const { target, azimuth, elevation, distance } = this.looking.value;
+    const looking = this.looking.value;
     this.whole = null;
-    const seen = 2 * distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
-    const [r, u] = [right * seen, up * seen];
-    const flat = u * Math.sin(elevation);
-    const moved: [number, number, number] = [
-      target[0] + r * Math.cos(azimuth) - flat * Math.sin(azimuth),
-      target[1] + r * Math.sin(azimuth) + flat * Math.cos(azimuth),
-      target[2] + u * Math.cos(elevation),
-    ];
-    this.looking.set({ ...this.looking.value, target: moved });
+    const seen = 2 * looking.distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    this.looking.set({ ...looking, target: besides(looking, right * seen, up * seen) });
   }
 
   zoom(factor: number): void {
@@ -93,6 +109,18 @@ export function eyeOf({ target, azimuth, elevation, distance }: Looking): [numbe
     target[2] + distance * Math.sin(elevation),
   ];
 }
+
+/** The point so many metres to the right of the target and above it in the picture. */
+function besides({ target, azimuth, elevation }: Looking, right: number, up: number): [number, number, number] {
+  const flat = up * Math.sin(elevation);
+  return [
+    target[0] + right * Math.cos(azimuth) - flat * Math.sin(azimuth),
+    target[1] + right * Math.sin(azimuth) + flat * Math.cos(azimuth),
+    target[2] + up * Math.cos(elevation),
+  ];
+}
+
+const middleOfSpan = (values: readonly number[]): number => (Math.min(...values) + Math.max(...values)) / 2;
 
 function cornersOf({ low, high }: Extent): [number, number, number][] {
   const ends = [low, high];

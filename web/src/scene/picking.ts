@@ -4,14 +4,15 @@ import type { Stage } from "./stage";
 const LEAST_RADIUS_PX = 6;
 
 export function fruitAt(stage: Stage, x: number, y: number): number | null {
-  const { positions, diameters, colours } = stage.fruits;
+  const { fruits } = stage;
+  const { colours } = fruits.from;
   let found: number | null = null;
   let least = Infinity;
-  for (let i = 0; i < diameters.length; i++) {
+  for (let i = 0; i < fruits.n; i++) {
     if (colours[4 * i + 3] < 100) continue; // hidden or faded
-    const at = stage.project(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
+    const at = stage.project(fruits.coordinate(i, 0), fruits.coordinate(i, 1), fruits.coordinate(i, 2));
     if (at === null) continue;
-    const radius = Math.max(LEAST_RADIUS_PX, (diameters[i] / 2) * stage.pixelsPerMetre(at.depth));
+    const radius = Math.max(LEAST_RADIUS_PX, (fruits.diameter(i) / 2) * stage.pixelsPerMetre(at.depth));
     const away = Math.hypot(at.x - x, at.y - y) / radius;
     // Near the middle of a disc beats near the eye only between small ones that overlap.
     const cost = at.depth * (1 + 0.05 * away);

@@ -1,29 +1,31 @@
-/** Fruits as points that a shader lights as spheres: 50,000 of them draw in one call, without a triangle. */
-import { Geometry, Mesh, Program, type OGLRenderingContext } from "ogl";
-
-/** In the fourth byte of a colour. */
-export const LOOKS = { hidden: 0, faded: 85, ring: 170, solid: 255 } as const;
+/** Fruits as points that a shader lights as spheres: 50,000 of them draw in a few calls, without a triangle. */
+import { Mesh, Program, type OGLRenderingContext } from "ogl";
+import { Cells, type Sight } from "./cells";
+import { drawingOrder } from "./drawing_order";
+import { momentOf, type Moment } from "./moment";
+import { Runs } from "./runs";
 
 const VERTEX = `#version 300 es
-in vec3 position;
-in float diameter;
-in vec4 colour;
+in vec3 placeFrom, placeTo;
+in float diameterFrom, diameterTo;
+in vec4 colourFrom, colourTo;
 uniform mat4 modelViewMatrix, projectionMatrix;
-uniform float pixels, least;
-out vec3 tint;
+uniform float share, pixels, least;
+flat out vec3 tint;
 flat out float look, rim;
 void main() {
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_PointSize = max(pixels * diameter / gl_Position.w, least);
-  tint = colour.rgb;
-  look = colour.a;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(mix(placeFrom, placeTo, share), 1.0);
+  gl_PointSize = max(pixels * mix(diameterFrom, diameterTo, share) / gl_Position.w, least);
+  tint = mix(colourFrom.rgb, colourTo.rgb, share);
+  look = colourFrom.a;
   rim = 1.0 - 3.0 / gl_PointSize;
   if (look < 0.1) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 
+// The shine is a power of 24 by products: without a graphics card pow() is most of the work of a pixel.
 const FRAGMENT = `#version 300 es
 precision mediump float;
-in vec3 tint;
+flat in vec3 tint;
 flat in float look, rim;
 uniform vec3 background;
 out vec4 shown;
@@ -33,50 +35,89 @@ void main() {
   if (r2 > 1.0 || (look > 0.5 && look < 0.8 && r2 < 0.4)) discard;
   vec3 normal = vec3(at.x, -at.y, sqrt(1.0 - r2));
   float light = 0.62 + 0.42 * dot(normal, vec3(-0.38, 0.56, 0.73));
-  float shine = 0.22 * pow(max(dot(normal, vec3(-0.25, 0.42, 0.87)), 0.0), 24.0);
-  vec3 lit = look > 0.8 ? tint * light + shine : tint;
+  float mirrored = max(dot(normal, vec3(-0.25, 0.42, 0.87)), 0.0);
+  float power2 = mirrored * mirrored, power4 = power2 * power2, power8 = power4 * power4;
+  vec3 lit = look > 0.8 ? tint * light + 0.22 * power8 * power8 * power8 : tint;
   // The rim fades where it has two pixels for it: most fruits hang before nothing.
   float solid = rim > 0.3 && look > 0.8 ? 1.0 - smoothstep(rim, 1.0, sqrt(r2)) * 0.7 : 1.0;
   shown = vec4(look < 0.5 ? mix(background, tint, 0.28) : mix(background, lit, solid), 1.0);
 }`;
 
-export interface Spheres {
+export class Spheres {
   readonly mesh: Mesh;
-  readonly positions: Float32Array;
-  readonly diameters: Float32Array;
-  readonly colours: Uint8Array;
-  /** Says that the three arrays have changed. */
-  readonly changed: () => void;
-  readonly setPixels: (pixelsOfMetreAtOneMetre: number, leastPx: number) => void;
-  readonly setBackground: (rgb: readonly number[]) => void;
-}
+  /** What is shown, or where it sets out. */
+  readonly from: Moment;
+  /** Where it goes to. */
+  readonly to: Moment;
+  private readonly uniforms = { share: { value: 0 }, pixels: { value: 1 }, least: { value: 2 }, background: { value: [1, 1, 1] } };
+  private made: { readonly runs: Runs; readonly cells: Cells } | null = null;
 
-export function spheres(gl: OGLRenderingContext, n: number): Spheres {
-  const positions = new Float32Array(3 * n);
-  const diameters = new Float32Array(n);
-  const colours = new Uint8Array(4 * n);
-  const geometry = new Geometry(gl, {
-    position: { size: 3, data: positions, usage: gl.DYNAMIC_DRAW },
-    diameter: { size: 1, data: diameters, usage: gl.DYNAMIC_DRAW },
-    colour: { size: 4, data: colours, type: gl.UNSIGNED_BYTE, normalized: true, usage: gl.DYNAMIC_DRAW },
-  });
-  const uniforms = { pixels: { value: 1 }, least: { value: 2 }, background: { value: [1, 1, 1] } };
-  const program = new Program(gl, { vertex: VERTEX, fragment: FRAGMENT, uniforms });
-  const mesh = new Mesh(gl, { mode: gl.POINTS, geometry, program, frustumCulled: false });
-  return {
-    mesh,
-    positions,
-    diameters,
-    colours,
-    changed: () => {
-      for (const attribute of Object.values(geometry.attributes)) attribute.needsUpdate = true;
-    },
-    setPixels: (pixels, least) => {
-      uniforms.pixels.value = pixels;
-      uniforms.least.value = least;
-    },
-    setBackground: (rgb) => {
-      uniforms.background.value = [...rgb];
-    },
-  };
+  constructor(
+    private readonly gl: OGLRenderingContext,
+    readonly n: number,
+  ) {
+    [this.from, this.to] = [momentOf(n), momentOf(n)];
+    const program = new Program(gl, { vertex: VERTEX, fragment: FRAGMENT, uniforms: this.uniforms });
+    this.mesh = new Mesh(gl, { mode: gl.POINTS, program, frustumCulled: false });
+    this.mesh.visible = false;
+  }
+
+  /** How far the fruits are from `from` to `to`: 0 to 1. */
+  get share(): number {
+    return this.uniforms.share.value;
+  }
+
+  set share(value: number) {
+    this.uniforms.share.value = value;
+  }
+
+  /** Where a fruit is now: along x, y or z. */
+  coordinate(fruit: number, axis: number): number {
+    return this.between(this.from.positions, this.to.positions, 3 * fruit + axis);
+  }
+
+  diameter(fruit: number): number {
+    return this.between(this.from.diameters, this.to.diameters, fruit);
+  }
+
+  private between(from: Float32Array, to: Float32Array, i: number): number {
+    return from[i] + this.share * (to[i] - from[i]);
+  }
+
+  /** Shows `from`, which has changed. */
+  rest(): void {
+    const { runs, cells } = this.make();
+    runs.changed("From");
+    cells.enclose([this.from]);
+    this.share = 0;
+  }
+
+  /** Goes from `from` to `to`, which both have changed. */
+  setOut(): void {
+    const { runs, cells } = this.make();
+    runs.changed("From");
+    runs.changed("To");
+    cells.enclose([this.from, this.to]);
+  }
+
+  /** Takes the camera, the pixels of the picture in a CSS pixel, the least diameter in CSS pixels, and how often to halve what is small. */
+  look(sight: Sight, ratio: number, leastPx: number, halvings: number): void {
+    this.uniforms.pixels.value = sight.pixels * ratio;
+    this.uniforms.least.value = leastPx * ratio;
+    if (this.made) this.made.runs.drawn = this.made.cells.runs(sight, halvings);
+  }
+
+  setBackground(rgb: readonly number[]): void {
+    this.uniforms.background.value = [...rgb];
+  }
+
+  /** The order follows from where fruits are when they are shown first; later they move by their growth alone. */
+  private make(): { readonly runs: Runs; readonly cells: Cells } {
+    if (this.made) return this.made;
+    const order = drawingOrder(this.from.positions);
+    this.made = { runs: new Runs(this.gl, order, this.from, this.to), cells: new Cells(order) };
+    this.mesh.geometry = this.made.runs;
+    this.mesh.visible = true;
+    return this.made;
+  }
 }

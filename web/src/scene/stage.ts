@@ -1,11 +1,14 @@
 /** A canvas with spheres and lines under one camera; it draws when something has changed, and never else. */
 import { Camera, Renderer, Transform, Vec3 } from "ogl";
-import { onceAFrame } from "../signal";
+import { drawOnceAFrame } from "../frames";
+import { N_LEVELS } from "./drawing_order";
+import { Motion } from "./motion";
 import { eyeOf, FIELD_OF_VIEW_DEG, type Orbit } from "./orbit";
-import { spheres, type Spheres } from "./spheres";
+import { Spheres } from "./spheres";
 import { strokes, type Strokes } from "./strokes";
 
 const LEAST_PX = 2.5;
+const LEAST_MARK_PX = 16;
 const MOST_RATIO = 2;
 /** Without a graphics card four samples a pixel take three times as long, and more fruits leave fewer pixels to each. */
 const FEW = 2000;
@@ -26,7 +29,11 @@ export class Stage {
   private readonly renderer: Renderer;
   private readonly camera: Camera;
   private readonly scene = new Transform();
+  private readonly motion = new Motion(N_LEVELS - 1, () => this.settle());
   private readonly drawnWatchers: (() => void)[] = [];
+  private readonly restWatchers: (() => void)[] = [];
+  private halvings = 0;
+  private size = { width: 0, height: 0 };
 
   constructor(
     readonly holder: HTMLElement,
@@ -40,15 +47,30 @@ export class Stage {
     holder.append(this.canvas);
     this.camera = new Camera(gl, { fov: FIELD_OF_VIEW_DEG });
     this.camera.up = new Vec3(0, 0, 1);
-    this.fruits = spheres(gl, n);
-    this.marks = spheres(gl, 1);
+    this.fruits = new Spheres(gl, n);
+    this.marks = new Spheres(gl, 1);
     this.marks.mesh.program.depthTest = false;
     this.ground = strokes(gl);
     this.lines = strokes(gl);
     for (const { mesh } of [this.ground, this.fruits, this.lines, this.marks]) mesh.setParent(this.scene);
-    this.redraw = onceAFrame(() => this.draw());
+    this.redraw = drawOnceAFrame((start) => this.draw(start));
     new ResizeObserver(() => this.resize()).observe(holder);
-    orbit.looking.watch(() => this.redraw());
+    orbit.looking.watch(() => (orbit.isSteered ? this.stir() : this.redraw()));
+  }
+
+  /** Draws what moves, and all of it as soon as it rests. */
+  stir(): void {
+    this.motion.stir();
+    this.redraw();
+  }
+
+  get isMoving(): boolean {
+    return this.motion.isMoving;
+  }
+
+  /** Calls whenever nothing moves any more. */
+  onRest(watcher: () => void): void {
+    this.restWatchers.push(watcher);
   }
 
   /** Calls after every frame, for what lies over the canvas. */
@@ -73,38 +95,56 @@ export class Stage {
     return { x: ((1 + across) / 2) * this.width, y: ((1 - upwards) / 2) * this.height, depth: w };
   }
 
+  /** CSS pixels of the canvas, kept: asking the document for them between changes to it lays it out anew. */
+  get width(): number {
+    return this.size.width;
+  }
+
+  get height(): number {
+    return this.size.height;
+  }
+
   /** Pixels that a metre takes at a depth. */
   pixelsPerMetre(depth: number): number {
     return this.height / (2 * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / depth;
   }
 
-  private get width(): number {
-    return this.holder.clientWidth;
-  }
-
-  private get height(): number {
-    return this.holder.clientHeight;
-  }
-
   private resize(): void {
-    if (this.width === 0 || this.height === 0) return;
+    this.size = { width: this.holder.clientWidth, height: this.holder.clientHeight };
+    if (this.isHidden) return;
     this.renderer.setSize(this.width, this.height);
     this.orbit.setAspect(this.width / this.height);
     this.redraw();
   }
 
-  private draw(): void {
-    if (this.width === 0 || this.height === 0) return;
-    const { looking } = this.orbit;
-    const { distance, target } = looking.value;
+  private get isHidden(): boolean {
+    return this.width === 0 || this.height === 0;
+  }
+
+  private settle(): void {
+    for (const watcher of this.restWatchers) watcher();
+    if (this.halvings > 0) this.redraw();
+  }
+
+  private draw(start: number): void {
+    if (this.isHidden) return;
+    this.motion.timeFrame(start);
+    this.aim();
+    const { renderer, camera } = this;
+    this.halvings = this.motion.halvings;
+    const sight = { matrix: camera.projectionViewMatrix, pixels: this.pixelsPerMetre(1) };
+    this.fruits.look(sight, renderer.dpr, LEAST_PX, this.halvings);
+    this.marks.look(sight, renderer.dpr, LEAST_MARK_PX, 0);
+    renderer.render({ scene: this.scene, camera, frustumCull: false, sort: false });
+    for (const watcher of this.drawnWatchers) watcher();
+  }
+
+  private aim(): void {
+    const looking = this.orbit.looking.value;
+    const { distance, target } = looking;
     this.camera.perspective({ aspect: this.width / this.height, near: distance / 100, far: distance * 20 + 1000 });
-    this.camera.position.set(...eyeOf(looking.value));
+    this.camera.position.set(...eyeOf(looking));
     this.camera.lookAt(new Vec3(...target));
     this.camera.updateMatrixWorld();
-    const dpr = this.renderer.dpr;
-    this.fruits.setPixels(this.pixelsPerMetre(1) * dpr, LEAST_PX * dpr);
-    this.marks.setPixels(this.pixelsPerMetre(1) * dpr, 16 * dpr);
-    this.renderer.render({ scene: this.scene, camera: this.camera, frustumCull: false, sort: false });
-    for (const watcher of this.drawnWatchers) watcher();
   }
 }

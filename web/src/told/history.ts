@@ -21,6 +21,13 @@ export interface History {
   /** Diameter by the curve; where there is none, the last one that was measured. */
   readonly sizeAt: (time: number) => (fruit: number) => number;
   readonly placeAt: (time: number) => (fruit: number, into: Float32Array, at: number) => void;
+  /** The stretch around a time in which states stay and places and sizes change evenly. */
+  readonly spanAt: (time: number) => Span;
+}
+
+export interface Span {
+  readonly start: number;
+  readonly end: number;
 }
 
 export function historyOf(season: Season): History {
@@ -83,7 +90,15 @@ export function historyOf(season: Season): History {
     stateAt,
     sizeAt,
     placeAt,
+    spanAt: spansOf([...times, ...(growth?.times ?? [])]),
   };
+}
+
+/** From each visit, or day of the curves, to the next. */
+function spansOf(times: readonly number[]): (time: number) => Span {
+  const days = [...new Set(times)].sort((a, b) => a - b);
+  const spans = days.slice(1).map((end, i) => ({ start: days[i], end }));
+  return (time) => spans.findLast(({ start }) => start <= time) ?? spans[0];
 }
 
 /** Curves at a time, on lines between their days; NaN where there is none. */
