@@ -5,12 +5,13 @@ import re
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pomona import FruitCloud, Index, PomonaError, PomonaWarning
+from pomona import FruitCloud, Index, Localizer, PomonaError, PomonaWarning
 from pomona.synth.clouds import ScenePair, scene_pair
 
 
@@ -143,6 +144,34 @@ def test_only_a_compact_index_is_saved(pair: ScenePair, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
     with pytest.raises(PomonaError, match="expected one by verified, metric"):
         Index(pair.map, scale="free", compact=True)
+
+
+def test_a_file_in_the_way_stays_and_the_message_tells_what_to_do(pair: ScenePair, tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.index"
+    foreign.write_text("someone's", encoding="ascii")
+    with pytest.raises(PomonaError) as refused:
+        Index(pair.map, compact=True).save(foreign)
+    told = "is there already and is not the index of a map: take another name, or remove it first"
+    assert str(refused.value) == f"{foreign}: {told}"
+    assert foreign.read_text(encoding="ascii") == "someone's"
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda path, cloud: Index(cloud, compact=True).save(path),
+        lambda path, cloud: Index.open(path, cloud),
+        lambda path, cloud: Localizer(cloud, index=path),
+    ],
+    ids=["save", "open", "localize"],
+)
+def test_a_name_that_no_file_can_have_is_an_error_of_one_line(
+    pair: ScenePair, tmp_path: Path, ask: Callable[[Path, FruitCloud], object]
+) -> None:
+    with pytest.raises(PomonaError, match="has a NUL in it") as refused:
+        ask(tmp_path / "map\0.index", pair.map)
+    assert "\0" not in str(refused.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_another_process_opens_it(pair: ScenePair, saved: Path) -> None:

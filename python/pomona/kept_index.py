@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.likes import INDEX, is_like
+from pomona.outputs import require_name
 
 __all__ = ["out_of_index"]
 
@@ -36,6 +37,7 @@ def out_of_index(
     PomonaError
         The file is missing or is no index, or of no use where nothing can be written in its place.
     """
+    require_name(path)
     if absent is not None and not path.exists():
         absent(path)
     if not path.is_file():

@@ -206,7 +206,7 @@ class Index:
         """
         if not self._core.is_compact:
             raise PomonaError(f"{path}: found an index that is not compact, expected one made with compact=True")
-        require_outputs([Output(Path(path), INDEX)], [])
+        require_outputs([Output(Path(path), INDEX)], [], otherwise="remove it first")
         with whole_file(path) as partial:
             self._core.save(partial)
 

@@ -16,7 +16,10 @@ from pomona.streams import is_device, is_standard_output, is_stream
 JOURNALS = ("-journal", "-wal", "-shm")
 """What SQLite calls its files beside a map: they hold what a killed writer left, and SQLite removes them."""
 
-__all__ = ["Output", "refuse_database", "refuse_inputs", "require_outputs"]
+FORCE = "--force to replace it"
+"""What else there is to do, on the command line, about a file that is in the way."""
+
+__all__ = ["Output", "refuse_database", "refuse_inputs", "require_name", "require_outputs"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,9 @@ class Output:
     like: Like
 
 
-def require_outputs(outputs: Sequence[Output], inputs: Iterable[Path], *, force: bool = False) -> None:
+def require_outputs(
+    outputs: Sequence[Output], inputs: Iterable[Path], *, force: bool = False, otherwise: str = FORCE
+) -> None:
     """Refuse outputs that would destroy something.
 
     Parameters
@@ -46,20 +51,24 @@ def require_outputs(outputs: Sequence[Output], inputs: Iterable[Path], *, force:
         All that it reads.
     force : bool
         Replace what is not alike too; but never an input, and no database that is not a session.
+    otherwise : str
+        What the caller can do about a file in the way instead of taking another name.
 
     Raises
     ------
     PomonaError
-        When an output is an input, by whatever name; lies where nothing can be written; is a map or another database;
-        is there already and not of the kind; or is the same as another output.
+        When an output has no name that a file can have; is an input, by whatever name; lies where nothing can be
+        written; is a map or another database; is there already and not of the kind; or is the same as another output.
     """
+    for output in outputs:
+        require_name(output.path)
     refuse_inputs([output.path for output in outputs], inputs)
     for output in outputs:
         _require_place(output)
         if not is_stream(output.path) and not output.like.is_folder:
             refuse_database(output.path)
         if not force:
-            _require_like(output)
+            _require_like(output, otherwise)
     for one, other in combinations((output.path for output in outputs), 2):
         if _are_same(one, other):
             raise PomonaError(f"{one} and {other} are the same file, expected two to write")
@@ -102,12 +111,22 @@ def refuse_database(path: Path) -> None:
         )
 
 
-def _require_like(output: Output) -> None:
+def require_name(path: Path) -> None:
+    """Refuse what no file can be called; the system's own functions say so in exceptions that nobody expects.
+
+    Raises
+    ------
+    PomonaError
+        Where the name has a NUL.
+    """
+    if "\0" in str(path):
+        raise PomonaError(f"{str(path)!r}: has a NUL in it, expected the name of a file")
+
+
+def _require_like(output: Output, otherwise: str) -> None:
     path = output.path
     if path.exists() and not is_stream(path) and not is_like(output.like, path):
-        raise PomonaError(
-            f"{path}: is there already and is not {output.like.name}: take another name, or --force to replace it"
-        )
+        raise PomonaError(f"{path}: is there already and is not {output.like.name}: take another name, or {otherwise}")
 
 
 def _require_place(output: Output) -> None:

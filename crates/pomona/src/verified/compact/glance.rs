@@ -48,17 +48,18 @@ impl<'a, M: Terrain> Glance<'a, M> {
         Self { proposer, model, seed: quad.map(|row| fruit(&row)), beside, most }
     }
 
-    /// Whether a seed of the map, by the numbers of its fruits in a neighbourhood, is worth a look.
+    /// What speaks for a seed of the map, by the numbers of its fruits in a neighbourhood, as a likelihood ratio; `None` where
+    /// what hangs there contradicts it.
     #[inline]
-    pub(super) fn admits(&self, which: [usize; STARS], near: &Neighbourhood) -> bool {
+    pub(super) fn evidence(&self, which: [usize; STARS], near: &Neighbourhood) -> Option<f64> {
         let mut fruits = [Vector3::zeros(); STARS];
         for (fruit, number) in fruits.iter_mut().zip(which) {
-            // Where a fruit is too far away to be written down nothing is known.
-            let Some(place) = near.place(number) else { return true };
+            // Where a fruit is too far away to be written down nothing is known: it has to be looked at.
+            let Some(place) = near.place(number) else { return Some(f64::INFINITY) };
             *fruit = place;
         }
         let fitted = self.proposer.fit_on(fruits).filter(|(_, residual)| *residual <= self.most);
-        let Some(pose) = fitted.and_then(|(pose, _)| self.proposer.upright(pose)) else { return false };
+        let pose = fitted.and_then(|(pose, _)| self.proposer.upright(pose))?;
         let anchor = which.iter().position(|&number| number == 0).unwrap_or_default();
         let mut around = 1.0;
         for beside in &self.beside[anchor] {
@@ -67,13 +68,13 @@ impl<'a, M: Terrain> Glance<'a, M> {
                 around *= self.ratio(beside, near.nearest(&place), near.density);
             }
             if around < HOPELESS {
-                return false;
+                return None;
             }
         }
         let apart = |(one, fruit): (&Beside, &Vector3<f64>)| {
             self.ratio(one, (pose.apply(&one.place) - fruit).norm_squared(), near.density)
         };
-        around * self.seed.iter().zip(&fruits).map(apart).product::<f64>() > 1.0
+        Some(around * self.seed.iter().zip(&fruits).map(apart).product::<f64>())
     }
 
     /// What a fruit whose nearest partner lies at this squared distance says, as a likelihood ratio.
@@ -126,8 +127,8 @@ mod tests {
             let Some(proposer) = Proposer::new(&query, &map, &model, quad) else { continue };
             let glance = Glance::new(&proposer, &query, &model, quad, 0.01);
             tried += 1;
-            passed += u32::from(glance.admits(same.0, &same.1));
-            dropped += u32::from(!glance.admits(other.0, &other.1));
+            passed += u32::from(glance.evidence(same.0, &same.1).is_some());
+            dropped += u32::from(glance.evidence(other.0, &other.1).is_none());
         }
         assert!(tried > 100, "{tried}");
         assert!(5 * passed >= 4 * tried, "{passed} of {tried}");

@@ -19,8 +19,13 @@ use crate::verified::search::{Contender, Effort, REACH, by_evidence, distinct};
 use crate::verified::size::Diameters;
 use nalgebra::Vector3;
 
-/// Rounds of the search: candidates that each meets, more or less, and contenders that are looked at more closely after it.
-const ROUNDS: [(f32, usize); 4] = [(1e4, 32), (5e4, 64), (2e5, 128), (1e6, 256)];
+/// Rounds of the search: what the looks of each may cost, in candidates, and contenders that are looked at more closely after
+/// it. Each costs as much as all before it, so that what is found costs twice of what it had to at the most.
+const ROUNDS: [(f32, usize); 8] =
+    [(8e3, 32), (8e3, 32), (1.6e4, 32), (3.2e4, 48), (6.4e4, 64), (1.28e5, 96), (2.56e5, 128), (5.12e5, 256)];
+
+/// Candidates of a round, the best at a glance, that get a first look, for each that gets a closer one.
+const LOOKED_AT: usize = 96;
 
 /// Contenders that are verified as a whole.
 const WHOLE: usize = 12;
@@ -101,20 +106,26 @@ struct Case<'a> {
 impl Case<'_> {
     /// Rounds that meet more and more candidates, until one finds an answer.
     fn run(&self) -> Match {
-        let (shapes, step) = (Shapes::new(self.index), self.index.facts.step);
-        let looks = looks(self.landscape, &shapes, &self.model, step);
+        let shapes = Shapes::new(self.index);
+        let looks = looks(self.landscape, &shapes, &self.model, self.index.facts.step);
         let (mut rest, mut effort) = (&looks[..], Effort::default());
-        let (mut contenders, mut best) = (Vec::new(), Vec::new());
-        for (budget, closely) in ROUNDS {
+        let (mut contenders, mut closely, mut best) = (Vec::new(), Vec::new(), Vec::new());
+        let mut judged = None;
+        for (budget, count) in ROUNDS {
             let (now, later) = rest.split_at(within_budget(rest, budget));
             rest = later;
-            let (more, spent) = proposals(self.landscape, (&self.ground, &shapes), &self.model, now, step);
+            let most = LOOKED_AT * count;
+            let (more, spent) = proposals(self.landscape, (&self.ground, &shapes), &self.model, now, most);
             effort = effort + spent;
             contenders.extend(more);
             contenders.sort_unstable_by(by_evidence);
             contenders.truncate(REMEMBERED);
-            best = self.of_other_poses(&self.looked_at(contenders.clone(), closely));
-            let answer = outstanding(&best).map(|some| self.judged(some, effort));
+            closely.extend(self.looked_at(&mut contenders, count));
+            closely.sort_unstable_by(by_evidence);
+            best = self.of_other_poses(&closely);
+            // What was judged before is so little again.
+            let some = outstanding(&best).filter(|some| judged.replace(some[0].key) != Some(some[0].key));
+            let answer = some.map(|some| self.judged(some, effort));
             if let Some(answer) = answer.filter(|answer| answer.verdict != Verdict::NoMatch) {
                 return answer;
             }
@@ -125,9 +136,9 @@ impl Case<'_> {
         self.judged(&best, effort)
     }
 
-    /// The best contenders on a closer look.
-    fn looked_at(&self, mut contenders: Vec<Contender>, closely: usize) -> Vec<Contender> {
-        let best = distinct(self.landscape, self.index.facts.spacing, &mut contenders, closely);
+    /// The best contenders on a closer look; they are taken out of the others.
+    fn looked_at(&self, contenders: &mut Vec<Contender>, count: usize) -> Vec<Contender> {
+        let best = distinct(self.landscape, self.index.facts.spacing, contenders, count);
         closer(self.landscape, &self.ground, &self.model, &best)
     }
 
@@ -175,7 +186,7 @@ impl Case<'_> {
 /// The best contender and its rivals, where it stands out.
 fn outstanding(contenders: &[Contender]) -> Option<&[Contender]> {
     let best = contenders.first()?.log_odds;
-    let second = contenders.get(1).map_or(0.0, |one| one.log_odds);
+    let second = contenders.get(1).map_or(0.0, |one| one.log_odds.max(0.0));
     let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
     (best > STANDS_OUT + second).then(|| &contenders[..rivals])
 }

@@ -18,7 +18,7 @@ pub(super) type Block = [[u8; LANES]; LABEL + 2];
 pub(super) const EMPTY: Block = [[0; LANES]; LABEL + 2];
 
 /// The fruit that a seed belongs to, and four bits for each fruit of the seed: 0 is that fruit, else which of its companions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Anchored {
     pub(super) anchor: u32,
     pub(super) label: u16,

@@ -74,6 +74,12 @@ impl<'a> Shapes<'a> {
         Some(sum / (1 + 2 * NUMBERS) as f32)
     }
 
+    /// How many times the seeds of a cell are within `radius` steps of a shape: the ball of six dimensions over the cube.
+    pub(super) fn reach(&self, radius: f32) -> f32 {
+        const UNIT_BALL: f32 = 5.167_713; // pi^3 / 6
+        UNIT_BALL * (radius / self.facts.cells.edge).powi(NUMBERS as i32)
+    }
+
     /// Finds the seeds whose shape is within `radius` of `shape`, both in steps, with what hangs next to them.
     ///
     /// In turns, each over all that the one before found: so that many waits for memory run at once.
@@ -109,6 +115,11 @@ impl<'a> Shapes<'a> {
             let lanes = (0..LANES).filter(|&lane| distances[lane] <= limit && seeds.contains(&(at * LANES + lane)));
             met.extend(lanes.map(|lane| anchored(block, lane)));
         }
+    }
+
+    /// Metres of a step of a shape.
+    pub(super) fn step(&self) -> f64 {
+        self.facts.step
     }
 
     /// Metres of a step of what hangs next to fruits.

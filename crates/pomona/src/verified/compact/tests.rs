@@ -67,6 +67,19 @@ fn the_same_map_gives_the_same_bytes() {
 }
 
 #[test]
+fn answers_do_not_depend_on_the_number_of_threads() {
+    let (query, map) = visits(0.02);
+    let index = compact(&map);
+    let frame = query.select(&(0..40).collect::<Vec<_>>());
+    for seen in [&query, &frame] {
+        let asked = || told(&index.search(seen, None, None).expect("sound"));
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        let many = rayon::ThreadPoolBuilder::new().num_threads(5).build().expect("threads");
+        assert_eq!(one.install(asked), many.install(asked));
+    }
+}
+
+#[test]
 fn a_byte_that_changed_and_a_file_cut_short_are_refused() {
     let (_, map) = visits(0.02);
     let content = kept(&map);
@@ -78,6 +91,27 @@ fn a_byte_that_changed_and_a_file_cut_short_are_refused() {
     for length in [0, 7, 511, 512, content.len() / 2, content.len() - 1] {
         assert!(opened(&content[..length], &map).is_err(), "{length} bytes");
     }
+}
+
+#[test]
+fn a_byte_between_the_columns_is_refused() {
+    let (_, map) = visits(0.02);
+    let content = kept(&map);
+    // The lengths of the columns are the words of the header from this one on.
+    let word = |at: usize| u64::from_le_bytes(content[8 * at..8 * at + 8].try_into().expect("eight bytes")) as usize;
+    let (mut end, mut tried) = (512, 0);
+    for length in (31..39).map(word) {
+        for at in [end + length, (end + length).next_multiple_of(64) - 1] {
+            if at >= end + length && at < content.len() && !(end + length).is_multiple_of(64) {
+                let mut changed = content.clone();
+                changed[at] = 1;
+                assert!(opened(&changed, &map).is_err(), "byte {at}");
+                tried += 1;
+            }
+        }
+        end = (end + length).next_multiple_of(64);
+    }
+    assert!(end == content.len() && tried > 3, "{end} of {}, {tried} tried", content.len());
 }
 
 #[test]
