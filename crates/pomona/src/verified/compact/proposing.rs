@@ -9,7 +9,7 @@ use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::proposal::Proposer;
 use crate::verified::search::{Contender, Effort};
-use crate::verified::seeds::{Quad, Seed, enumerate, near_ties, shuffled};
+use crate::verified::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, enumerate, near_ties, shuffled};
 use rayon::prelude::*;
 
 /// Reach of the code search in standard deviations of one axis: a third less than where the map is small. It holds half of
@@ -35,13 +35,13 @@ pub(super) struct Look {
 
 /// All that are worth it, of the rarest shape first.
 pub(super) fn looks(query: &Landscape, shapes: &Shapes, model: &Model, step: f64) -> Vec<Look> {
-    let seeds = enumerate(query, 6.0 * model.sigma);
+    let seeds = enumerate(query, SHORTEST * model.sigma);
     let stride = seeds.len().div_ceil(CONSIDERED).max(1) as u64;
     let considered: Vec<Seed> =
         (0..).zip(seeds).filter(|&(at, _)| shuffled(at).is_multiple_of(stride)).map(|(_, seed)| seed).collect();
     let of_seed = |&(quad, _): &Seed| {
         let mut found = Vec::new();
-        near_ties(&query.points, quad, 2.8 * model.sigma, &mut |quad, code: Code| {
+        near_ties(&query.points, quad, NEAR_TIE * model.sigma, &mut |quad, code: Code| {
             let steps = in_steps(&code, step);
             if let (Some(shape), Some(crowd)) = (rounded(&steps), shapes.crowd(&steps)) {
                 found.push(Look { quad, shape, expected: crowd + LEAST });
