@@ -11,7 +11,8 @@ use crate::error::Result;
 use crate::geometry::{Scale, Similarity, fit};
 use crate::neighbours::tree::Tree;
 use crate::verified::{
-    COMPANIONS, Landscape, Quad, SEED_SIGMA, SeedIndex, canonical, frame, near_ties, shuffled, single,
+    COMPANIONS, Landscape, NEAR_TIE, Quad, SEED_SIGMA, SHORTEST, SeedIndex, canonical, frame, near_ties, shuffled,
+    single,
 };
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -128,7 +129,7 @@ impl<'a> Search<'a> {
         let points: Vec<_> = map.iter().map(|point| single(&point.coords)).collect();
         let visit = Landscape::new(visit);
         let sigma = SEED_SIGMA * visit.spacing;
-        let seeds = SeedIndex::new(&visit, Scale::Metric, 6.0 * sigma);
+        let seeds = SeedIndex::new(&visit, Scale::Metric, SHORTEST * sigma);
         Self { map, tree: Tree::new(&points), visit, seeds, sigma }
     }
 
@@ -151,10 +152,10 @@ impl<'a> Search<'a> {
         let (mut runs, mut hits, mut guesses) = (Vec::new(), Vec::new(), Vec::new());
         for turn in 0..TURNS {
             let Some((quad, code)) = canonical(&around, set_of(anchor, turn)) else { continue };
-            if f64::from(code[0]) < 6.0 * self.sigma {
+            if f64::from(code[0]) < SHORTEST * self.sigma {
                 continue;
             }
-            near_ties(&around, quad, 2.8 * self.sigma, &mut |quad, code| {
+            near_ties(&around, quad, NEAR_TIE * self.sigma, &mut |quad, code| {
                 hits.clear();
                 self.seeds.codes.within(&code, (RADIUS * self.sigma) as f32, &mut runs, |hit| hits.push(hit));
                 if let Some(axes) = frame(&around, &quad).filter(|_| hits.len() <= COMMON) {

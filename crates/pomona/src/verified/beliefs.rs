@@ -11,6 +11,9 @@ pub(super) struct Edge {
     pub(super) distance: f64,
 }
 
+/// Pairs less likely than this against both being alone are left out.
+pub(super) const LEAST_RATIO: f64 = 1e-3;
+
 /// What all one-to-one sets of pairs say, each weighing the product of its edges' ratios.
 #[derive(Debug)]
 pub(super) struct Beliefs {

@@ -7,7 +7,7 @@ use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::placement::Placement;
 use super::search::Effort;
-use super::seeds::SeedIndex;
+use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::size::Diameters;
 use super::vertical::Vertical;
@@ -34,7 +34,7 @@ pub(crate) struct VerifiedMap {
 impl VerifiedMap {
     pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
         let landscape = Landscape::new(map);
-        let seeds = SeedIndex::new(&landscape, scale, 6.0 * SEED_SIGMA * landscape.spacing);
+        let seeds = SeedIndex::new(&landscape, scale, SHORTEST * SEED_SIGMA * landscape.spacing);
         Self { landscape, seeds, scale, fruits: map.len() }
     }
 

@@ -53,8 +53,8 @@ const LAID: usize = 3;
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
 const LEAST_LAID: f64 = 16.0;
 
-/// A pose with this many times the evidence needed is no local optimum.
-const SURE: f64 = 6.0;
+/// A pose with this many times the evidence needed is no local optimum and has no rival.
+pub(super) const SURE: f64 = 6.0;
 
 /// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
 const UPRIGHT_SEEDS: u64 = 2;

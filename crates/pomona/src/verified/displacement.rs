@@ -8,6 +8,9 @@ use rayon::prelude::*;
 /// Pairs below which residuals say nothing about what neighbours share.
 const MIN_AGREEING: f64 = 20.0;
 
+/// Variance that neighbours share, in that of the noise, at the least.
+const LEAST_SHARED: f64 = 0.01;
+
 /// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not.
 ///
 /// `residual` gives a fruit's residual and its weight.
@@ -35,6 +38,16 @@ pub(super) fn shared_by_neighbours(
         .collect();
     let [products, pairs, weights] = parts.iter().fold([0.0; 3], |sum, part| [0, 1, 2].map(|i| sum[i] + part[i]));
     if weights > MIN_AGREEING && pairs > 0.0 { (products / pairs / 3.0).max(0.0) } else { 0.0 }
+}
+
+/// The same, or 0 where it is too little beside the noise, a standard deviation of `sigma`, to be told.
+pub(super) fn told_by_neighbours(
+    query: &Landscape,
+    sigma: f64,
+    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync,
+) -> f64 {
+    let shared = shared_by_neighbours(query, residual);
+    if shared < LEAST_SHARED * sigma * sigma { 0.0 } else { shared }
 }
 
 /// Mean residual of the neighbours, the fruit itself left out, shrunk by the noise; and the variance left.

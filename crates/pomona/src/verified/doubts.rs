@@ -7,15 +7,12 @@ use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::Landing;
 use super::placement::{Moments, Placement};
-use super::search::{Contender, Starts, refined};
+use super::search::{Contender, SAME_PLACE, Starts, refined};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
-
-/// Two hypotheses that put a fruit within this many spacings of one place are the same.
-const SAME: f64 = 0.4;
 
 /// No other pose may have this share of the best evidence.
 const RIVAL: f64 = 0.5;
@@ -61,7 +58,7 @@ impl<'a> Search<'a> {
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
     pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Placement) -> bool {
-        let reach = SAME * self.query.spacing;
+        let reach = SAME_PLACE * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
         let same = near

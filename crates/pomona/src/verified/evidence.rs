@@ -12,7 +12,7 @@
 //! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
 //! when it grew, below zero where nothing was selected.
 
-use super::beliefs::{Beliefs, Edge};
+use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
 use super::hypothesis::DETECTION;
 use super::landscape::Landscape;
 use super::pairing::{Meeting, meetings};
@@ -24,9 +24,6 @@ const STEPS: usize = 4;
 
 /// Least and largest share of fruits seen again.
 const SHARES: (f64, f64) = (0.1, 0.95);
-
-/// Pairs less likely than this against both being alone are left out.
-const LEAST_RATIO: f64 = 1e-3;
 
 /// Evidence of an overlap, nats.
 ///

@@ -7,13 +7,13 @@
 
 use super::acceptance::VerifiedConfig;
 use super::case::{Search, Stages, VerifiedMap};
-use super::decision::{MIN_FRUITS, answer_of};
+use super::decision::{MIN_FRUITS, SURE, answer_of};
 use super::landscape::Landscape;
 use super::nearest::single;
 use super::placement::Placement;
 use super::proposal::Proposer;
-use super::search::{Contender, Effort, by_evidence, distinct, of_some_fruits};
-use super::seeds::{Quad, STARS, Seed};
+use super::search::{Contender, Effort, RADIUS, by_evidence, distinct, of_some_fruits};
+use super::seeds::{Quad, SHORTEST, STARS, Seed};
 use super::size::Diameters;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
@@ -24,18 +24,9 @@ use nalgebra::Vector3;
 /// Spacings by which a fruit may be off from where it is expected: 27 cm in an orchard.
 const OFF: f64 = 1.0;
 
-/// Standard deviations by which two fruits of a seed may be nearer to each other, or farther, than in the map.
-const APART: f64 = 2.5;
-
-/// Seeds shorter than this, in standard deviations, fix no pose.
-const SHORTEST: f64 = 6.0;
-
 /// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
 const FRUITS: usize = 128;
 const REFINED: usize = 32;
-
-/// An answer with this many times the evidence needed has no rival.
-const BEYOND_DOUBT: f64 = 6.0;
 
 /// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt.
 pub(crate) fn search_expected(
@@ -55,7 +46,7 @@ pub(crate) fn search_expected(
     let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let contenders = search.contenders(&expected);
     let (findings, stages) = search.weigh(&contenders, Effort::default());
-    let least = BEYOND_DOUBT * search.threshold();
+    let least = SURE * search.threshold();
     if findings.accepted.first().is_some_and(|best| best.overlap.log_odds > least) {
         answer_of(&search, (findings, stages))
     } else {
@@ -82,7 +73,7 @@ impl Search<'_> {
         let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
         let fruits = quad.map(|row| self.query.points[row as usize]);
         let near = fruits.map(|fruit| self.near(&expected.apply(&fruit)));
-        let most = 2.0 * (APART * self.model.sigma).powi(2);
+        let most = 2.0 * (RADIUS * self.model.sigma).powi(2);
         self.each_alike(&fruits, &near, &mut |target| {
             let Some((pose, residual)) = proposer.fit(&target) else { return };
             if residual > most {
@@ -110,7 +101,7 @@ impl Search<'_> {
         let place = |row: u32| self.map.points[row as usize];
         let alike = |one: usize, other: usize, rows: [u32; 2]| {
             let [here, there] = rows.map(place);
-            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < APART * self.model.sigma
+            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < RADIUS * self.model.sigma
         };
         for &a in &near[0] {
             for &b in near[1].iter().filter(|&&b| alike(0, 1, [a, b])) {

@@ -4,10 +4,10 @@
 //! trees still have the same extent. The principal axes give the pose up to half-turns; annealed least squares, from
 //! the width of a branch down to the noise, decides between them.
 
+use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
 use super::hypothesis::{DETECTION, Hypothesis, gaussian};
 use super::landscape::Landscape;
 use super::placement::{Moments, Placement};
-use super::votes::HALF_TURNS;
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -25,10 +25,10 @@ pub(crate) fn hypothesis(
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
     }
-    let ((axes_query, extent_query), (axes_map, extent_map)) = (axes(query)?, axes(map)?);
+    let ((axes_query, extents_query), (axes_map, extents_map)) = (axes_of(query)?, axes_of(map)?);
     let ratio = match scale {
         Scale::Metric => 1.0,
-        Scale::Free => extent_map / extent_query,
+        Scale::Free => extents_map.norm() / extents_query.norm(),
     };
     let annealed = |signs: [f64; 3]| {
         let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
@@ -45,7 +45,7 @@ pub(crate) fn hypothesis(
     if sharp < threshold(query) {
         return None;
     }
-    let shared = beside(query, &pose, &axes_map, ASIDE * map.spacing)
+    let shared = beside(query, &pose, &axes_map, WIDE * map.spacing)
         .map(|aside| fine_structure(query, map, &aside, sigma))
         .fold(0.0, f64::max);
     let log_odds = sharp - shared;
@@ -67,9 +67,6 @@ fn beside(query: &Landscape, pose: &Placement, axes: &Matrix3<f64>, distance: f6
     })
 }
 
-/// Fewer fruits than this have no outline.
-const MIN_FRUITS: usize = 100;
-
 /// Evidence in nats above which an outline is accepted: seven standard deviations of its sum under chance.
 ///
 /// Over disjoint rows the sum has mean zero and a standard deviation of 0.9 per square root of fruits.
@@ -82,18 +79,6 @@ pub(crate) fn threshold(query: &Landscape) -> f64 {
 /// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over
 /// disjoint rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
 const OUTSTANDING: f64 = 0.85;
-
-/// Principal axes as a proper rotation, and the root-mean-square extent.
-fn axes(cloud: &Landscape) -> Option<(Matrix3<f64>, f64)> {
-    let scatter = cloud.points.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose()) / cloud.len() as f64;
-    let eigen = scatter.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let [first, second] = [order[0], order[1]].map(|i| eigen.eigenvectors.column(i).into_owned());
-    let axes = Matrix3::from_columns(&[first, second, first.cross(&second)]);
-    let extent = scatter.trace().sqrt();
-    (extent > 0.0 && axes.iter().all(|x| x.is_finite())).then_some((axes, extent))
-}
 
 /// The fruit nearest the centre.
 fn middle(cloud: &Landscape) -> Vector3<f64> {
@@ -155,14 +140,12 @@ fn fine_structure(query: &Landscape, map: &Landscape, pose: &Placement, sigma: f
         .sum()
 }
 
-/// How far aside, in spacings, fruits no longer lie on themselves at any noise that is tried.
-const ASIDE: f64 = 0.9;
-
 /// Noise in spacings that is tried: 1.5 to 11 cm in an orchard.
 const SIGMAS: [f64; 8] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33];
 
 /// Noise in spacings at which the half-turns are compared.
 const SCREENING: f64 = 0.25;
 
-/// Width in spacings of the crowns' structure that chance may share.
+/// Width in spacings of the crowns' structure that chance may share. So far aside fruits no longer lie on themselves at any
+/// noise that is tried.
 const WIDE: f64 = 0.9;

@@ -24,8 +24,8 @@ const RIGID_ROUNDS: usize = 6;
 /// Rounds of pairing and fitting when the pose is known for the whole query.
 const WHOLE_ROUNDS: usize = 4;
 
-/// The same once those that only one visit sees are left out.
-const LAY_ROUNDS: usize = 2;
+/// The same once fruits or cells were left out of it.
+const LEFT_OUT_ROUNDS: usize = 2;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
@@ -104,13 +104,9 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
     for cell in &mut growth.cells {
         cell.reached = true;
     }
-    for _ in 0..WHOLE_ROUNDS {
-        growth.predict();
-        growth.pair_up();
-        growth.refit();
-    }
     growth.predict();
     growth.pair_up();
+    growth.go_on(WHOLE_ROUNDS);
     growth
 }
 
@@ -119,12 +115,10 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
 pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = hold(query, map, whole, model);
     growth.unseen = unseen(query, map, &growth.pose);
-    growth.forget_unseen();
-    for _ in 0..LAY_ROUNDS {
-        growth.refit();
-        growth.predict();
-        growth.pair_up();
-    }
+    let hidden: Vec<usize> = (0..query.len()).filter(|&row| growth.unseen[0][row]).collect();
+    hidden.into_iter().for_each(|row| growth.forget(row));
+    growth.pair_up();
+    growth.go_on(LEFT_OUT_ROUNDS);
     growth.whole = false;
     growth
 }
@@ -183,15 +177,21 @@ impl<'a> Growth<'a> {
         !new.is_empty()
     }
 
-    /// Takes the partners of fruits that only one visit sees.
-    fn forget_unseen(&mut self) {
-        for row in (0..self.query.len()).filter(|&row| self.unseen[0][row]) {
-            self.predictions[row] = None;
-            if let Some(partner) = self.partners[row].take() {
-                self.owner[partner.row as usize] = None;
-            }
+    /// Fits to the pairs and makes them anew, so many times.
+    fn go_on(&mut self, rounds: usize) {
+        for _ in 0..rounds {
+            self.refit();
+            self.predict();
+            self.pair_up();
         }
-        self.pair_up();
+    }
+
+    /// Leaves a fruit out, with its partner.
+    fn forget(&mut self, row: usize) {
+        self.predictions[row] = None;
+        if let Some(partner) = self.partners[row].take() {
+            self.owner[partner.row as usize] = None;
+        }
     }
 
     /// Fruits of the reached cells.
@@ -222,17 +222,9 @@ impl<'a> Growth<'a> {
         for i in outside {
             self.cells[i].reached = false;
             self.cells[i].moments = Moments::default();
-            for &row in self.cells[i].rows.iter() {
-                self.predictions[row as usize] = None;
-                if let Some(partner) = self.partners[row as usize].take() {
-                    self.owner[partner.row as usize] = None;
-                }
-            }
+            let rows = self.cells[i].rows.clone();
+            rows.iter().for_each(|&row| self.forget(row as usize));
         }
-        for _ in 0..2 {
-            self.refit();
-            self.predict();
-            self.pair_up();
-        }
+        self.go_on(LEFT_OUT_ROUNDS);
     }
 }

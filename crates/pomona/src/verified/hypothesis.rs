@@ -1,7 +1,7 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
 use super::landscape::Landscape;
-use super::placement::{Moments, Placement};
+use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
@@ -137,7 +137,7 @@ pub(crate) fn refine(
             moments.add(&p, &map.points[partner as usize], weight);
             residual += weight * d2;
         }
-        if moments.weight < 3.5 {
+        if moments.weight < FIXING {
             return answer;
         }
         let mut log_odds = evidence.log_odds();
@@ -151,7 +151,7 @@ pub(crate) fn refine(
         pose = moments.step(&pose, model.scale, 0.0)?;
         centroid = moments.centroid();
         freedom = 1.0 / moments.weight;
-        inertia = moments.weight * moments.spread().trace() * 2.0 / 3.0;
+        inertia = moments.inertia();
         if step >= 2 {
             let freedoms = (3.0 * moments.weight - 6.0).max(0.0);
             sigma = ((PRIOR_FREEDOMS * model.sigma * model.sigma + residual) / (PRIOR_FREEDOMS + freedoms)).sqrt();

@@ -8,7 +8,7 @@
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
 //!    stands out of all others of the search (`outlier`).
-//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`extent`).
+//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`axes`, `extent`).
 //!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
 //!    what only one visit sees is left out (`sight`).
 //! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
@@ -17,6 +17,7 @@
 //! Where it is known about where the query lies, seeds are looked up there in place of steps 1 and 5 (`expected`).
 
 mod acceptance;
+mod axes;
 mod beliefs;
 mod case;
 mod chance;
@@ -59,4 +60,4 @@ pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
 pub(crate) use landscape::{Landscape, median};
 pub(crate) use nearest::single;
-pub(crate) use seeds::{COMPANIONS, Quad, SeedIndex, canonical, frame, near_ties, shuffled};
+pub(crate) use seeds::{COMPANIONS, NEAR_TIE, Quad, SHORTEST, SeedIndex, canonical, frame, near_ties, shuffled};

@@ -28,9 +28,6 @@ const SAME_TURN_RAD: f64 = 0.06;
 /// Noise of a peak, in that of a pair: its cell is wider than the noise.
 const WIDE: f64 = 2.5;
 
-/// Poses that are worth a thread of their own.
-const SHARE_OF_POSES: usize = 8;
-
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(
     query: &Landscape,
@@ -46,7 +43,6 @@ pub(super) fn hypotheses(
     let wide = Model { sigma: WIDE * model.sigma, ..model };
     let mut looks: Vec<(f64, Placement)> = distinct(rows.peaks(admits), map.spacing)
         .par_iter()
-        .with_min_len(SHARE_OF_POSES)
         .map(|pose| (look(query, map, &wide, pose), *pose))
         .collect();
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -55,8 +51,7 @@ pub(super) fn hypotheses(
     let refined = |scratch: &mut Scratch, (_, pose): &(f64, Placement)| {
         refine(query, map, pose, &Vector3::zeros(), reach, &model, scratch)
     };
-    let mut found: Vec<Hypothesis> =
-        looks.par_iter().with_min_len(SHARE_OF_POSES).map_init(Scratch::default, refined).flatten_iter().collect();
+    let mut found: Vec<Hypothesis> = looks.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }

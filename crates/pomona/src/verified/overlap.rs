@@ -4,6 +4,7 @@ use super::cut::{key_of, total};
 use super::growth::{Growth, Partner};
 use super::hypothesis::gaussian;
 use super::placement::{Landing, Placement};
+use super::sight::is_among;
 use nalgebra::Vector3;
 
 /// Shares of fruits seen again that are tried: heavy occlusion to a bare tree.
@@ -77,7 +78,7 @@ impl Growth<'_> {
             .iter()
             .zip(&self.owner)
             .enumerate()
-            .filter(|(row, (_, owner))| owner.is_none() && !self.unseen[1].get(*row).is_some_and(|&unseen| unseen))
+            .filter(|(row, (_, owner))| owner.is_none() && !is_among(&self.unseen[1], *row))
             .map(|(_, (p, _))| self.pose.apply_inverse(p))
             .filter(|place| self.cut.index.get(&key_of(place, self.edge)).is_some_and(|&cell| self.cells[cell].reached))
             .map(|place| self.query.support(&place))

@@ -1,6 +1,6 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::beliefs::{Beliefs, Edge};
+use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
 use super::placement::Landing;
@@ -22,9 +22,6 @@ const FAR: f64 = 0.5;
 /// pair far off is believed only where nothing else is near.
 const LOOSE: f64 = 0.01;
 const LOOSE_WIDTH: f64 = 3.0;
-
-/// Pairs less likely than this against "hidden there, new here" are left out.
-const LEAST_RATIO: f64 = 1e-3;
 
 /// One fruit of the query found again, rows of the centred clouds.
 #[derive(Debug, Clone, Copy)]

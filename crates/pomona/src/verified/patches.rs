@@ -5,12 +5,13 @@
 //! residuals agree.
 
 use super::cut::{Cell, surroundings, total};
-use super::displacement::{displacement, shared_by_neighbours};
+use super::displacement::{displacement, told_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::hypothesis::GATE;
 use super::nearest::SHARE_OF_ROWS;
 use super::placement::Landing;
-use super::placement::{Moments, Placement};
+use super::placement::{FIXING, Moments, Placement};
+use super::sight::is_among;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -20,7 +21,7 @@ use std::mem::take;
 pub(super) const HOLD: f64 = 2.0;
 
 /// Share of the distance by which a crown may have bent between visits; recordings show 1 to 3 %.
-pub(super) const DRIFT: f64 = 0.02;
+const DRIFT: f64 = 0.02;
 
 /// Cells of a patch's own fit, by their weight (see [`super::cut`]): those next to it.
 const NEXT: f64 = 0.3;
@@ -39,12 +40,8 @@ pub(super) struct Footing {
 impl Footing {
     /// Of a fit to `moments`, held by as many pairs as `hold` about `centre`, an `edge` away.
     pub(super) fn new(moments: &Moments, hold: f64, edge: f64, centre: Vector3<f64>) -> Self {
-        let known = moments.weight > 3.5;
-        let (middle, inertia) = if known {
-            (moments.centroid(), moments.weight * moments.spread().trace() * 2.0 / 3.0)
-        } else {
-            (centre, 0.1 * edge * edge)
-        };
+        let (middle, inertia) =
+            if moments.weight > FIXING { (moments.centroid(), moments.inertia()) } else { (centre, 0.1 * edge * edge) };
         Self { middle, weight: moments.weight + hold, inertia: inertia + hold * edge * edge }
     }
 
@@ -61,8 +58,15 @@ impl Footing {
 
     /// Squared distance from the middle of the pairs.
     #[inline]
-    pub(super) fn away2(&self, p: &Vector3<f64>) -> f64 {
+    fn away2(&self, p: &Vector3<f64>) -> f64 {
         (p - self.middle).norm_squared()
+    }
+
+    /// Variance at `p` by what the crown may have bent, where that is farther than an `edge` away.
+    #[inline]
+    pub(super) fn bent(&self, p: &Vector3<f64>, edge: f64) -> f64 {
+        let away2 = self.away2(p);
+        if away2 > edge * edge { DRIFT * DRIFT * away2 } else { 0.0 }
     }
 }
 
@@ -91,17 +95,15 @@ impl Growth<'_> {
         let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
         let unseen = &self.unseen[0];
         let at = |row: usize| {
-            if unseen.get(row).is_some_and(|&unseen| unseen) {
+            if is_among(unseen, row) {
                 return None;
             }
             let cell = self.cut.cell_of[row] as usize;
             let footing = footings[cell]?;
             let p = self.query.points[row];
-            let away2 = footing.away2(&p);
-            let bent = if away2 > self.edge * self.edge { DRIFT * DRIFT * away2 } else { 0.0 };
             let place = self.cells[cell].pose.apply(&p);
             let (shift, unexplained) = displacement(self.query, row, (self.shared, self.sigma * self.sigma), residual);
-            let variance = sigma2 * (1.0 + footing.looseness(&p)) + bent + unexplained;
+            let variance = sigma2 * (1.0 + footing.looseness(&p)) + footing.bent(&p, self.edge) + unexplained;
             Some((place, Landing { place: place + shift, variance }))
         };
         let (mut predictions, mut places) = (take(&mut self.predictions), take(&mut self.patch_places));
@@ -179,7 +181,7 @@ impl Growth<'_> {
     /// New patch poses, global pose, noise and shared displacement from the current pairs.
     pub(super) fn refit(&mut self) {
         let all = total(self.cells.iter().filter(|c| c.reached).map(|c| (&c.moments, 1.0)));
-        if all.weight < 3.5 {
+        if all.weight < FIXING {
             return;
         }
         if let Some(pose) = all.step(&self.pose, self.model.scale, 0.0) {
@@ -217,14 +219,11 @@ impl Growth<'_> {
             squares += partner.weight * partner.residual.norm_squared();
             weights += partner.weight;
         }
-        if weights < 3.5 {
+        if weights < FIXING {
             return;
         }
         let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
-        self.shared = shared_by_neighbours(self.query, residual);
-        if self.shared < 0.01 * self.sigma * self.sigma {
-            self.shared = 0.0;
-        }
+        self.shared = told_by_neighbours(self.query, self.sigma, residual);
         // Residuals about the patches hold noise and shared displacement; the gate cuts 3 % off.
         let mean = squares / (3.0 * weights - 6.0).max(weights);
         let prior = self.model.sigma * self.model.sigma;

@@ -84,6 +84,9 @@ pub(crate) struct Landing {
     pub(crate) variance: f64,
 }
 
+/// Pairs, weighted, that fix a pose at the least: three and a half.
+pub(super) const FIXING: f64 = 3.5;
+
 /// Sums of weighted pairs, enough for one least-squares step from a current pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moments {
@@ -136,6 +139,11 @@ impl Moments {
     pub(crate) fn spread(&self) -> Matrix3<f64> {
         let mean = self.centroid();
         self.square / self.weight - mean * mean.transpose()
+    }
+
+    /// Sum of the squared distances from the mean axis through the centroid.
+    pub(crate) fn inertia(&self) -> f64 {
+        self.weight * self.spread().trace() * 2.0 / 3.0
     }
 
     /// One Gauss-Newton step of the Procrustes problem from `start`, whose rotation must be near.

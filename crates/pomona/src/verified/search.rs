@@ -4,7 +4,7 @@ use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::proposal::Proposer;
-use super::seeds::{Quad, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -95,7 +95,7 @@ fn candidates_of(
         Scale::Metric => model.sigma,
         Scale::Free => model.sigma / map.spacing * query.spacing,
     };
-    if length < 6.0 * sigma {
+    if length < SHORTEST * sigma {
         return effort;
     }
     // Standard deviations that the two seeds may differ by.
@@ -104,7 +104,7 @@ fn candidates_of(
         Scale::Free => RADIUS,
     };
     let (mut runs, mut hits) = (Vec::new(), Vec::new());
-    near_ties(&query.points, seed.0, 2.8 * sigma, &mut |quad, code| {
+    near_ties(&query.points, seed.0, NEAR_TIE * sigma, &mut |quad, code| {
         effort.codes += 1;
         let (code, radius) = match model.scale {
             Scale::Metric => (code, apart * sigma),
@@ -137,7 +137,7 @@ fn candidates_of(
 /// Reach of the code search in standard deviations of one axis.
 ///
 /// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
-const RADIUS: f64 = 2.5;
+pub(super) const RADIUS: f64 = 2.5;
 
 /// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many
 /// times.
@@ -215,7 +215,7 @@ pub(super) fn distinct(
 
 /// Candidates of one neighbourhood are the same pose when they put it within this many spacings of one place, turned by
 /// less than that: what one refinement reaches.
-const SAME_PLACE: f64 = 0.4;
+pub(super) const SAME_PLACE: f64 = 0.4;
 const SAME_TURN_RAD: f64 = 0.15;
 
 /// Where the refinement of a candidate starts.

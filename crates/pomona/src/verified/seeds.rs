@@ -19,6 +19,12 @@ pub(crate) const COMPANIONS: usize = 10;
 /// Seeds flatter than this (distance of C from the line AB over |AB|) fix the turn about AB too badly.
 const MIN_FLATNESS: f64 = 0.15;
 
+/// Seeds shorter than this, in standard deviations of the noise, fix no pose.
+pub(crate) const SHORTEST: f64 = 6.0;
+
+/// Standard deviations by which noise may have made one of two lengths the longer: twice that of their difference.
+pub(crate) const NEAR_TIE: f64 = 2.8;
+
 /// Four rows labelled A, B, C, D.
 pub(crate) type Quad = [u32; STARS];
 

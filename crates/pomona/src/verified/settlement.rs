@@ -11,17 +11,18 @@
 //!    the common pose as firmly as the clouds show that they move together.
 
 use super::cut::{Cell, Cut, key_of, surroundings, total};
-use super::displacement::{carried_on, shared_by_neighbours};
+use super::displacement::{carried_on, shared_by_neighbours, told_by_neighbours};
 use super::evidence::evidence;
 use super::growth::{Growth, Partner};
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
 use super::overlap::Overlap;
 use super::pairing::Marginals;
-use super::patches::{DRIFT, Footing, HOLD, SHARE_OF_CELLS, next_to};
+use super::patches::{Footing, HOLD, SHARE_OF_CELLS, next_to};
 use super::placement::Landing;
 use super::placement::{Moments, Placement};
 use super::scatter::{KnownNoise, scatter};
+use super::sight::is_among;
 use super::size::{Cue, Diameters};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
@@ -82,10 +83,6 @@ struct Settlement<'a> {
     predictions: Vec<Option<Landing>>,
     /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
     unseen: [&'a [bool]; 2],
-}
-
-fn is_among(rows: &[bool], row: usize) -> bool {
-    rows.get(row).is_some_and(|&told| told)
 }
 
 /// Settles what `growth` found; `noise_m` is the relative noise where it is known.
@@ -180,8 +177,6 @@ impl<'a> Settlement<'a> {
 
     fn prediction(&self, row: usize, [near, wide]: &[Footing; 2]) -> Landing {
         let p = self.query.points[row];
-        let away2 = wide.away2(&p);
-        let bent = if away2 > self.edge * self.edge { DRIFT * DRIFT * away2 } else { 0.0 };
         // The patch follows its surroundings in the measure in which it is held to them.
         let looseness = near.looseness(&p) + near.share_held(self.holds[0]) * wide.looseness(&p);
         let noise = self.sigma * self.sigma;
@@ -192,7 +187,7 @@ impl<'a> Settlement<'a> {
             let leverage = (weight * looseness).min(MAX_LEVERAGE);
             place -= residual * (leverage / (1.0 - leverage));
         }
-        Landing { place, variance: noise * (1.0 + looseness) + bent + unexplained }
+        Landing { place, variance: noise * (1.0 + looseness) + wide.bent(&p, self.edge) + unexplained }
     }
 
     /// Noise and share from the distances; the predictions' variances follow.
@@ -252,8 +247,7 @@ impl<'a> Settlement<'a> {
         self.fit(surroundings, self.holds[1]);
         self.holds[0] = self.hold(HOLDS);
         self.fit(next_to, self.holds[0]);
-        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
-        self.shared = if shared < 0.01 * self.sigma * self.sigma { 0.0 } else { shared };
+        self.shared = told_by_neighbours(self.query, self.sigma, |row| self.residual(row));
     }
 
     /// Mean partners by the probabilities, and their sums in every cell.

@@ -7,7 +7,7 @@
 use super::hypothesis::gaussian;
 use super::landscape::Landscape;
 use super::placement::Placement;
-use super::votes::axes_of;
+use super::votes::row_axes;
 use nalgebra::Vector3;
 
 /// A visit that shows less than this share of the other's fruits in a depth does not see there.
@@ -16,9 +16,14 @@ const LEAST: f64 = 0.1;
 /// Standard deviation of the depths over which fruits are counted, in spacings: 7 cm in an orchard.
 const WIDTH: f64 = 0.25;
 
+/// Whether a fruit is told to be one of some; of no fruits none is.
+pub(super) fn is_among(rows: &[bool], row: usize) -> bool {
+    rows.get(row).is_some_and(|&told| told)
+}
+
 /// Fruits of the query, and of the map, that hang where the other visit does not see; none where the map is no row.
 pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Placement) -> [Vec<bool>; 2] {
-    let Some(axes) = axes_of(map) else { return [vec![false; query.len()], vec![false; map.len()]] };
+    let Some(axes) = row_axes(map) else { return [vec![false; query.len()], vec![false; map.len()]] };
     let depth = |place: &Vector3<f64>| place.dot(&axes.column(2));
     let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.apply(p)).collect();
     // Trees that only one visit shows say nothing about how far the other sees.

@@ -3,14 +3,12 @@
 //! A generalised Hough transform. For each turn that the principal axes of two rows leave, the offsets of all fruits are
 //! counted in cells. Crowns on crowns raise whole regions of them; fruits on fruits raise one.
 
+use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::seeds::shuffled;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
-
-/// Fewer fruits have no principal axes to go by.
-const MIN_FRUITS: usize = 100;
 
 /// A row is so many times as long as it is high, and as high as it is deep, at the least: else the axes do not say which is
 /// which.
@@ -26,9 +24,6 @@ const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
 /// the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
 const ACROSS: (i32, f64) = (6, 0.044);
 const ALONG: (i32, f64) = (1, 0.07);
-
-/// Signs of the axes that principal axes leave open, those of turns.
-pub(super) const HALF_TURNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
 
 /// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
 const CELL: [f64; 3] = [0.45, 0.45, 0.6];
@@ -48,6 +43,9 @@ const OUTSTANDING: f64 = 4.0;
 
 /// Votes that a cell has at the least: a pair of clusters gives two.
 const LEAST_VOTES: u16 = 3;
+
+/// Cells that are asked at once whether any of them stands out.
+const AT_ONCE: usize = 32;
 
 /// Votes of a cell count four times, and those of the six next to it once.
 const WEIGHTS: f64 = 10.0;
@@ -81,10 +79,11 @@ struct Counts {
     cells: Vec<u16>,
     /// Sums of blocks, each a mean with those around.
     blocks: Vec<f32>,
-    /// For each line of blocks in depth, cell by cell: what the weighted votes in and next to a cell must exceed.
-    asked: Vec<u16>,
-    /// Votes of the lines of one such line of blocks together.
+    /// Votes of the lines in depth of a row of blocks together.
     line: Vec<u16>,
+    /// For a slab of cells across the row: their weighted votes, and what these must exceed.
+    weighted: Vec<u16>,
+    asked: Vec<u16>,
     /// Cells that one fruit votes for.
     voted: Vec<u32>,
 }
@@ -96,7 +95,7 @@ impl Rows {
         if query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
             return None;
         }
-        let axes = [axes_of(query)?, axes_of(map)?];
+        let axes = [row_axes(query)?, row_axes(map)?];
         let share = (MOST_PAIRS as f64 / pairs as f64).sqrt().min(1.0);
         let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
         let edges = Vector3::from(CELL) * map.spacing;
@@ -125,12 +124,13 @@ impl Rows {
     }
 
     fn no_counts(&self) -> Counts {
-        let ([_, _, deep], [along, up, _]) = (self.size, self.blocks);
+        let [_, high, deep] = self.size;
         Counts {
             cells: vec![0; self.size.iter().product::<usize>() + 1],
             blocks: vec![0.0; self.blocks.iter().product()],
-            asked: vec![0; along * up * deep],
             line: vec![0; deep],
+            weighted: vec![0; high * deep],
+            asked: vec![0; high * deep],
             voted: vec![0; self.map[0].len()],
         }
     }
@@ -138,20 +138,26 @@ impl Rows {
     fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<Peak> {
         self.count(turn, counts);
         self.sum_up(counts);
-        self.ask(counts);
         let [long, high, deep] = self.size;
         let mut peaks = Vec::new();
-        for (x, y) in (1..long - 1).flat_map(|x| (1..high - 1).map(move |y| (x, y))) {
-            let first = (x * high + y) * deep;
-            let asked = &counts.asked[(x / BLOCK[0] * self.blocks[1] + y / BLOCK[1]) * deep..][..deep];
-            if !self.stands_out(&counts.cells, first, asked) {
-                continue;
+        for x in 1..long - 1 {
+            if x == 1 || x.is_multiple_of(BLOCK[0]) {
+                self.ask(x, counts);
             }
-            for z in 1..deep - 1 {
-                let sum = self.weighted(&counts.cells, first + z);
-                if sum > asked[z] && counts.cells[first + z] >= LEAST_VOTES {
-                    let (height, offset) = self.height(counts, first + z, [x, y, z]);
-                    peaks.push(Peak { height, pose: self.placement(turn, &offset) });
+            self.weigh(x, counts);
+            let both = counts.weighted.chunks(AT_ONCE).zip(counts.asked.chunks(AT_ONCE));
+            // Hardly any stands out: what does is looked for among many at once.
+            let any = |(_, (sums, asked)): &(usize, (&[u16], &[u16]))| {
+                sums.iter().zip(*asked).fold(0, |over, (sum, asked)| over | sum.saturating_sub(*asked)) > 0
+            };
+            for (chunk, (sums, asked)) in both.enumerate().filter(any) {
+                for at in (0..sums.len()).filter(|&at| sums[at] > asked[at]).map(|at| chunk * AT_ONCE + at) {
+                    let [y, z] = [at / deep, at % deep];
+                    let inside = y > 0 && y + 1 < high && z > 0 && z + 1 < deep;
+                    if inside && counts.cells[x * high * deep + at] >= LEAST_VOTES {
+                        let (height, offset) = self.height(counts, [x, y, z]);
+                        peaks.push(Peak { height, pose: self.placement(turn, &offset) });
+                    }
                 }
             }
         }
@@ -199,49 +205,45 @@ impl Rows {
         }
     }
 
-    /// What cells must exceed to stand out of their blocks.
-    fn ask(&self, Counts { blocks, asked, .. }: &mut Counts) {
-        for (asked, blocks) in asked.chunks_exact_mut(self.size[2]).zip(blocks.chunks_exact(self.blocks[2])) {
-            for (asked, &sum) in asked.chunks_mut(BLOCK[2]).zip(blocks) {
+    /// What the cells of the slab at `x` must exceed to stand out of their blocks.
+    fn ask(&self, x: usize, Counts { blocks, asked, .. }: &mut Counts) {
+        let [_, up, back] = self.blocks;
+        let blocks = blocks[x / BLOCK[0] * up * back..].chunks_exact(back);
+        for (lines, blocks) in asked.chunks_mut(BLOCK[1] * self.size[2]).zip(blocks) {
+            let (first, others) = lines.split_at_mut(self.size[2]);
+            for (asked, &sum) in first.chunks_mut(BLOCK[2]).zip(blocks) {
                 let expected = expected(sum);
                 asked.fill((WEIGHTS * (expected + OUTSTANDING * (expected + LEAST_EXPECTED).sqrt())) as u16);
             }
+            others.chunks_exact_mut(first.len()).for_each(|line| line.copy_from_slice(first));
         }
     }
 
-    /// Whether any cell of the line in depth that begins at `first` may have more votes than are asked of it: of many cells
-    /// at once, for hardly any has.
-    fn stands_out(&self, cells: &[u16], first: usize, asked: &[u16]) -> bool {
+    /// Votes of the cells of the slab at `x`, four times, and of the six next to each; those of its rim mean
+    /// nothing, and where one cell has a fourth of all votes the clouds are no rows.
+    fn weigh(&self, x: usize, Counts { cells, weighted, .. }: &mut Counts) {
         let [_, high, deep] = self.size;
-        let most = deep - 2;
-        let line = |first: usize| &cells[first..][..most];
-        let (here, middle) = (line(first + 1), first + 1);
-        let around = [middle - 1, middle + 1, middle - deep, middle + deep, middle - high * deep, middle + high * deep];
-        let [a, b, c, d, e, f] = around.map(line);
-        let asked = &asked[1..][..most];
-        let mut over = 0;
-        for z in 0..most {
-            let next = [a[z], b[z], c[z], d[z], e[z], f[z]].into_iter().fold(0, u16::saturating_add);
-            let twice = here[z].saturating_add(here[z]);
-            over |= next.saturating_add(twice).saturating_add(twice).saturating_sub(asked[z]);
+        let (first, rim) = (x * high * deep, deep + 1);
+        let inner = high * deep - 2 * rim;
+        let at = |offset: usize| &cells[first + rim + offset - high * deep..][..inner];
+        let slab = high * deep;
+        let [here, a, b] = [at(slab), at(0), at(2 * slab)];
+        let [c, d, e, f] = [at(slab - deep), at(slab + deep), at(slab - 1), at(slab + 1)];
+        let sums = &mut weighted[rim..][..inner];
+        for i in 0..inner {
+            let next =
+                a[i].wrapping_add(b[i]).wrapping_add(c[i]).wrapping_add(d[i]).wrapping_add(e[i]).wrapping_add(f[i]);
+            sums[i] = here[i].wrapping_mul(4).wrapping_add(next);
         }
-        over > 0
-    }
-
-    /// Votes of a cell, four times, and of the six next to it.
-    fn weighted(&self, cells: &[u16], place: usize) -> u16 {
-        let [_, high, deep] = self.size;
-        let next = |stride: usize| cells[place - stride].saturating_add(cells[place + stride]);
-        let sum = [1, deep, high * deep].map(next).into_iter().fold(0, u16::saturating_add);
-        (0..4).fold(sum, |sum, _| sum.saturating_add(cells[place]))
     }
 
     /// Standard deviations by which a cell with its neighbours exceeds its surroundings, and the offset that it stands for.
-    fn height(&self, Counts { cells, blocks, .. }: &Counts, place: usize, at: [usize; 3]) -> (f64, Vector3<f64>) {
+    fn height(&self, Counts { cells, blocks, weighted, .. }: &Counts, at: [usize; 3]) -> (f64, Vector3<f64>) {
         let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
-        let sum = f64::from(self.weighted(cells, place));
+        let (slab, place) = (high * deep, (at[0] * high + at[1]) * deep + at[2]);
+        let sum = f64::from(weighted[place % slab]);
         let votes = |place: usize| f64::from(cells[place]);
-        let aside = Vector3::from([high * deep, deep, 1]).map(|stride| votes(place + stride) - votes(place - stride));
+        let aside = Vector3::from([slab, deep, 1]).map(|stride| votes(place + stride) - votes(place - stride));
         let [x, y, z] = [0, 1, 2].map(|i| at[i] / BLOCK[i]);
         let expected = expected(blocks[(x * up + y) * back + z]);
         let height = (sum / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
@@ -292,17 +294,11 @@ fn smooth(values: &mut [f32], stride: usize, count: usize) {
     }
 }
 
-/// Principal axes, the longest first, as a proper rotation; `None` where they are no row's.
-pub(super) fn axes_of(cloud: &Landscape) -> Option<Matrix3<f64>> {
-    let scatter = cloud.points.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose()) / cloud.len() as f64;
-    let eigen = scatter.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let extents = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-    let [along, up] = [order[0], order[1]].map(|i| eigen.eigenvectors.column(i).into_owned());
-    let axes = Matrix3::from_columns(&[along, up, along.cross(&up)]);
-    let told = extents[0] > LEAST_RATIO * extents[1] && extents[1] > LEAST_RATIO * extents[2];
-    (told && axes.iter().all(|x| x.is_finite())).then_some(axes)
+/// Axes of a row; `None` where they do not say which is which.
+pub(super) fn row_axes(cloud: &Landscape) -> Option<Matrix3<f64>> {
+    let (axes, extents) = axes_of(cloud)?;
+    let told = (0..2).all(|i| extents[i] > LEAST_RATIO * extents[i + 1]);
+    told.then_some(axes)
 }
 
 /// Standard deviation along an axis.

@@ -19,7 +19,7 @@ use crate::verified::codes::{Cells, Code};
 use crate::verified::landscape::{floor_of, spacing_of};
 use crate::verified::nearest::{Neighbours, SHARE_OF_ROWS, single};
 use crate::verified::seeds::{COMPANIONS, canonical, sets_of};
-use crate::verified::{SEED_SIGMA, shuffled};
+use crate::verified::{SEED_SIGMA, SHORTEST, shuffled};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -109,7 +109,7 @@ impl Seeds<'_> {
     fn of(&self, row: u32, mut visit: impl FnMut([u32; 4], Code)) {
         for set in sets_of(&|row| self.near(row), row) {
             let Some((quad, code)) = canonical(self.points, set) else { continue };
-            if f64::from(code[0]) >= 6.0 * SEED_SIGMA * self.spacing {
+            if f64::from(code[0]) >= SHORTEST * SEED_SIGMA * self.spacing {
                 visit(quad, in_steps(&code, self.step));
             }
         }

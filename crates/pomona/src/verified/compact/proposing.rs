@@ -10,7 +10,7 @@ use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::proposal::Proposer;
 use crate::verified::search::{Contender, Effort};
-use crate::verified::seeds::{Quad, Seed, enumerate, near_ties, shuffled};
+use crate::verified::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, enumerate, near_ties, shuffled};
 use rayon::prelude::*;
 
 /// Reach of the code search in standard deviations of one axis: a third less than where the map is small. It holds half of
@@ -63,14 +63,14 @@ impl Look {
 
 /// The looks that are worth it, of the least price first.
 pub(super) fn looks(query: &Landscape, shapes: &Shapes, model: &Model, step: f64) -> Vec<Look> {
-    let seeds = enumerate(query, 6.0 * model.sigma);
+    let seeds = enumerate(query, SHORTEST * model.sigma);
     let stride = seeds.len().div_ceil(CONSIDERED).max(1) as u64;
     let considered: Vec<Seed> =
         (0..).zip(seeds).filter(|&(at, _)| shuffled(at).is_multiple_of(stride)).map(|(_, seed)| seed).collect();
     let reach = shapes.reach(reach_in(shapes, model));
     let of_seed = |&(quad, _): &Seed| {
         let (mut found, mut labelings) = (Vec::new(), 0.0f32);
-        near_ties(&query.points, quad, 2.8 * model.sigma, &mut |quad, code: Code| {
+        near_ties(&query.points, quad, NEAR_TIE * model.sigma, &mut |quad, code: Code| {
             labelings += 1.0;
             let steps = in_steps(&code, step);
             if let (Some(shape), Some(crowd)) = (rounded(&steps), shapes.crowd(&steps)) {
