@@ -75,15 +75,29 @@ def lives_of(seen: NDArray[np.bool_], missing: NDArray[np.float64]) -> Lives:
     leaving = np.full(n_visits, SHARE_GONE)
     share_false = SHARE_FALSE
     false = np.where(is_single, SHARE_FALSE, 0.0)
+    # What the last visit saw hangs: nothing is open, and nothing of it is weighed.
+    is_open = last < n_visits - 1
+    open_first, open_last, open_hidden = first[is_open], last[is_open], hidden[is_open]
+    n_hanging = np.array([np.sum(~is_open & (first < visit)) for visit in range(n_visits)])
+    log_evidence = np.zeros(n_fruits)
     for _ in range(ROUNDS):
-        ends, log_evidence = _ends(leaving, first, last, hidden)
+        ends, log_evidence[is_open] = _ends(leaving, open_first, open_last, open_hidden)
+        log_evidence[~is_open] = _log_staying(leaving, first[~is_open])
         n_real = np.sum((1.0 - false) / seen_at_all)
         n_false_here = share_false * n_seen[first]
         n_real_here = n_real * np.exp(only_here + log_evidence)
         false = np.where(is_single, n_false_here / (n_false_here + n_real_here), 0.0)
         share_false = (false.sum() + BELIEF_FALSE * SHARE_FALSE) / (n_seen.sum() + BELIEF_FALSE)
-        leaving = _leaving(ends, first, 1.0 - false)
-    return Lives(gone=1.0 - ends[:, -1], false=false)
+        leaving = _leaving(ends, open_first, 1.0 - false[is_open], n_hanging)
+    gone = np.zeros(n_fruits)
+    gone[is_open] = 1.0 - ends[:, -1]
+    return Lives(gone=gone, false=false)
+
+
+def _log_staying(leaving: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return how likely fruits stay from the visit that saw them first to the last one, (K,), as logarithms."""
+    stayed = np.concatenate([[0.0], np.cumsum(np.log1p(-leaving))])
+    return np.asarray(stayed[-1] - stayed[first + 1])
 
 
 def _ends(
@@ -101,13 +115,17 @@ def _ends(
     return weights / total, (most + np.log(total))[:, 0]
 
 
-def _leaving(ends: NDArray[np.float64], first: NDArray[np.int64], real: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the share of the fruits there that go before each visit, (V,)."""
+def _leaving(
+    ends: NDArray[np.float64], first: NDArray[np.int64], real: NDArray[np.float64], n_hanging: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the share of the fruits there that go before each visit, (V,); others hang for sure, so many, (V,)."""
     n_visits = ends.shape[1] - 1
     leaving = np.full(n_visits, SHARE_GONE)
+    # Of each fruit, that it goes before a visit or later.
+    still = np.cumsum(ends[:, ::-1], axis=1)[:, ::-1]
     for visit in range(1, n_visits):
         known = (first < visit) * real
-        n_going, n_there = known @ ends[:, visit], known @ ends[:, visit:].sum(axis=1)
+        n_going, n_there = known @ ends[:, visit], known @ still[:, visit] + n_hanging[visit]
         leaving[visit] = (n_going + BELIEF_GONE * SHARE_GONE) / (n_there + BELIEF_GONE)
     return leaving
 
