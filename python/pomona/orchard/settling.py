@@ -179,7 +179,7 @@ def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[NDArray[n
 
 
 def _write_fruits(connection: sqlite3.Connection, rows: dict[int, FruitRow], known: set[int]) -> None:
-    """Write fruits that are new or another than before; the place, which the spatial index follows, where it changed."""
+    """Write fruits that are new or another than before; the place, which an index follows, only where it moved."""
     names = (
         "id", "geom", "state", "last_seen", "last_session_id", "n_sessions", "n_missed", "diameter_m",
         "state_probability", "fruit_probability",
