@@ -10,6 +10,7 @@ import pytest
 from pomona import _core
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
 from pomona.identity.links import links_of
+from pomona.identity.looks import quantile_of_rows
 from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.places import looked_at, towards_camera
 from pomona.identity.sizes import size_log_odds
@@ -205,6 +206,13 @@ def test_places_of_own_fruits_are_asked_as_all_others() -> None:
         np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(fruits.spacings_m(4), fruits.nearest(fruits.positions, 4)[0][:, 3])
     assert np.isinf(NearFruits(places).spacings_m(6)).all()
+
+
+@pytest.mark.parametrize("n_around", [1, 2, 7, 25])
+def test_the_quantile_of_rows_is_that_of_numpy(n_around: int) -> None:
+    counts = np.random.default_rng(n_around).integers(0, 9, (300, n_around))
+    for share in (0.85, 0.5, 0.1):
+        np.testing.assert_array_equal(quantile_of_rows(counts, share), np.quantile(counts, share, axis=1))
 
 
 @pytest.mark.parametrize("n_visits", [1, 2])

@@ -244,6 +244,13 @@ mod tests {
     }
 
     #[test]
+    fn every_bit_of_a_mask_is_told_once() {
+        let mask = [1 << 63 | 0b1001, 0, u64::MAX];
+        let told: Vec<usize> = bits(&mask).collect();
+        assert_eq!(told, [0, 3, 63].into_iter().chain(128..192).collect::<Vec<_>>());
+    }
+
+    #[test]
     fn numbers_that_name_nothing_are_refused() {
         let wrong = |links: &[[usize; 2]], log_odds: &[f64]| {
             contracted(&Evidence { visits: &[0, 1], n_visits: 2, links, log_odds, matched: &[] }).is_err()
