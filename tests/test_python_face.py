@@ -78,7 +78,7 @@ def test_clouds_made_ready_once_are_matched_as_if_they_were_not() -> None:
         np.testing.assert_array_equal(found.pairs, expected.pairs)
         np.testing.assert_array_equal(found.probabilities, expected.probabilities)
         np.testing.assert_array_equal(found.map_from_query, expected.map_from_query)
-    with pytest.raises(PomonaError, match="cloud: "):
+    with pytest.raises(PomonaError, match="threads: found 0, expected a whole number from 1"):
         ReadyCloud(visits[0], threads=0)
 
 
