@@ -45,7 +45,11 @@ def _search(draw: Drawn) -> None:
     query, noise_m = cloud(draw), draw.choice(None, None, draw.positive())
     if draw.choice(False, False, False, True):
         found = _core.match_expected(
-            query, cloud(draw), map_from_query=draw.pose(), config=draw.config(), noise_m=noise_m, threads=1
+            *map(_core.ReadyCloud, (query, cloud(draw))),
+            map_from_query=draw.pose(),
+            config=draw.config(),
+            noise_m=noise_m,
+            threads=1,
         )
     elif draw.choice(False, False, True):
         found = index.pairs_under(query, map_from_query=draw.pose(), noise_m=noise_m)

@@ -27,6 +27,10 @@ def test_a_list_of_points_is_a_cloud() -> None:
         ({"covariances": np.zeros((2, 3))}, "covariances: found shape (2, 3), expected (2, 3, 3)"),
         ({"covariances": [np.eye(3), -np.eye(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),
         ({"covariances": [np.eye(3), np.tri(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),
+        (
+            {"covariances": [np.eye(3), [[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]]]},
+            "covariances: row 1 is not symmetric positive semi-definite",
+        ),
         ({"n_views": [1]}, "n_views: found shape (1), expected (2)"),
         ({"views": Views(np.array([0]), np.array([2]))}, "views.fruits: a sighting names a row outside 0..1"),
         ({"extras": {"note": ("a",)}}, "note: found 1 values, expected 2, one a fruit"),
@@ -36,6 +40,13 @@ def test_refuses_in_one_line(wrong: dict[str, object], line: str) -> None:
     with pytest.raises(PomonaError) as caught:
         FruitCloud(**{"positions": np.zeros((2, 3)), **wrong})  # type: ignore[arg-type]
     assert str(caught.value) == line
+
+
+def test_covariances_may_be_flat() -> None:
+    """Along one ray, in one plane, or none at all."""
+    ray = np.array([0.6, 0.8, 0.0])
+    flat = [np.outer(ray, ray), np.diag([1.0, 1.0, 0.0]), np.zeros((3, 3))]
+    assert len(FruitCloud(np.zeros((3, 3)), covariances=np.array(flat))) == 3
 
 
 def test_views_of_unequal_length_are_refused() -> None:

@@ -11,6 +11,8 @@ from pomona import _core
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
 from pomona.identity.links import links_of
 from pomona.identity.lives import SHARE_FALSE
+from pomona.identity.looks import quantile_of_rows
+from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.places import looked_at, towards_camera
 from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import all_sights
@@ -179,8 +181,9 @@ def test_cameras_tell_where_a_visit_looked_and_from_where() -> None:
     own = places[places[:, 0] < 3.0]
     seeing = visit(0, own, cameras=cameras)
     asked = np.array([[1.5, 0.4, 1.5], [5.5, 0.4, 1.5], [1.5, -2.5, 1.5]])
-    assert looked_at(seeing, own, asked, np.full(3, 0.2)).tolist() == [True, False, False]
-    towards = towards_camera(seeing, own, np.eye(3), asked[:1])
+    of_visit = AskedPlaces(asked, NearFruits(own), np.full(3, -1))
+    assert looked_at(seeing, of_visit, np.full(3, 0.2)).tolist() == [True, False, False]
+    towards = towards_camera(seeing, of_visit, np.eye(3))
     np.testing.assert_allclose(towards[0], (0, -1, 0), atol=1e-9)
 
 
@@ -190,10 +193,28 @@ def test_lines_of_sight_tell_the_side_where_there_are_no_cameras() -> None:
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     covariances = 1e-4 * (np.eye(3) + 3.0 * rays[:, :, None] * rays[:, None])
     seeing = visit(0, places, covariances=covariances)
-    towards = towards_camera(seeing, places, np.eye(3), places[:20])
+    of_visit = AskedPlaces(places[:20], NearFruits(places), np.arange(20))
+    towards = towards_camera(seeing, of_visit, np.eye(3))
     assert (towards[:, 1] < -0.7).all()
     blind = visit(0, places, covariances=np.tile(1e-4 * np.eye(3), (200, 1, 1)))
-    assert np.isnan(towards_camera(blind, places, np.eye(3), places[:20])).all()
+    assert np.isnan(towards_camera(blind, of_visit, np.eye(3))).all()
+
+
+def test_places_of_own_fruits_are_asked_as_all_others() -> None:
+    fruits = NearFruits(row(60))
+    places = np.concatenate([fruits.positions[[4, 9]], fruits.positions[:3] + 0.07])
+    told = AskedPlaces(places, fruits, np.array([4, 9, -1, -1, -1]))
+    for found, expected in zip(told.nearest, fruits.nearest(places, 25), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(fruits.spacings_m(4), fruits.nearest(fruits.positions, 4)[0][:, 3])
+    assert np.isinf(NearFruits(places).spacings_m(6)).all()
+
+
+@pytest.mark.parametrize("n_around", [1, 2, 7, 25])
+def test_the_quantile_of_rows_is_that_of_numpy(n_around: int) -> None:
+    counts = np.random.default_rng(n_around).integers(0, 9, (300, n_around))
+    for share in (0.85, 0.5, 0.1):
+        np.testing.assert_array_equal(quantile_of_rows(counts, share), np.quantile(counts, share, axis=1))
 
 
 @pytest.mark.parametrize("n_visits", [1, 2])

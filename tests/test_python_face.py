@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import pomona
 from pomona import FruitCloud, Index, Match, OrchardMap, PomonaError
-from pomona.matching import match_expected
+from pomona.matching import ReadyCloud, match_expected
 from pomona.synth.clouds import scene_pair
 from pomona.synth.planting import grow_row
 
@@ -64,6 +64,22 @@ def test_an_expected_pose_saves_the_search_and_changes_nothing_of_what_is_found(
     assert not match_expected(query, map, aside)
     with pytest.raises(PomonaError, match=r"map_from_query: found an array of shape \(3, 3\), expected \(4, 4\)"):
         match_expected(query, map, np.eye(3))
+
+
+def test_clouds_made_ready_once_are_matched_as_if_they_were_not() -> None:
+    rng = np.random.default_rng(6)
+    row = grow_row(rng, 4).positions
+    visits = [row[rng.random(len(row)) < 0.8] + rng.normal(0, 0.006, 3) for _ in range(3)]
+    ready = [ReadyCloud(places, threads=1) for places in visits]
+    for one, other in ((0, 1), (1, 0), (2, 0), (2, 1)):
+        found, expected = (match_expected(sides[one], sides[other], np.eye(4)) for sides in (ready, visits))
+        assert found
+        assert found.n_query == len(visits[one])
+        np.testing.assert_array_equal(found.pairs, expected.pairs)
+        np.testing.assert_array_equal(found.probabilities, expected.probabilities)
+        np.testing.assert_array_equal(found.map_from_query, expected.map_from_query)
+    with pytest.raises(PomonaError, match="threads: found 0, expected a whole number from 1"):
+        ReadyCloud(visits[0], threads=0)
 
 
 def test_a_file_of_unknown_scale_is_read_as_it_is(visits: tuple[Path, Path], tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ __all__ = [
     "MapIndex",
     "Match",
     "Odometry",
+    "ReadyCloud",
     "RowScene",
     "Tracker",
     "Tracks",
@@ -110,9 +111,13 @@ class MapIndex:
         self, query: _Arrays, *, map_from_query: list[list[float]], noise_m: float | None = None
     ) -> Match: ...
 
+@final
+class ReadyCloud:
+    def __new__(cls, cloud: _Arrays, *, threads: int | None = None) -> ReadyCloud: ...
+
 def match_expected(
-    query: _Arrays,
-    map: _Arrays,
+    query: ReadyCloud,
+    map: ReadyCloud,
     *,
     map_from_query: list[list[float]],
     config: str,

@@ -31,6 +31,7 @@ __all__ = [
     "are_points",
     "connect",
     "create",
+    "joined_points",
     "line",
     "points",
     "points_of",
@@ -265,12 +266,18 @@ def points_of(blobs: Sequence[bytes]) -> NDArray[np.float64]:
 
 def are_points(blobs: Sequence[bytes]) -> bool:
     """Tell whether all geometries are points as `points` encodes them, with finite coordinates."""
-    if any(size != POINT_Z.itemsize for size in set(map(len, blobs))):
-        return False
-    decoded = np.frombuffer(b"".join(blobs), dtype=POINT_Z)
+    return set(map(len, blobs)) <= {POINT_Z.itemsize} and joined_points(b"".join(blobs)) is not None
+
+
+def joined_points(whole: bytes) -> NDArray[np.float64] | None:
+    """Decode points, one after the other, to (N, 3); None where one is not as `points` encodes it, or not finite."""
+    if len(whole) % POINT_Z.itemsize:
+        return None
+    decoded = np.frombuffer(whole, dtype=POINT_Z)
     ours = (decoded["magic"] == b"GP") & (decoded["flags"] == LITTLE_ENDIAN) & (decoded["wkb_type"] == WKB_POINT_Z)
     ours &= decoded["wkb_order"] == LITTLE_ENDIAN
-    return bool(ours.all() and np.isfinite(decoded["xyz"]).all())
+    places = decoded["xyz"].astype(np.float64)
+    return places if ours.all() and np.isfinite(places).all() else None
 
 
 @lru_cache(maxsize=1)

@@ -327,9 +327,39 @@ def match(
     return replace(found, elapsed_s=time.perf_counter() - start)
 
 
+class ReadyCloud:
+    """A cloud made ready once for several of `match_expected`, as the query or as the map.
+
+    Parameters
+    ----------
+    cloud
+        A cloud, (N, 3) metres, or the name of a file with one.
+    threads
+        As for `match`.
+
+    Raises
+    ------
+    PomonaError
+        An array is wrong.
+    """
+
+    def __init__(self, cloud: Cloud, *, threads: int | None = None) -> None:
+        self.cloud = as_cloud(cloud, "m")
+        try:
+            self._core = _core.ReadyCloud(core_arrays(self.cloud), threads=capped_threads(threads))
+        except (ValueError, TypeError, OverflowError) as error:
+            raise PomonaError(f"cloud: {error}") from None
+
+    def __len__(self) -> int:
+        return len(self.cloud)
+
+    def __repr__(self) -> str:
+        return f"ReadyCloud({amount(len(self), 'fruit')})"
+
+
 def match_expected(
-    query: Cloud,
-    map: Cloud,
+    query: Cloud | ReadyCloud,
+    map: Cloud | ReadyCloud,
     map_from_query: ArrayLike,
     *,
     noise_m: float | None = None,
@@ -344,7 +374,7 @@ def match_expected(
     Parameters
     ----------
     query, map, noise_m, config, threads
-        As for `match`, in metres.
+        As for `match`, in metres; clouds that are asked about several times may be made ready once.
     map_from_query
         (4, 4), without a scale.
 
@@ -357,11 +387,13 @@ def match_expected(
     pose = np.asarray(map_from_query, np.float64)
     if pose.shape != (4, 4):
         raise PomonaError(f"map_from_query: found an array of shape {pose.shape}, expected (4, 4)")
-    clouds = as_cloud(query, "m"), as_cloud(map, "m")
+    asked, known = (
+        side if isinstance(side, ReadyCloud) else ReadyCloud(side, threads=threads) for side in (query, map)
+    )
     try:
         found = _core.match_expected(
-            core_arrays(clouds[0]),
-            core_arrays(clouds[1]),
+            asked._core,
+            known._core,
             map_from_query=pose.tolist(),
             config=core_settings(config),
             noise_m=noise_m,
@@ -369,7 +401,7 @@ def match_expected(
         )
     except (ValueError, TypeError, OverflowError) as error:
         raise PomonaError(f"match: {error}") from None
-    return _told(found, len(clouds[0]), len(clouds[1]), start)
+    return _told(found, len(asked), len(known), start)
 
 
 def default_config() -> dict[str, Any]:

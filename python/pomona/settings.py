@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pomona.cloud import FruitCloud
-    from pomona.matching import Match
+    from pomona.matching import Match, ReadyCloud
 
 # Table of the file that holds what `pomona.match` is told by name; the other tables are the core's.
 _CALL_TABLE = "match"
@@ -77,16 +77,25 @@ class Settings:
 
         return match(query, map, **self.call, config=self.overrides)
 
-    def match_expected(self, query: FruitCloud, map: FruitCloud, map_from_query: NDArray[np.float64]) -> Match:
+    def ready(self, cloud: FruitCloud) -> FruitCloud | ReadyCloud:
+        """Make a cloud ready for several of `match_expected`, where these settings have a use for it."""
+        from pomona.matching import ReadyCloud
+
+        return ReadyCloud(cloud, threads=self.call["threads"]) if self._takes_expectations else cloud
+
+    def match_expected(
+        self, query: FruitCloud | ReadyCloud, map: FruitCloud | ReadyCloud, map_from_query: NDArray[np.float64]
+    ) -> Match:
         """Run `pomona.match` with these settings where the pose is known to a few decimetres."""
-        from pomona.matching import match_expected
+        from pomona.matching import ReadyCloud, match_expected
 
         if self._takes_expectations:
             named = {name: self.call[name] for name in ("noise_m", "threads")}
             found = match_expected(query, map, map_from_query, **named, config=self.overrides)
             if found:
                 return found
-        return self.match(query, map)
+        clouds = (side.cloud if isinstance(side, ReadyCloud) else side for side in (query, map))
+        return self.match(*clouds)
 
     @property
     def _takes_expectations(self) -> bool:

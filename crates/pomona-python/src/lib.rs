@@ -23,6 +23,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;
+    module.add_class::<matching::PyReadyCloud>()?;
     module.add_class::<localization::PyLocalization>()?;
     module.add_class::<localization::PyLocalizer>()?;
     module.add_class::<odometry::PyLooking>()?;

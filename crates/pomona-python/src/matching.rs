@@ -5,7 +5,7 @@ use memmap2::{Mmap, MmapOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
 use pomona::verified::compact::Bytes;
-use pomona::{Config, MapIndex, Match, Method, Scale, Similarity, Verdict};
+use pomona::{Config, MapIndex, Match, Method, ReadyCloud, Scale, Similarity, Verdict};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::HashMap;
@@ -208,14 +208,35 @@ impl PyMapIndex {
     }
 }
 
+/// A cloud made ready for several matches where it is expected.
+#[pyclass(name = "ReadyCloud", module = "pomona._core", frozen)]
+pub struct PyReadyCloud(ReadyCloud);
+
+#[pymethods]
+#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+impl PyReadyCloud {
+    #[new]
+    #[pyo3(signature = (cloud, *, threads=None))]
+    fn new(py: Python<'_>, cloud: Arrays<'_>, threads: Option<usize>) -> PyResult<Self> {
+        let pool = threads.map(pool_of).transpose()?;
+        let cloud = cloud.to_cloud()?;
+        let make = || ReadyCloud::new(&cloud);
+        let made = py.detach(|| match &pool {
+            Some(pool) => pool.install(make),
+            None => make(),
+        });
+        made.map(Self).map_err(wrong)
+    }
+}
+
 /// Pairs of two clouds whose pose is known to a few decimetres.
 #[pyfunction]
 #[pyo3(signature = (query, map, *, map_from_query, config, noise_m=None, threads=None))]
 #[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
 pub fn match_expected(
     py: Python<'_>,
-    query: Arrays<'_>,
-    map: Arrays<'_>,
+    query: PyRef<'_, PyReadyCloud>,
+    map: PyRef<'_, PyReadyCloud>,
     map_from_query: [[f64; 4]; 4],
     config: &str,
     noise_m: Option<f64>,
@@ -223,10 +244,10 @@ pub fn match_expected(
 ) -> PyResult<PyMatch> {
     let config = config_of(config)?;
     let pool = threads.map(pool_of).transpose()?;
-    let (query, map) = (query.to_cloud()?, map.to_cloud()?);
+    let (query, map) = (&query.0, &map.0);
     let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
     let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
-    let search = || pomona::match_expected(&query, &map, &pose, noise_m, &config);
+    let search = || pomona::match_expected(query, map, &pose, noise_m, &config);
     let found = py.detach(|| match &pool {
         Some(pool) => pool.install(search),
         None => search(),

@@ -95,7 +95,7 @@ pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
 pub use localization::{Localization, Localizer};
-pub use matching::{MapIndex, Method, Request, match_clouds, match_expected};
+pub use matching::{MapIndex, Method, ReadyCloud, Request, match_clouds, match_expected};
 pub use pose::Pose;
 pub use verified::VerifiedConfig;
 

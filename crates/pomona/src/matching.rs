@@ -6,6 +6,7 @@ use crate::conditioning::Conditioned;
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
+use crate::verified::VerifiedMap;
 use crate::verified::compact::{self, Bytes, CompactMap};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -52,7 +53,7 @@ enum PreparedMap {
     /// Fewer fruits than a constellation of the paper.
     TooFew,
     Paper(Box<crate::paper::PaperMap>),
-    Verified(Box<crate::verified::VerifiedMap>),
+    Verified(Box<VerifiedMap>),
     Compact(Box<CompactMap>),
 }
 
@@ -74,7 +75,7 @@ impl MapIndex {
                     Scale::Free => Err(too_many(fruits.len(), crate::verified::MAX_FRUITS)),
                 };
             }
-            Method::Verified => PreparedMap::Verified(Box::new(crate::verified::VerifiedMap::new(fruits, scale))),
+            Method::Verified => PreparedMap::Verified(Box::new(VerifiedMap::new(fruits, scale))),
             Method::Paper if fruits.len() < config.constellation.k => PreparedMap::TooFew,
             Method::Paper => PreparedMap::Paper(Box::new(crate::paper::PaperMap::new(&fruits.positions, &config)?)),
         };
@@ -252,30 +253,49 @@ pub fn match_clouds(query: &FruitCloud, map: &FruitCloud, request: &Request, con
     MapIndex::new(map, request.method, request.scale, *config)?.answer(query, request)
 }
 
+/// A cloud in metres made ready once for several matches where it is expected, as the query or as the map.
+#[derive(Debug)]
+pub struct ReadyCloud {
+    given: Conditioned,
+    prepared: VerifiedMap,
+}
+
+impl ReadyCloud {
+    /// Prepares a cloud.
+    ///
+    /// # Errors
+    /// A cloud that is wrong.
+    pub fn new(cloud: &FruitCloud) -> Result<Self> {
+        cloud.validate()?;
+        let given = Conditioned::new(cloud, Scale::Metric);
+        let prepared = VerifiedMap::without_seeds(&given.cloud);
+        Ok(Self { given, prepared })
+    }
+}
+
 /// Which fruit of `query` is which fruit of `map`, where the pose is known to a few decimetres: as the verified method
 /// says it, at half the cost. `NoMatch` where that leaves any doubt, as it does where little is shared: then search.
 ///
 /// # Errors
-/// A cloud, a value or a setting that is wrong.
+/// A value or a setting that is wrong.
 pub fn match_expected(
-    query: &FruitCloud,
-    map: &FruitCloud,
+    query: &ReadyCloud,
+    map: &ReadyCloud,
     map_from_query: &Similarity,
     noise_m: Option<f64>,
     config: &Config,
 ) -> Result<Match> {
-    query.validate()?;
-    map.validate()?;
     config.validate()?;
-    let [query, map] = [query, map].map(|cloud| Conditioned::new(cloud, Scale::Metric));
+    let [(query, query_ready), (map, map_ready)] = [query, map].map(|ready| (&ready.given, &ready.prepared));
     let request = Request { noise_m: map.noise(noise_m)?, ..Request::default() };
     request.validate()?;
-    if !map.is_comparable(&query) {
+    if !map.is_comparable(query) {
         return Ok(Match::without_answer(Verdict::NoMatch, Vec::new()));
     }
-    let pose = map.conditioned_pose(&query, map_from_query);
-    let found = crate::verified::search_expected(&map.cloud, &query.cloud, &pose, &request, &config.verified);
-    Ok(map.restored(&query, found))
+    let pose = map.conditioned_pose(query, map_from_query);
+    let sides = [(query_ready, &query.cloud), (map_ready, &map.cloud)];
+    let found = crate::verified::search_expected(sides, &pose, &request, &config.verified);
+    Ok(map.restored(query, found))
 }
 
 #[cfg(test)]

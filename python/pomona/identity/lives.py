@@ -123,25 +123,33 @@ def _ends(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return probabilities of going before each visit, the last column for never, (K, V + 1); and log evidence."""
     n_fruits, n_visits = logs_missing.shape
-    hidden = np.zeros((n_fruits, n_visits + 1))
-    hidden[:, 1:] = np.cumsum(np.where(np.arange(n_visits) > last[:, None], logs_missing, 0.0), axis=1)
     stayed = np.concatenate([[0.0], np.cumsum(np.log1p(-leaving))])
-    logs = hidden + stayed - stayed[first + 1][:, None]
+    # What the last visit saw hangs.
+    ends, log_evidence = np.zeros((n_fruits, n_visits + 1)), stayed[-1] - stayed[first + 1]
+    ends[:, -1] = 1.0
+    is_open = last < n_visits - 1
+    hidden = np.zeros((np.count_nonzero(is_open), n_visits + 1))
+    unseen = np.arange(n_visits + 1) > last[is_open, None]
+    np.cumsum(np.where(unseen[:, :-1], logs_missing[is_open], 0.0), axis=1, out=hidden[:, 1:])
+    logs = hidden + stayed - stayed[first[is_open] + 1][:, None]
     logs[:, :n_visits] += np.log(leaving)
-    logs = np.where(np.arange(n_visits + 1) > last[:, None], logs, -np.inf)
-    most = logs.max(axis=1, keepdims=True)
+    logs = np.where(unseen, logs, -np.inf)
+    most = logs.max(axis=1, keepdims=True, initial=-np.inf)
     weights = np.exp(logs - most)
     total = weights.sum(axis=1, keepdims=True)
-    return weights / total, (most + np.log(total))[:, 0]
+    ends[is_open], log_evidence[is_open] = weights / total, (most + np.log(total))[:, 0]
+    return ends, log_evidence
 
 
 def _leaving(ends: NDArray[np.float64], first: NDArray[np.int64], real: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the share of the fruits there that go before each visit, (V,)."""
     n_visits = ends.shape[1] - 1
     leaving = np.full(n_visits, SHARE_GONE)
+    # Of each fruit, that it goes before a visit or later.
+    still = np.cumsum(ends[:, ::-1], axis=1)[:, ::-1]
     for visit in range(1, n_visits):
         known = (first < visit) * real
-        n_going, n_there = known @ ends[:, visit], known @ ends[:, visit:].sum(axis=1)
+        n_going, n_there = known @ ends[:, visit], known @ still[:, visit]
         leaving[visit] = (n_going + BELIEF_GONE * SHARE_GONE) / (n_there + BELIEF_GONE)
     return leaving
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.places import looked_at, surroundings_of, towards_camera
 from pomona.identity.visits import SeenVisit, Sights
 
-__all__ = ["SHARES_OF_VIEWS", "Looks", "looks_of", "visibility_classes"]
+__all__ = ["SHARES_OF_VIEWS", "Looks", "looks_of", "quantile_of_rows", "visibility_classes"]
 
 SAME_SIDE = 0.5
 """Cosine of the angle between two looks at a fruit, 60 degrees, under which one tells of the other."""
@@ -55,7 +56,8 @@ def looks_of(
     frames: NDArray[np.float64],
 ) -> Looks:
     """Find out where each visit looked; `positions`, (S, 3), and `frames`, (V, 4, 4), are in and into the map."""
-    around = surroundings_of(sights, labels, positions)
+    fruits = [NearFruits(own) for own in np.split(positions, sights.starts[1:])]
+    around = surroundings_of(sights, labels, positions, fruits)
     places = around.places
     seen = np.zeros(places.shape[:2], bool)
     seen[labels, sights.visits] = True
@@ -64,11 +66,14 @@ def looks_of(
         own = np.flatnonzero(sights.visits == number)
         if not len(own):
             continue
+        rows = np.full(len(places), -1)
+        rows[labels[own]] = np.arange(len(own))
+        asked = AskedPlaces(places[:, number], fruits[number], rows)
         scale = np.cbrt(np.linalg.det(frames[number, :3, :3]))
         in_map = _with_cameras_in_map(visit, frames[number], scale)
-        in_view[:, number] |= looked_at(in_map, positions[own], places[:, number], around.spacings_m[:, number])
-        towards[:, number] = towards_camera(in_map, positions[own], frames[number, :3, :3] / scale, places[:, number])
-        views[labels[own], number] = _shares_of_views(visit.n_views, positions[own])
+        in_view[:, number] |= looked_at(in_map, asked, around.spacings_m[:, number])
+        towards[:, number] = towards_camera(in_map, asked, frames[number, :3, :3] / scale)
+        views[labels[own], number] = _shares_of_views(visit.n_views, fruits[number])
     return Looks(seen, in_view, views, towards)
 
 
@@ -82,16 +87,23 @@ def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], 
     return replace(visit, cameras=cameras)
 
 
-def _shares_of_views(n_views: NDArray[np.int64] | None, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shares_of_views(n_views: NDArray[np.int64] | None, fruits: NearFruits) -> NDArray[np.float64]:
     """Return ranks, 0 to 1, of the views of each fruit against those around it; the middle where nobody counted."""
-    from scipy.spatial import cKDTree
-
-    n = len(positions)
     if n_views is None:
-        return np.full(n, 0.5)
-    around = cKDTree(positions).query(positions, k=list(range(1, min(AROUND, n) + 1)))[1]
-    possible = np.maximum(np.quantile(n_views[around], MOST_VIEWS, axis=1), 1.0)
-    return _ranks(n_views / possible) / n
+        return np.full(len(fruits), 0.5)
+    possible = np.maximum(quantile_of_rows(n_views[fruits.rows(AROUND)], MOST_VIEWS), 1.0)
+    return _ranks(n_views / possible) / len(fruits)
+
+
+def quantile_of_rows(counts: NDArray[np.int64], share: float) -> NDArray[np.float64]:
+    """Return a quantile of each row, as `np.quantile` does at six times the cost."""
+    place = (counts.shape[1] - 1) * share
+    low = int(place)
+    high = min(low + 1, counts.shape[1] - 1)
+    ordered = np.partition(counts, (low, high), axis=1)
+    least, most = ordered[:, low].astype(np.float64), ordered[:, high]
+    part = place - low
+    return np.asarray(least + (most - least) * part if part < 0.5 else most - (most - least) * (1.0 - part))
 
 
 def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.visits import SeenVisit, Sights
 
 __all__ = ["Surroundings", "looked_at", "on_days", "surroundings_of", "towards_camera"]
@@ -45,57 +47,48 @@ class Surroundings:
     spacings_m: NDArray[np.float64]
 
 
-def surroundings_of(sights: Sights, labels: NDArray[np.int64], positions: NDArray[np.float64]) -> Surroundings:
-    """Return the surroundings by the sight of each fruit that is nearest in order; `positions` of sights, (S, 3)."""
-    spacings_m = np.concatenate(
-        [_spacings_m(own, own, NEIGHBOURS + 1) for own in np.split(positions, sights.starts[1:])]
-    )
-    return Surroundings(on_days(sights, labels, positions), on_days(sights, labels, spacings_m))
+def surroundings_of(
+    sights: Sights, labels: NDArray[np.int64], positions: NDArray[np.float64], fruits: Sequence[NearFruits]
+) -> Surroundings:
+    """Return the surroundings by the sight of each fruit that is nearest in order.
+
+    `positions` are those of the sights, (S, 3); `fruits` the same, visit by visit.
+    """
+    spacings_m = np.concatenate([own.spacings_m(NEIGHBOURS + 1) for own in fruits])
+    told = on_days(sights, labels)
+    return Surroundings(positions[told], spacings_m[told])
 
 
-def on_days(sights: Sights, labels: NDArray[np.int64], of_sights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what sights, (S, ...), tell of each fruit on each day, (K, V, ...): the one nearest in order."""
+def on_days(sights: Sights, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the sight that tells of each fruit on each day, (K, V): the one nearest in order."""
     n_fruits, n_visits = int(labels.max(initial=-1)) + 1, len(sights.starts)
-    is_seen = np.zeros((n_fruits, n_visits), bool)
-    is_seen[labels, sights.visits] = True
-    seen = np.zeros((n_fruits, n_visits, *of_sights.shape[1:]))
-    seen[labels, sights.visits] = of_sights
-    told, is_told = seen.copy(), is_seen.copy()
+    seen = np.full((n_fruits, n_visits), -1)
+    seen[labels, sights.visits] = np.arange(len(labels))
+    told = seen.copy()
     for visit in range(n_visits):
         for other in sorted(range(n_visits), key=lambda other: (abs(other - visit), other)):
-            now = ~is_told[:, visit] & is_seen[:, other]
-            told[now, visit] = seen[now, other]
-            is_told[now, visit] = True
+            told[:, visit] = np.where(told[:, visit] < 0, seen[:, other], told[:, visit])
     return told
 
 
-def looked_at(
-    visit: SeenVisit, own: NDArray[np.float64], places: NDArray[np.float64], spacings_m: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell at which places, (K, 3), a visit looked; `own` are its fruits, (N, 3), in the same frame.
+def looked_at(visit: SeenVisit, asked: AskedPlaces, spacings_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell at which places, (K,), a visit looked.
 
     By its cameras where it has them and they explain its own fruits: one came as straight before the place as before
     most of the fruits that it saw, and as near. Else by its fruits around the place, which are as near as they ever
     were, (K,), or as the visit's fruits are to one another.
     """
+    own, places = asked.fruits, asked.places
     if visit.cameras is not None and len(visit.cameras):
-        widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in _straightest(visit.cameras, own))
+        straightest = _straightest(visit.cameras, own.positions)
+        widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in straightest)
         if np.isfinite(widest):
             tangents, depths_m = _straightest(visit.cameras, places)
             return np.asarray((tangents <= widest) & (depths_m <= farthest_m))
     if len(own) <= NEIGHBOURS:
         return np.zeros(len(places), bool)
-    usual_m = np.quantile(_spacings_m(own, own, NEIGHBOURS + 1), AS_MOST)
-    return np.asarray(_spacings_m(own, places, NEIGHBOURS) <= np.maximum(usual_m, NEAR * spacings_m))
-
-
-def _spacings_m(own: NDArray[np.float64], places: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return how near the so manieth of a visit's fruits is to each place, (K,); infinite where there are fewer."""
-    from scipy.spatial import cKDTree
-
-    if not len(own):
-        return np.full(len(places), np.inf)
-    return np.asarray(cKDTree(own).query(places, k=[count])[0]).reshape(-1)
+    usual_m = np.quantile(own.spacings_m(NEIGHBOURS + 1), AS_MOST)
+    return np.asarray(asked.nearest[0][:, NEIGHBOURS - 1] <= np.maximum(usual_m, NEAR * spacings_m))
 
 
 def _straightest(
@@ -112,49 +105,51 @@ def _straightest(
     return best, depths
 
 
-def towards_camera(
-    visit: SeenVisit, own: NDArray[np.float64], axes: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def towards_camera(visit: SeenVisit, asked: AskedPlaces, axes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return unit vectors from places, (K, 3), to where a visit looked at them from; NaN where nothing tells.
 
     The camera nearest to the place; or where the lines of sight of the fruits around it meet, which are the long axes
-    of their covariances. `axes` turns the visit's axes into those of `own` and `places`, (3, 3).
+    of their covariances. `axes` turns the visit's axes into those of the places, (3, 3).
     """
     towards: NDArray[np.float64]
     if visit.cameras is not None and len(visit.cameras):
         from scipy.spatial import cKDTree
 
         stations = visit.cameras[:, :3, 3]
-        towards = stations[cKDTree(stations).query(places)[1]] - places
+        towards = stations[cKDTree(stations).query(asked.places)[1]] - asked.places
     else:
-        towards = _meeting_points(visit.covariances, own, axes, places) - places
+        towards = _meeting_points(visit.covariances, asked, axes) - asked.places
     with np.errstate(invalid="ignore"):
         return np.asarray(towards / np.linalg.norm(towards, axis=1, keepdims=True))
 
 
 def _meeting_points(
-    covariances: NDArray[np.float64] | None,
-    own: NDArray[np.float64],
-    axes: NDArray[np.float64],
-    places: NDArray[np.float64],
+    covariances: NDArray[np.float64] | None, asked: AskedPlaces, axes: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the points nearest to the lines of sight around each place: sum of (1 - d d') (c - x) is zero."""
-    from scipy.spatial import cKDTree
-
-    nowhere = np.full(places.shape, np.nan)
+    nowhere = np.full(asked.places.shape, np.nan)
     if covariances is None:
         return nowhere
     lengths, vectors = np.linalg.eigh(covariances)
     tell = np.flatnonzero(lengths[:, 2] > LEAST_LENGTH * lengths[:, 1])
     if len(tell) < LEAST_LINES:
         return nowhere
-    lines = vectors[tell, :, 2] @ axes.T
+    lines, own = vectors[tell, :, 2] @ axes.T, asked.fruits.positions[tell]
     across = np.eye(3) - lines[:, :, None] * lines[:, None, :]
-    of_lines = np.concatenate([across.reshape(-1, 9), np.einsum("nij,nj->ni", across, own[tell])], axis=1)
-    nearest = cKDTree(own[tell]).query(places, k=list(range(1, min(PENCIL, len(tell)) + 1)))[1]
-    sums = of_lines[nearest].sum(axis=1)
+    of_lines = np.concatenate([across.reshape(-1, 9), np.einsum("nij,nj->ni", across, own)], axis=1)
+    all_tell = len(tell) == len(asked.fruits)
+    nearest = asked.nearest[1][:, :PENCIL] if all_tell else NearFruits(own).nearest(asked.places, PENCIL)[1]
+    sums = _sums_of_rows(of_lines, nearest)
     weights, moments = sums[:, :9].reshape(-1, 3, 3), sums[:, 9:]
     # Lines that are all parallel meet nowhere; the little weight of the place itself keeps the sum solvable.
     little = 1e-6
-    solved = np.linalg.solve(weights + little * np.eye(3), (moments + little * places)[:, :, None])
+    solved = np.linalg.solve(weights + little * np.eye(3), (moments + little * asked.places)[:, :, None])
     return np.asarray(solved[:, :, 0])
+
+
+def _sums_of_rows(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return sums of some rows of values, (K, n), for each of K: as a product with ones nothing is laid out for it."""
+    from scipy.sparse import csr_array
+
+    ends = np.arange(0, rows.size + 1, rows.shape[1])
+    return np.asarray(csr_array((np.ones(rows.size), rows.ravel(), ends), (len(rows), len(values))) @ values)

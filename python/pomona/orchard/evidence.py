@@ -18,8 +18,8 @@ from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import cameras_in_map
 from pomona.store.cells import finite_json
 from pomona.store.failures import WrongContentError
-from pomona.store.rows import columns_of, one_of
-from pomona.store.stored_fruits import OF_SESSION, seen_cloud
+from pomona.store.rows import columns_of, one_of, parsed_column
+from pomona.store.stored_fruits import SeenBySession, seen_by_sessions
 
 __all__ = ["Evidence", "KnownVisit", "new_visit", "read_evidence"]
 
@@ -43,6 +43,8 @@ class KnownVisit:
     map_from_session : (4, 4) float64
     observation_ids, fruit_ids : (N,) int64
         Of each fruit of the cloud; 0 where it has none yet.
+    match_probabilities, match_distances_m : (N,) float64
+        How surely and how far from its fruit's sight before the map has each of them; NaN where it says nothing.
     """
 
     session_id: int
@@ -52,6 +54,13 @@ class KnownVisit:
     map_from_session: NDArray[np.float64]
     observation_ids: NDArray[np.int64]
     fruit_ids: NDArray[np.int64]
+    match_probabilities: NDArray[np.float64]
+    match_distances_m: NDArray[np.float64]
+
+    @property
+    def places_in_map(self) -> NDArray[np.float64]:
+        """Where its fruits are in the map, (N, 3)."""
+        return self.cloud.positions @ self.map_from_session[:3, :3].T + self.map_from_session[:3, 3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +132,16 @@ class Evidence:
         """Observation of every sight; 0 where it is not in the map yet."""
         return np.concatenate([visit.observation_ids for visit in self.visits])
 
+    @property
+    def match_probabilities(self) -> NDArray[np.float64]:
+        """How surely every sight is of its fruit, as the map has it; NaN where it says nothing."""
+        return np.concatenate([visit.match_probabilities for visit in self.visits])
+
+    @property
+    def match_distances_m(self) -> NDArray[np.float64]:
+        """How far every sight is from its fruit's sight before, as the map has it; NaN where it says nothing."""
+        return np.concatenate([visit.match_distances_m for visit in self.visits])
+
     def conclusion(self) -> Conclusion:
         """Say what follows for visits that hang together; the sessions that came first stay where they are."""
         known = np.array([visit.map_from_session for visit in self.visits])
@@ -140,29 +159,33 @@ def read_evidence(connection: sqlite3.Connection, session_ids: Sequence[int]) ->
     names = ("id", "date", "content_sha256", "map_from_session")
     wanted = one_of("sessions.id", session_ids)
     rows = sorted(zip(*columns_of(connection, "sessions", names, wanted), strict=True), key=lambda row: row[1:3])
+    seen = seen_by_sessions(connection, [row[0] for row in rows], FruitCloud)
     visits = [
-        _known_visit(connection, session_id, (date, content), np.array(finite_json(transform), np.float64))
+        _known_visit(connection, seen[session_id], (date, content), np.array(finite_json(transform), np.float64))
         for session_id, date, content, transform in rows
     ]
     return Evidence(visits, _pairs(connection, visits))
 
 
 def _known_visit(
-    connection: sqlite3.Connection, session_id: int, key: tuple[str, str], map_from_session: NDArray[np.float64]
+    connection: sqlite3.Connection,
+    seen: SeenBySession,
+    key: tuple[str, str],
+    map_from_session: NDArray[np.float64],
 ) -> KnownVisit:
-    which = OF_SESSION.format(session_id)
-    ids, fruit_ids = columns_of(connection, "observations", ("id", "fruit_id"), which)
     session_from_map = np.linalg.inv(map_from_session)
-    cloud = seen_cloud(connection, session_id, FruitCloud).transformed(session_from_map)
-    cameras = cameras_in_map(connection, session_id)
+    cloud = seen.cloud.transformed(session_from_map)
+    cameras = cameras_in_map(connection, seen.session_id)
     return KnownVisit(
-        session_id=session_id,
+        session_id=seen.session_id,
         date=key[0],
         cloud=cloud,
         seen=_seen_visit(key, cloud, None if cameras is None else _rigid(session_from_map @ cameras[2])),
         map_from_session=map_from_session,
-        observation_ids=np.array(ids, np.int64),
-        fruit_ids=np.array(fruit_ids, np.int64),
+        observation_ids=seen.observation_ids,
+        fruit_ids=seen.fruit_ids,
+        match_probabilities=seen.match_probabilities,
+        match_distances_m=seen.match_distances_m,
     )
 
 
@@ -189,20 +212,19 @@ def _rigid(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _pairs(connection: sqlite3.Connection, visits: Sequence[KnownVisit]) -> list[VisitPair]:
     numbers = {visit.session_id: number for number, visit in enumerate(visits)}
-    names = ("id", "first_session_id", "second_session_id", "first_from_second", "log_odds", "pairs")
+    names = ("id", "first_session_id", "second_session_id", "log_odds")
     wanted = one_of("first_session_id", numbers)
+    columns = columns_of(connection, "matches", names, wanted)
+    parsed = (parsed_column(connection, "matches", name, wanted) for name in ("first_from_second", "pairs"))
     found = []
-    for match_id, first, second, transform, log_odds, pairs in zip(
-        *columns_of(connection, "matches", names, wanted), strict=True
-    ):
+    for match_id, first, second, log_odds, transform, cells in zip(*columns, *parsed, strict=True):
         if second not in numbers:
             continue
         asked = (numbers[first], numbers[second])
-        cells = np.array(finite_json(pairs), np.float64).reshape(-1, 3)
         found.append(
             VisitPair(
                 *asked,
-                first_from_second=np.array(finite_json(transform), np.float64),
+                first_from_second=transform,
                 log_odds=log_odds,
                 rows=_rows(match_id, visits, asked, cells[:, :2].astype(np.int64)),
                 probabilities=cells[:, 2].copy(),
@@ -237,4 +259,6 @@ def new_visit(session: Session) -> KnownVisit:
         map_from_session=np.eye(4),
         observation_ids=np.zeros(len(session.cloud), np.int64),
         fruit_ids=np.zeros(len(session.cloud), np.int64),
+        match_probabilities=np.full(len(session.cloud), np.nan),
+        match_distances_m=np.full(len(session.cloud), np.nan),
     )

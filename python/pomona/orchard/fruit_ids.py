@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
@@ -47,9 +46,10 @@ def ids_of_clusters(labels: NDArray[np.int64], before: NDArray[np.int64], last_i
         The last that was given out.
     """
     ids = np.zeros(int(labels.max(initial=-1)) + 1, np.int64)
-    shared = Counter(zip(before.tolist(), labels.tolist(), strict=True))
+    one, other, counts = _counted(before, labels)
+    order = np.argsort(-counts, kind="stable")
     taken = {0}
-    for (fruit_id, cluster), _ in sorted(shared.items(), key=lambda item: (-item[1], item[0])):
+    for fruit_id, cluster in zip(one[order].tolist(), other[order].tolist(), strict=True):
         if fruit_id not in taken and not ids[cluster]:
             ids[cluster] = fruit_id
             taken.add(fruit_id)
@@ -61,13 +61,24 @@ def ids_of_clusters(labels: NDArray[np.int64], before: NDArray[np.int64], last_i
 def changes_between(before: NDArray[np.int64], after: NDArray[np.int64], last_id: int) -> list[Change]:
     """Return what became of the sights that had an id, (S,), in order of ids."""
     still_there = set(after.tolist())
-    moved = Counter(
-        (one, other) for one, other in zip(before.tolist(), after.tolist(), strict=True) if one and one != other
-    )
+    moved = (before != 0) & (before != after)
     return [
         Change(_event(one in still_there, other > last_id), one, other, count)
-        for (one, other), count in sorted(moved.items())
+        for one, other, count in zip(
+            *(column.tolist() for column in _counted(before[moved], after[moved])), strict=True
+        )
     ]
+
+
+def _counted(
+    first: NDArray[np.int64], second: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the pairs that are there, in order, one side and the other, and how often each is."""
+    order = np.lexsort((second, first))
+    one, other = first[order], second[order]
+    is_new = np.concatenate([[True], (one[1:] != one[:-1]) | (other[1:] != other[:-1])])[: len(one)]
+    starts = np.flatnonzero(is_new)
+    return one[starts], other[starts], np.diff(starts, append=len(one))
 
 
 def _event(is_still_there: bool, is_new: bool) -> Event:

@@ -39,7 +39,8 @@ def write_growth(connection: sqlite3.Connection, fruit_ids: Iterable[int], chang
         )
         rates = _rates(part, fruits, [day_of[session] for session in sessions], diameters_m)
         connection.executemany(
-            "UPDATE fruits SET growth_mm_per_day = ? WHERE id = ?", zip(nullable(rates), part.tolist(), strict=True)
+            "UPDATE fruits SET growth_mm_per_day = ?1 WHERE id = ?2 AND growth_mm_per_day IS NOT ?1",
+            zip(nullable(rates), part.tolist(), strict=True),
         )
 
 

@@ -6,6 +6,8 @@ import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.growth_of_fruits import write_growth
 from pomona.orchard.session import Session
@@ -87,6 +89,8 @@ def _inserted(connection: sqlite3.Connection, settlement: Settlement, number: in
         map_from_session=frame,
         observation_ids=observation_ids,
         fruit_ids=fruit_ids,
+        match_probabilities=np.full(len(fruit_ids), np.nan),
+        match_distances_m=np.full(len(fruit_ids), np.nan),
     )
 
 

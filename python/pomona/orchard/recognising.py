@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona import _core, geopackage
+from pomona import _core
 from pomona.cloud import FruitCloud
 from pomona.identity import VisitPair
 from pomona.orchard.evidence import Evidence, KnownVisit
@@ -20,11 +20,11 @@ from pomona.orchard.hanging import may_hang
 from pomona.settings import Settings
 from pomona.store.failures import WrongContentError
 from pomona.store.rows import columns_of, one_of
-from pomona.store.stored_fruits import fruits_in_map
+from pomona.store.stored_fruits import fruit_places, fruits_in_map
 from pomona.threads import capped_threads, cores
 
 if TYPE_CHECKING:
-    from pomona.matching import Match
+    from pomona.matching import Match, ReadyCloud
 
 __all__ = [
     "MARGIN_M",
@@ -110,8 +110,7 @@ def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Setting
     (n_fruits,) = connection.execute("SELECT count(*) FROM fruits").fetchone()
     if n_fruits < LARGE or settings.call["scale"] != "metric":
         return []
-    ids, geoms = columns_of(connection, "fruits", ("id", "geom"), asked)
-    places = geopackage.points_of(geoms)
+    ids, places = fruit_places(connection, asked)
     guess = _core.whereabouts(places, np.ascontiguousarray(cloud.positions))
     if guess is None:
         return []
@@ -119,7 +118,8 @@ def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Setting
     low, high = in_map.min(axis=0) - NEARBY_M, in_map.max(axis=0) + NEARBY_M
     around = np.flatnonzero(((places >= low) & (places <= high)).all(axis=1))
     distances_m, _ = cKDTree(in_map).query(places[around], distance_upper_bound=NEARBY_M)
-    return [ids[row] for row in around[np.isfinite(distances_m)].tolist()]
+    chosen: list[int] = ids[around[np.isfinite(distances_m)]].tolist()
+    return chosen
 
 
 def seen_last_by(connection: sqlite3.Connection, found: Recognised) -> set[int]:
@@ -166,27 +166,42 @@ def matches_between(
 
     Sessions in `but` are not asked.
     """
-    in_map = visit.cloud.transformed(map_from_visit).positions
+    in_map = replace(visit, map_from_session=map_from_visit).places_in_map
     numbers = [
         number
         for number, other in enumerate(evidence.visits)
         if other.session_id not in but and not _are_apart(in_map, other)
     ]
     asked = Settings({**settings.call, "up": None, "per_frame": False, "threads": 1}, settings.overrides)
+    if not numbers:
+        return {}
+    own = _Side(visit.seen.key, asked.ready(_rounded(visit.cloud)), map_from_visit)
+
+    def match_with(number: int) -> VisitPair | None:
+        other = evidence.visits[number]
+        return _match_of_two(
+            own, _Side(other.seen.key, asked.ready(_rounded(other.cloud)), other.map_from_session), asked
+        )
+
     with ThreadPoolExecutor(capped_threads(settings.call["threads"]) or cores()) as pool:
-        found = pool.map(lambda number: _match_of_two(visit, evidence.visits[number], map_from_visit, asked), numbers)
+        found = pool.map(match_with, numbers)
         return {number: pair for number, pair in zip(numbers, found, strict=True) if pair is not None}
 
 
-def _match_of_two(
-    visit: KnownVisit, other: KnownVisit, map_from_visit: NDArray[np.float64], settings: Settings
-) -> VisitPair | None:
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One of two visits that are matched: its key, its cloud made ready, and where it seems to lie in the map."""
+
+    key: tuple[str, str]
+    cloud: FruitCloud | ReadyCloud
+    map_from_visit: NDArray[np.float64]
+
+
+def _match_of_two(one: _Side, other: _Side, settings: Settings) -> VisitPair | None:
     """Return how two visits match; where they seem to lie saves a search, and changes nothing of what is found."""
-    is_later = visit.seen.key > other.seen.key
-    sides = [(visit.cloud, map_from_visit), (other.cloud, other.map_from_session)]
-    (query, map_from_query), (map_, map_from_map) = sides if is_later else sides[::-1]
-    expected = np.linalg.inv(map_from_map) @ map_from_query
-    match = settings.match_expected(_rounded(query), _rounded(map_), expected)
+    query, map_ = (one, other) if one.key > other.key else (other, one)
+    expected = np.linalg.inv(map_.map_from_visit) @ query.map_from_visit
+    match = settings.match_expected(query.cloud, map_.cloud, expected)
     if match.status.value != "Found":
         return None
     assert match.map_from_query is not None
@@ -211,7 +226,7 @@ def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
     """Tell whether two visits saw other places; that takes less than to match them."""
     if not len(other.cloud):
         return True
-    others = other.cloud.transformed(other.map_from_session).positions
+    others = other.places_in_map
     low, high = others.min(axis=0) - MARGIN_M, others.max(axis=0) + MARGIN_M
     return bool((in_map.min(axis=0) > high).any() or (in_map.max(axis=0) < low).any())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ FruitRow = tuple[bytes, str, str, int, int, int, float | None, float, float]
 fruit_probability."""
 
 UNMOVED_M = 1e-9
-"""By less than this nothing moves: rounding."""
+"""By less than this nothing moves, and no length is another: rounding."""
 
 DIGITS = 4
 """Of probabilities as they are written. One visit more makes all others a little surer: rows that nobody could tell
@@ -129,38 +129,36 @@ def _move_sessions(connection: sqlite3.Connection, part: SettledPart) -> None:
 def fruit_rows(connection: sqlite3.Connection, part: SettledPart) -> dict[int, FruitRow]:
     """Return the rows of the part's fruits by id, each where its last sight is."""
     evidence, conclusion = part.evidence, part.conclusion
-    geoms = dict(zip(*_of_sessions(connection, evidence, ("id", "geom")), strict=True))
     order = np.arange(len(evidence.visits))
     looks = conclusion.looks
     first = looks.seen.argmax(axis=1)[:, None]
     n_missed = (looks.in_view & ~looks.seen & (order > first)).sum(axis=1).tolist()
     n_sessions = looks.seen.sum(axis=1).tolist()
     last_sight, diameters_m = _last_of_each(evidence, conclusion)
+    seen_by = conclusion.sights.visits[last_sight].tolist()
+    observed = evidence.observation_ids[last_sight].tolist()
+    geoms = dict(zip(*columns_of(connection, "observations", ("id", "geom"), one_of("id", observed)), strict=True))
+    state_probabilities = [round(one, DIGITS) for one in conclusion.state_probabilities.tolist()]
+    fruit_probabilities = [round(1.0 - one, DIGITS) for one in conclusion.lives.false.tolist()]
+    ids = part.ids.tolist()
     rows: dict[int, FruitRow] = {}
     for fruit in np.argsort(part.ids).tolist():
-        sight = last_sight[fruit]
-        visit = evidence.visits[int(conclusion.sights.visits[sight])]
-        rows[int(part.ids[fruit])] = (
-            geoms[int(evidence.observation_ids[sight])],
+        visit = evidence.visits[seen_by[fruit]]
+        rows[ids[fruit]] = (
+            geoms[observed[fruit]],
             conclusion.states[fruit],
             visit.date,
             visit.session_id,
             n_sessions[fruit],
             n_missed[fruit],
             diameters_m[fruit],
-            round(float(conclusion.state_probabilities[fruit]), DIGITS),
-            round(float(1.0 - conclusion.lives.false[fruit]), DIGITS),
+            state_probabilities[fruit],
+            fruit_probabilities[fruit],
         )
     return rows
 
 
-def _of_sessions(connection: sqlite3.Connection, evidence: Evidence, names: Sequence[str]) -> list[list[Any]]:
-    """Return columns of the observations of these visits."""
-    which = one_of("session_id", (visit.session_id for visit in evidence.visits))
-    return columns_of(connection, "observations", names, which)
-
-
-def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[list[int], list[float | None]]:
+def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[NDArray[np.int64], list[float | None]]:
     """Return the last sight of each fruit and its last diameter that is known."""
     labels = conclusion.labels
     n_fruits = len(conclusion.states)
@@ -177,11 +175,11 @@ def _last_of_each(evidence: Evidence, conclusion: Conclusion) -> tuple[list[int]
     known = np.flatnonzero(~np.isnan(sizes))
     diameters_m = np.full(n_fruits, np.nan)
     diameters_m[labels[known]] = sizes[known]
-    return last.tolist(), nullable(diameters_m)
+    return last, nullable(diameters_m)
 
 
 def _write_fruits(connection: sqlite3.Connection, rows: dict[int, FruitRow], known: set[int]) -> None:
-    """Write fruits that are new or another than before; the place apart, which the spatial index follows."""
+    """Write fruits that are new or another than before; the place, which an index follows, only where it moved."""
     names = (
         "id", "geom", "state", "last_seen", "last_session_id", "n_sessions", "n_missed", "diameter_m",
         "state_probability", "fruit_probability",
@@ -192,39 +190,53 @@ def _write_fruits(connection: sqlite3.Connection, rows: dict[int, FruitRow], kno
         f"INSERT INTO fruits ({', '.join(names)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         ((fruit_id, *row) for fruit_id, row in rows.items() if fruit_id not in before),
     )
-    changed = [(row, fruit_id) for fruit_id, row in rows.items() if before.get(fruit_id, row) != row]
-    connection.executemany(
-        f"UPDATE fruits SET {', '.join(f'{name} = ?' for name in names[2:])} WHERE id = ?",
-        ((*row[1:], fruit_id) for row, fruit_id in changed),
-    )
-    connection.executemany(
-        "UPDATE fruits SET geom = ? WHERE id = ?",
-        ((row[0], fruit_id) for row, fruit_id in changed if row[0] != before[fruit_id][0]),
-    )
+    changed = [(row, fruit_id) for fruit_id, row in rows.items() if _is_another(before.get(fruit_id, row), row)]
+    for written, is_elsewhere in ((names[2:], False), (names[1:], True)):
+        connection.executemany(
+            f"UPDATE fruits SET {', '.join(f'{name} = ?' for name in written)} WHERE id = ?",
+            (
+                (*row[-len(written) :], fruit_id)
+                for row, fruit_id in changed
+                if (row[0] != before[fruit_id][0]) == is_elsewhere
+            ),
+        )
+
+
+def _is_another(before: FruitRow, row: FruitRow) -> bool:
+    """Tell whether a row is another than before by more than the rounding of its diameter."""
+    (*told, diameter_m, _, _), (*now, now_m, _, _) = before, row
+    if told != now or before[-2:] != row[-2:]:
+        return True
+    if diameter_m is None or now_m is None:
+        return diameter_m is not now_m
+    return abs(diameter_m - now_m) > UNMOVED_M
 
 
 def _write_observations(connection: sqlite3.Connection, part: SettledPart) -> None:
-    """Give observations their fruits, and say how sure that is."""
-    names = ("id", "fruit_id", "match_probability", "match_distance_m")
-    before = {row[0]: row[1:] for row in zip(*_of_sessions(connection, part.evidence, names), strict=True)}
-    after = zip(
-        part.evidence.observation_ids.tolist(),
-        part.fruit_ids.tolist(),
-        nullable(np.minimum(np.round(part.conclusion.probabilities, DIGITS), SUREST)),
-        nullable(part.conclusion.distances_m),
-        strict=True,
-    )
-    changed = [row for row in after if before[row[0]] != row[1:]]
+    """Give observations their fruits, and say how sure that is, where it is another than before."""
+    evidence, fruit_ids = part.evidence, part.fruit_ids
+    probabilities = np.minimum(np.round(part.conclusion.probabilities, DIGITS), SUREST)
+    distances_m = part.conclusion.distances_m
+    is_elsewhere = fruit_ids != evidence.fruit_ids
+    changed = is_elsewhere.copy()
+    for now, before, least in (
+        (probabilities, evidence.match_probabilities, 0.0),
+        (distances_m, evidence.match_distances_m, UNMOVED_M),
+    ):
+        changed |= np.isnan(now) != np.isnan(before)
+        changed |= np.abs(now - before) > least
+    ids = evidence.observation_ids
     connection.executemany(
         "UPDATE observations SET match_probability = ?, match_distance_m = ? WHERE id = ?",
-        ((*row[2:], row[0]) for row in changed),
+        zip(nullable(probabilities[changed]), nullable(distances_m[changed]), ids[changed].tolist(), strict=True),
     )
     # Two that change places would meet on the way: a session sees a fruit once.
     connection.execute("PRAGMA defer_foreign_keys = ON")
-    elsewhere = [row[:2] for row in changed if before[row[0]][0] != row[1]]
-    connection.executemany("UPDATE observations SET fruit_id = -id WHERE id = ?", ((row,) for row, _ in elsewhere))
+    elsewhere = ids[is_elsewhere].tolist()
+    connection.executemany("UPDATE observations SET fruit_id = -id WHERE id = ?", ((row,) for row in elsewhere))
     connection.executemany(
-        "UPDATE observations SET fruit_id = ? WHERE id = ?", ((fruit_id, row) for row, fruit_id in elsewhere)
+        "UPDATE observations SET fruit_id = ? WHERE id = ?",
+        zip(fruit_ids[is_elsewhere].tolist(), elsewhere, strict=True),
     )
 
 

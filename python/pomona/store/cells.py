@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from pomona import geopackage
 from pomona.errors import PomonaError
 from pomona.store.values import FARTHEST_M, iso_date
 
-__all__ = ["COLUMNS", "CellKind", "finite_json", "similarity"]
+__all__ = ["COLUMNS", "CellKind", "finite_json", "places_of", "similarity"]
 
 RIGID_TOLERANCE = 1e-6
 """How far the axes of a transform may be from right angles and one length; rounding is at 1e-15."""
@@ -37,18 +38,23 @@ class CellKind:
         Whether all of these cells, of that type, are right.
     may_be_null : bool
         Whether nothing is right too.
+    parse : callable, optional
+        What the text of a cell says, None where it is not right; of columns of JSON.
     """
 
     expected: str
     type: type
     hold: Callable[[Sequence[Any]], bool]
     may_be_null: bool = False
+    parse: Callable[[str], Any] | None = None
 
     def are_right(self, cells: Sequence[object]) -> bool:
         """Tell whether all cells are of this kind."""
-        if self.may_be_null:
+        types = set(map(type, cells))
+        if self.may_be_null and NoneType in types:
+            types.remove(NoneType)
             cells = [cell for cell in cells if cell is not None]
-        return set(map(type, cells)) <= {self.type} and (not cells or self.hold(cells))
+        return types <= {self.type} and (not cells or self.hold(cells))
 
     def wrong_rows(self, cells: Sequence[object]) -> list[int]:
         """Return the rows of the cells that are not of this kind."""
@@ -80,6 +86,15 @@ def _one_of(*words: str) -> CellKind:
 
 def _json(expected: str, is_right: Callable[[Any], bool]) -> CellKind:
     return _text(expected, lambda text: is_right(finite_json(text)))
+
+
+def _parsed(expected: str, read: Callable[[Any], Any]) -> CellKind:
+    """Return a kind of JSON of which `read` makes what is asked for, or None where it is wrong."""
+
+    def parse(text: str) -> Any:
+        return read(finite_json(text)) if _are_unicode((text,)) else None
+
+    return CellKind(expected, str, lambda cells: all(parse(text) is not None for text in set(cells)), parse=parse)
 
 
 def _are_unicode(texts: Sequence[str]) -> bool:
@@ -127,8 +142,14 @@ def similarity(rows: Any) -> NDArray[np.float64] | None:
     return transform if is_similarity and (transform[3] == (0, 0, 0, 1)).all() else None
 
 
+def places_of(points: bytes) -> NDArray[np.float64] | None:
+    """Return the places, (N, 3), of points that lie one after the other; None where one of them is no cell of ours."""
+    places = geopackage.joined_points(points)
+    return places if places is not None and np.abs(places).max(initial=0.0) <= FARTHEST_M else None
+
+
 def _are_places(blobs: Sequence[bytes]) -> bool:
-    return geopackage.are_points(blobs) and bool(np.abs(geopackage.points_of(blobs)).max() <= FARTHEST_M)
+    return set(map(len, blobs)) <= {geopackage.POINT_Z.itemsize} and places_of(b"".join(blobs)) is not None
 
 
 def _are_pictures(blobs: Sequence[bytes]) -> bool:
@@ -139,13 +160,25 @@ def _are_pictures(blobs: Sequence[bytes]) -> bool:
     )
 
 
-def _are_pairs(value: object) -> bool:
-    """Tell whether these are rows of two ids and a probability; a map has millions, so a column at a time."""
+def _pairs(value: object) -> NDArray[np.float64] | None:
+    """Return rows of two ids and a probability, (M, 3); None where these are none.
+
+    A map has millions of them, so a column at a time.
+    """
     if not isinstance(value, list) or set(map(type, value)) - {list} or set(map(len, value)) - {3}:
-        return False
-    *ids, probabilities = zip(*value, strict=True) if value else ([], [], [0.0])
-    are_ids = all(set(map(type, column)) <= {int} for column in ids)
-    return are_ids and set(map(type, probabilities)) == {float} and 0.0 <= min(probabilities) <= max(probabilities) <= 1
+        return None
+    if not value:
+        return np.empty((0, 3))
+    *ids, probabilities = zip(*value, strict=True)
+    are_ids = all(set(map(type, column)) == {int} for column in ids)
+    if not are_ids or set(map(type, probabilities)) != {float}:
+        return None
+    if not 0.0 <= min(probabilities) <= max(probabilities) <= 1.0:
+        return None
+    try:
+        return np.array([*ids, probabilities], np.float64).T
+    except OverflowError:
+        return None
 
 
 def _texts_by_name(value: object) -> bool:
@@ -160,8 +193,8 @@ TEXT = _text("a text in UTF-8", lambda _: True)
 DATE = _text("ISO 8601 local time as 2021-09-27 or 2021-09-27T11:40:12", _is_date)
 OBJECT = _json("a JSON object", lambda value: isinstance(value, dict))
 HASHES = _json("a JSON object of texts", _texts_by_name)
-TRANSFORM = _json("a 4x4 rigid or similarity transform as JSON", lambda value: similarity(value) is not None)
-PAIRS = _json("a JSON list of [observation id, observation id, probability]", _are_pairs)
+TRANSFORM = _parsed("a 4x4 rigid or similarity transform as JSON", similarity)
+PAIRS = _parsed("a JSON list of [observation id, observation id, probability]", _pairs)
 POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
 PICTURE = CellKind("a WebP or JPEG picture of at most 1 MiB", bytes, _are_pictures)
 LONGITUDE = _number("degrees from -180 to 180", -180.0, 180.0)

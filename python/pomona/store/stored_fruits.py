@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.errors import PomonaError
-from pomona.store.cells import finite_json
+from pomona.store.cells import finite_json, places_of
 from pomona.store.failures import WrongContentError, content
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of, one_of
@@ -22,9 +23,22 @@ from pomona.views import Views
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
 
-__all__ = ["OF_SESSION", "fruits_in_map", "observed_cloud", "only_session", "seen_cloud", "session_row", "stored_cloud"]
+__all__ = [
+    "OF_SESSION",
+    "SeenBySession",
+    "fruit_places",
+    "fruits_in_map",
+    "observed_cloud",
+    "only_session",
+    "seen_by_sessions",
+    "session_row",
+    "stored_cloud",
+]
 
 COVARIANCE = ("cxx", "cxy", "cxz", "cxy", "cyy", "cyz", "cxz", "cyz", "czz")
+
+UPPER, FROM_UPPER = ("cxx", "cyy", "czz", "cxy", "cxz", "cyz"), (0, 3, 4, 3, 1, 5, 4, 5, 2)
+"""A covariance without what is there twice, and each cell of it among these."""
 
 OF_SESSION = "WHERE session_id = {:d} ORDER BY id"
 
@@ -32,6 +46,28 @@ PROBABILITIES = ("state_probability", "fruit_probability")
 
 AT_LAST = "JOIN fruits f ON f.id = fruit_id AND f.last_session_id = session_id{} ORDER BY fruit_id"
 """The observation of each fruit by the session that saw it last."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenBySession:
+    """What a session saw, as the tables hold it.
+
+    Attributes
+    ----------
+    session_id : int
+    cloud : FruitCloud
+        In the map's frame, in the order of the session.
+    observation_ids, fruit_ids : (N,) int64
+    match_probabilities, match_distances_m : (N,) float64
+        NaN where the map says nothing.
+    """
+
+    session_id: int
+    cloud: FruitCloud
+    observation_ids: NDArray[np.int64]
+    fruit_ids: NDArray[np.int64]
+    match_probabilities: NDArray[np.float64]
+    match_distances_m: NDArray[np.float64]
 
 
 def stored_cloud(path: Path, make: type[FruitCloud], *, in_metres: bool = True) -> FruitCloud:
@@ -70,18 +106,33 @@ def observed_cloud(connection: sqlite3.Connection, session_id: int, make: type[F
         )
 
 
-def seen_cloud(connection: sqlite3.Connection, session_id: int, make: type[FruitCloud]) -> FruitCloud:
-    """Return where a session saw its fruits and how large, as `observed_cloud` does, without what it noted besides."""
-    geoms, diameters_m, n_views, *cells = columns_of(
-        connection, "observations", ("geom", "diameter_m", "n_views", *COVARIANCE), OF_SESSION.format(session_id)
+def seen_by_sessions(
+    connection: sqlite3.Connection, session_ids: Collection[int], make: type[FruitCloud]
+) -> dict[int, SeenBySession]:
+    """Return where sessions saw their fruits and how large, and which these are; not what they noted besides.
+
+    All of them in one question: what a part of a map holds is read at once.
+    """
+    names = ("session_id", "id", "fruit_id", "geom", "n_views", "diameter_m", "match_probability", "match_distance_m")
+    sessions, ids, fruit_ids, geoms, n_views, *cells = columns_of(
+        connection, "observations", (*names, *UPPER), one_of("session_id", session_ids)
     )
-    with content("observations"):
-        return make(
-            positions=geopackage.points_of(geoms),
-            diameters_m=_numbers(diameters_m),
-            covariances=_covariances(cells),
-            n_views=None if not n_views or None in n_views else np.array(n_views, dtype=np.int64),
-        )
+    whole = np.array([sessions, ids, fruit_ids], np.int64)
+    places, numbers = geopackage.points_of(geoms), np.array(cells, np.float64)
+    seen = {}
+    for session_id in session_ids:
+        rows = np.flatnonzero(whole[0] == session_id)
+        diameters_m, probabilities, distances_m, *upper = numbers[:, rows]
+        views = [n_views[row] for row in rows.tolist()]
+        with content("observations"):
+            cloud = make(
+                positions=places[rows],
+                diameters_m=_numbers(diameters_m),
+                covariances=_covariances([upper[at] for at in FROM_UPPER]),
+                n_views=None if not views or None in views else np.array(views, np.int64),
+            )
+        seen[session_id] = SeenBySession(session_id, cloud, whole[1, rows], whole[2, rows], probabilities, distances_m)
+    return seen
 
 
 def fruits_in_map(
@@ -113,6 +164,24 @@ def fruits_in_map(
                 **_trees(connection, of_fruits),
             },
         )
+
+
+def fruit_places(connection: sqlite3.Connection, which: str = "") -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return ids, (N,), and places, (N, 3), of the fruits that `which` chooses as for `columns_of`, by their ids.
+
+    A map may have a hundred thousand: they come in one text, not in as many rows. Where a cell is wrong, `columns_of`
+    says which.
+    """
+    ids, points = connection.execute(
+        f"SELECT group_concat(fruits.id), group_concat(hex(geom), '') FROM fruits {which}"
+    ).fetchone()
+    if ids is not None:
+        numbers, places = np.fromstring(ids, np.int64, sep=","), places_of(bytes.fromhex(points or ""))
+        if places is not None and len(places) == len(numbers):
+            order = np.argsort(numbers)
+            return numbers[order], places[order]
+    listed, geoms = columns_of(connection, "fruits", ("id", "geom"), which)
+    return np.array(listed, np.int64), geopackage.points_of(geoms)
 
 
 def _trees(connection: sqlite3.Connection, of_fruits: Sequence[int | None]) -> dict[str, tuple[str, ...]]:
@@ -161,7 +230,7 @@ def _require_seen(ids: Sequence[int], last_session_ids: Sequence[int], seen_ids:
     raise WrongContentError("fruits: an id is there twice, expected each once")
 
 
-def _numbers(column: Sequence[float | None]) -> NDArray[np.float64] | None:
+def _numbers(column: Sequence[float | None] | NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return numbers with NaN for what is unknown; None when all of it is."""
     numbers = np.array(column, dtype=np.float64)
     return None if np.isnan(numbers).all() else numbers
@@ -171,7 +240,7 @@ def _shares(column: Sequence[float | None]) -> tuple[str, ...]:
     return tuple("" if cell is None else f"{cell:.4f}" for cell in column)
 
 
-def _covariances(cells: Sequence[Sequence[float | None]]) -> NDArray[np.float64] | None:
+def _covariances(cells: Sequence[Sequence[float | None] | NDArray[np.float64]]) -> NDArray[np.float64] | None:
     numbers = np.array(cells, dtype=np.float64)
     return None if np.isnan(numbers).any() or not numbers.size else numbers.T.reshape(-1, 3, 3)
 

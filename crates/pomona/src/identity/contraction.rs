@@ -55,14 +55,13 @@ fn below<'a>(what: &'static str, mut rows: impl Iterator<Item = &'a usize>, belo
 pub fn contracted(evidence: &Evidence) -> Result<Vec<usize>> {
     evidence.validate()?;
     let mut clusters = Clusters::new(evidence);
-    let mut heap = BinaryHeap::new();
-    for sight in 0..evidence.visits.len() {
-        clusters.offer(sight, &mut heap);
-    }
+    // Of the two that a link joins one offers it.
+    let first = (0..evidence.visits.len()).flat_map(|sight| clusters.offered(sight, move |other| other > sight));
+    let mut heap: BinaryHeap<Candidate> = first.collect::<Vec<_>>().into();
     while let Some(best) = heap.pop() {
         if clusters.is_as_it_was(&best) {
             clusters.join(best.one, best.other);
-            clusters.offer(best.one, &mut heap);
+            heap.extend(clusters.offered(best.one, |_| true));
         }
     }
     Ok(clusters.numbered())
@@ -139,15 +138,14 @@ impl Clusters {
         clusters
     }
 
-    /// Puts those that a cluster is better joined with on the heap.
-    fn offer(&self, cluster: usize, heap: &mut BinaryHeap<Candidate>) {
-        for &(linked, nats) in &self.linked[cluster] {
+    /// Those of the chosen ones that a cluster is better joined with.
+    fn offered(&self, cluster: usize, is_chosen: impl Fn(usize) -> bool) -> impl Iterator<Item = Candidate> {
+        let chosen = self.linked[cluster].iter().filter(move |&&(linked, _)| is_chosen(linked));
+        chosen.filter_map(move |&(linked, nats)| {
             let (one, other) = (cluster.min(linked), cluster.max(linked));
             let nats = self.evidence(one, other, nats);
-            if nats > 0.0 {
-                heap.push(Candidate { nats, one, other, grown: [self.grown[one], self.grown[other]] });
-            }
-        }
+            (nats > 0.0).then(|| Candidate { nats, one, other, grown: [self.grown[one], self.grown[other]] })
+        })
     }
 
     /// Log-odds that two clusters are one fruit; minus infinity where one visit saw both.
@@ -156,8 +154,10 @@ impl Clusters {
         if visits.iter().zip(others).any(|(a, b)| a & b != 0) {
             return f64::NEG_INFINITY;
         }
-        let shared = |visit| self.mask(&self.matched, visit).iter().zip(others).map(|(a, b)| (a & b).count_ones());
-        let n_against: u32 = bits(visits).flat_map(shared).sum();
+        let shared = |visit| -> u32 {
+            self.mask(&self.matched, visit).iter().zip(others).map(|(a, b)| (a & b).count_ones()).sum()
+        };
+        let n_against: u32 = bits(visits).map(shared).sum();
         linked - UNPAIRED * f64::from(n_against)
     }
 
@@ -211,9 +211,12 @@ impl Clusters {
 
 /// The bits that are set in a mask.
 fn bits(mask: &[u64]) -> impl Iterator<Item = usize> {
-    mask.iter()
-        .enumerate()
-        .flat_map(|(at, &word)| (0..WORD).filter(move |bit| word >> bit & 1 == 1).map(move |bit| at * WORD + bit))
+    mask.iter().enumerate().flat_map(|(at, &word)| {
+        // Each step takes the lowest bit away.
+        let beyond = |word: &u64| Some(word & (word - 1)).filter(|&left| left != 0);
+        let left = std::iter::successors(Some(word).filter(|&word| word != 0), beyond);
+        left.map(move |word| at * WORD + word.trailing_zeros() as usize)
+    })
 }
 
 #[cfg(test)]
@@ -238,6 +241,13 @@ mod tests {
     fn what_matched_visits_leave_unpaired_speaks_against() {
         assert_eq!(labels(&[0, 1, 2], &[[0, 1], [1, 2]], &[8.0, 6.0], &EVERY_TWO), [0, 0, 1]);
         assert_eq!(labels(&[0, 1, 2], &[[0, 1], [1, 2]], &[8.0, 7.5], &EVERY_TWO), [0, 0, 0]);
+    }
+
+    #[test]
+    fn every_bit_of_a_mask_is_told_once() {
+        let mask = [1 << 63 | 0b1001, 0, u64::MAX];
+        let told: Vec<usize> = bits(&mask).collect();
+        assert_eq!(told, [0, 3, 63].into_iter().chain(128..192).collect::<Vec<_>>());
     }
 
     #[test]

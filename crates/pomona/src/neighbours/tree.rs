@@ -75,11 +75,11 @@ impl Tree {
         }
         let mut stack = [(0u32, 0f32); 64];
         let mut depth = 1;
+        let mut worst = f32::INFINITY;
         while depth > 0 {
             depth -= 1;
             let (mut at, bound) = stack[depth];
-            let worst = |found: &Vec<(u32, f32)>| if found.len() < count { f32::INFINITY } else { found[count - 1].1 };
-            if bound > worst(found) {
+            if bound > worst {
                 continue;
             }
             loop {
@@ -87,13 +87,8 @@ impl Tree {
                 if node.right == 0 {
                     for i in node.start as usize..node.end as usize {
                         let entry = (self.rows[i], squared_distance(&self.points[i], centre));
-                        if entry.1 > worst(found) {
-                            continue;
-                        }
-                        let place = found.partition_point(|f| (f.1, f.0) < (entry.1, entry.0));
-                        if place < count {
-                            found.insert(place, entry);
-                            found.truncate(count);
+                        if entry.1 <= worst {
+                            worst = put_in(found, count, entry);
                         }
                     }
                     break;
@@ -106,6 +101,25 @@ impl Tree {
             }
         }
     }
+}
+
+/// Puts an entry where it belongs among the nearest, of which no more than `count` are kept; returns beyond which squared
+/// distance none is taken. From the end: a few dozen are passed faster one by one than a search among them finds its place.
+#[inline]
+fn put_in(found: &mut Vec<(u32, f32)>, count: usize, entry: (u32, f32)) -> f32 {
+    let is_before = |other: &(u32, f32)| (entry.1, entry.0) < (other.1, other.0);
+    if found.len() < count {
+        found.push(entry);
+    } else if !is_before(&found[count - 1]) {
+        return found[count - 1].1;
+    }
+    let mut at = found.len() - 1;
+    while at > 0 && is_before(&found[at - 1]) {
+        found[at] = found[at - 1];
+        at -= 1;
+    }
+    found[at] = entry;
+    if found.len() < count { f32::INFINITY } else { found[count - 1].1 }
 }
 
 #[inline]

@@ -39,7 +39,7 @@ impl VerifiedMap {
     }
 
     /// Where no seeds are looked up, as poses are proposed.
-    pub(super) fn without_seeds(map: &FruitCloud) -> Self {
+    pub(crate) fn without_seeds(map: &FruitCloud) -> Self {
         Self { landscape: Landscape::new(map), seeds: SeedIndex::empty(), scale: Scale::Metric, fruits: map.len() }
     }
 

@@ -16,18 +16,20 @@ const LEAST_SHARED: f64 = 0.01;
 /// `residual` gives a fruit's residual and its weight.
 pub(super) fn shared_by_neighbours(
     query: &Landscape,
-    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync,
+    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
 ) -> f64 {
     let rows: Vec<usize> = (0..query.len()).collect();
+    // Each is asked for as often as it is a neighbour.
+    let residuals: Vec<_> = rows.par_iter().with_min_len(SHARE_OF_ROWS).map(|&row| residual(row)).collect();
     let parts: Vec<[f64; 3]> = rows
         .par_chunks(SHARE_OF_ROWS)
         .map(|rows| {
             let [mut products, mut pairs, mut weights] = [0.0; 3];
             for &row in rows {
-                let Some((own, weight)) = residual(row) else { continue };
+                let Some((own, weight)) = residuals[row] else { continue };
                 weights += weight;
                 for (other, kinship) in query.kin(row) {
-                    let Some((rival, other_weight)) = residual(other as usize) else { continue };
+                    let Some((rival, other_weight)) = residuals[other as usize] else { continue };
                     let kernel = weight * other_weight * kinship;
                     products += kernel * own.dot(&rival);
                     pairs += kernel;

@@ -8,7 +8,6 @@
 use super::acceptance::VerifiedConfig;
 use super::case::{Search, Stages, VerifiedMap};
 use super::decision::{MIN_FRUITS, SURE, answer_of};
-use super::landscape::Landscape;
 use super::nearest::single;
 use super::placement::Placement;
 use super::proposal::Proposer;
@@ -28,10 +27,10 @@ const OFF: f64 = 1.0;
 const FRUITS: usize = 128;
 const REFINED: usize = 32;
 
-/// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt.
+/// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt. Both are there without seeds, each
+/// with its cloud, the query first.
 pub(crate) fn search_expected(
-    map: &FruitCloud,
-    query: &FruitCloud,
+    [(ready, query), (prepared, map)]: [(&VerifiedMap, &FruitCloud); 2],
     map_from_query: &Similarity,
     request: &Request,
     config: &VerifiedConfig,
@@ -39,10 +38,9 @@ pub(crate) fn search_expected(
     if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS || request.scale != Scale::Metric {
         return Match::without_answer(Verdict::NoMatch, Stages::new());
     }
-    let prepared = VerifiedMap::without_seeds(map);
-    let landscape = Landscape::new(query);
-    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
-    let search = Search::new(&prepared, &landscape, sizes, request, config);
+    let landscape = &ready.landscape;
+    let sizes = Diameters::new(query, map, landscape, &prepared.landscape);
+    let search = Search::new(prepared, landscape, sizes, request, config);
     let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let contenders = search.contenders(&expected);
     let (findings, stages) = search.weigh(&contenders, Effort::default());
@@ -122,7 +120,9 @@ mod tests {
     use nalgebra::Rotation3;
 
     fn asked(query: &FruitCloud, map: &FruitCloud, expected: &Similarity) -> Match {
-        search_expected(map, query, expected, &Request::default(), &Config::default().verified)
+        let [ready, prepared] = [query, map].map(VerifiedMap::without_seeds);
+        let sides = [(&ready, query), (&prepared, map)];
+        search_expected(sides, expected, &Request::default(), &Config::default().verified)
     }
 
     #[test]
