@@ -116,7 +116,9 @@ pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothes
     let mut growth = hold(query, map, whole, model);
     growth.unseen = unseen(query, map, &growth.pose);
     let hidden: Vec<usize> = (0..query.len()).filter(|&row| growth.unseen[0][row]).collect();
-    hidden.into_iter().for_each(|row| growth.forget(row));
+    for row in hidden {
+        growth.forget(row);
+    }
     growth.pair_up();
     growth.go_on(LEFT_OUT_ROUNDS);
     growth.whole = false;

@@ -180,7 +180,9 @@ impl Rows {
                 // A cell of its own for those outside: where a fourth are, a processor that guesses is wrong too often.
                 *place = if inside { (along * high + up) * deep + depth } else { outside };
             }
-            voted.iter().for_each(|&place| cells[place as usize] += 1);
+            for &place in voted.iter() {
+                cells[place as usize] += 1;
+            }
         }
     }
 
