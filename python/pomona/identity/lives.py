@@ -91,13 +91,13 @@ def lives_of(seen: NDArray[np.bool_], in_view: NDArray[np.bool_], classes: NDArr
         share_false = (false.sum() + BELIEF_FALSE * SHARE_FALSE) / (n_seen.sum() + BELIEF_FALSE)
         leaving = _leaving(ends, first, 1.0 - false)
         looked = (later & in_view) * _hanging(ends, last) * (1.0 - false)[:, None]
-        chances = _chances(seen_later, np.bincount(classes.ravel(), looked.ravel(), len(CHANCES_OF_SEEING)))
+        chances = _chances(seen_later, classes, looked)
     return Lives(gone=1.0 - ends[:, -1], false=false)
 
 
 def _seen_at_all(logs: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the chance that some visit sees each fruit, (K,): beside one that is seen are those that all missed."""
-    return -np.expm1(logs.sum(axis=1))
+    return np.asarray(-np.expm1(logs.sum(axis=1)))
 
 
 def _only_here(first: NDArray[np.int64], logs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,8 +112,9 @@ def _hanging(ends: NDArray[np.float64], last: NDArray[np.int64]) -> NDArray[np.f
     return np.where(np.arange(ends.shape[1] - 1) > last[:, None], goes_later, 1.0)
 
 
-def _chances(n_seen: NDArray[np.int64], n_looked: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the chance of seeing a fruit of each class, (C,)."""
+def _chances(n_seen: NDArray[np.int64], classes: NDArray[np.int64], looked: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the chance of seeing a fruit of each class, (C,); `looked` at, as far as it hung, (K, V)."""
+    n_looked = np.bincount(classes.ravel(), looked.ravel(), len(n_seen)).astype(np.float64)
     learnt = (n_seen + BELIEF_SEEING * CHANCES_OF_SEEING) / (n_looked + BELIEF_SEEING)
     return np.asarray(np.minimum(learnt, MOST_SEEING))
 

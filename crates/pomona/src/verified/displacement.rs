@@ -46,7 +46,7 @@ pub(super) fn shared_by_neighbours(
 pub(super) fn told_by_neighbours(
     query: &Landscape,
     sigma: f64,
-    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync,
+    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
 ) -> f64 {
     let shared = shared_by_neighbours(query, residual);
     if shared < LEAST_SHARED * sigma * sigma { 0.0 } else { shared }

@@ -20,6 +20,10 @@ const MOST_PAIRS: usize = 60_000;
 /// Clouds with more pairs than this are left alone: with so few of their fruits too little in common would be asked.
 const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
 
+/// Visits to one row show fruits that hang at most so many times as far apart in one as in the other: one fruit in 27. Cells
+/// count by the cube of it, so that a query in millimetres would ask for more of them than there is memory.
+const ALIKE: f64 = 3.0;
+
 /// Steps either way, and their width in radians, of the turns about the axis across the row and about the one along it:
 /// the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
 const ACROSS: (i32, f64) = (6, 0.044);
@@ -89,10 +93,11 @@ struct Counts {
 }
 
 impl Rows {
-    /// `None` where the clouds are no rows, or too large.
+    /// `None` where the clouds are no rows, not alike, or too large.
     pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
         let pairs = query.len() * map.len();
-        if query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
+        let alike = query.spacing.max(map.spacing) <= ALIKE * query.spacing.min(map.spacing);
+        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
             return None;
         }
         let axes = [row_axes(query)?, row_axes(map)?];
