@@ -160,6 +160,11 @@ impl<'a> Search<'a> {
         pattern(poses, share)
     }
 
+    /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
+    pub(super) fn least(&self) -> f64 {
+        self.config.threshold(poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
+    }
+
     /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
     fn offered(&self) -> (f64, f64) {
         let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());

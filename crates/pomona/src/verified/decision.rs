@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
             self.lay_along(&mut findings, &mut log);
         }
         if findings.accepted.is_empty() {
-            findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
+            findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let stages = self.stages(&log, findings.accepted.len());
@@ -157,7 +157,8 @@ impl<'a> Search<'a> {
         }
         self.sift(&mut findings, &mut log);
         if findings.accepted.is_empty() {
-            findings.accepted.extend(self.single_out(&mut findings.others, &mut log));
+            log.grown += self.grow_poor(&hypotheses, &mut findings.others);
+            findings.accepted.extend(self.single_out(&mut findings.others, self.least(), &mut log));
         } else {
             self.doubt(&mut findings, &[], &mut log);
         }
@@ -284,6 +285,17 @@ impl<'a> Search<'a> {
             }
         }
         (some, &[])
+    }
+
+    /// Grows what little speaks for, or nothing: where few poses are proposed, these show what chance reaches. Returns how many.
+    fn grow_poor(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
+        let before = findings.len();
+        for seed in hypotheses {
+            if !findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
+                findings.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
+            }
+        }
+        (findings.len() - before) as u32
     }
 
     /// Asks the offsets of all fruits, where too few are in common for any seed.

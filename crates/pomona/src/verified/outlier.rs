@@ -17,8 +17,8 @@ const COMPARED: usize = 3;
 const KEPT: f64 = 0.9;
 
 impl<'a> Search<'a> {
-    /// Takes the best pose out of those that were not accepted, where it stands out of the others.
-    pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, log: &mut Log) -> Option<Finding<'a>> {
+    /// Takes the best pose out of those that were not accepted, where it stands out of the others and has the `least` evidence.
+    pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, least: f64, log: &mut Log) -> Option<Finding<'a>> {
         others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let distinct = self.distinct(others);
         if distinct.len() <= ENOUGH {
@@ -32,7 +32,7 @@ impl<'a> Search<'a> {
         distinct[..COMPARED].iter().for_each(|&at| self.polish(&mut others[at]));
         let second = distinct[1..COMPARED].iter().map(|&at| evidence(others, at)).fold(f64::NEG_INFINITY, f64::max);
         log.best = log.best.max(evidence(others, distinct[0]));
-        log.threshold = log.threshold.min(outlying(rate, second));
+        log.threshold = log.threshold.min(outlying(rate, second).max(least));
         self.holds(&mut others[distinct[0]], KEPT, log).then(|| others.swap_remove(distinct[0]))
     }
 
