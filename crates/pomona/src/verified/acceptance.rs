@@ -21,6 +21,9 @@ pub struct VerifiedConfig {
 }
 }
 
+/// Probability from which on a pair is worth reporting: a wrong one costs a third of what a right one is worth.
+pub(super) const WORTH_IT: f64 = 0.25;
+
 impl Default for VerifiedConfig {
     fn default() -> Self {
         Self {
@@ -29,8 +32,7 @@ impl Default for VerifiedConfig {
             // The longest of some 68 sets each: with one shared tree of five and 45 % hidden, ten true ones are among
             // them.
             seeds_per_fruit: 32,
-            // A wrong pair costs a third of what a right one is worth.
-            min_probability: 0.25,
+            min_probability: WORTH_IT,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{VerifiedConfig, pattern, poses};
+use super::acceptance::{VerifiedConfig, WORTH_IT, pattern, poses};
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
@@ -191,10 +191,10 @@ impl<'a> Search<'a> {
         settled > least && grown.max(settled) > log.threshold && grown * self.believed(finding) > least
     }
 
-    /// Mean probability of the pairs that a settled finding would report; 0 where there is none.
+    /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where there is none.
     fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
-        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), WORTH_IT);
         pairs.iter().map(|pair| pair.probability).sum::<f64>() / pairs.len().max(1) as f64
     }
 
