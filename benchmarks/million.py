@@ -57,8 +57,8 @@ def main(arguments: list[str]) -> None:
 
 
 def numbers(row: dict[str, str]) -> dict[str, Any]:
-    """Read a row that was written before."""
-    return {key: int(value) if value.isdigit() else float(value) for key, value in row.items()}
+    """Read a row that was written before; an older one has fewer figures."""
+    return {key: int(value) if value.isdigit() else float(value) for key, value in row.items() if value}
 
 
 def in_process(n_fruits: int, n_places: int) -> dict[str, Any]:
@@ -151,7 +151,7 @@ def resident_mb() -> float:
 def report(rows: list[dict[str, Any]]) -> str:
     header = ["", *(f"{int(str(row['fruits'])):,}" for row in rows)]
     keys = [key for key in rows[0] if key != "fruits"]
-    lines = [(key, *(shown(key, row[key]) for row in rows)) for key in keys]
+    lines = [(key, *(shown(key, row.get(key, "-")) for row in rows)) for key in keys]
     return f"# A million fruits\n\n{' '.join((__doc__ or '').split())}\n\n{markdown(header, lines)}"
 
 

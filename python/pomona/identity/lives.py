@@ -161,7 +161,7 @@ def states_of(
     """Return the state of each fruit, and its probability.
 
     `seen` by the last visit that looked there; `new` when that is its only sight and visits before had looked there;
-    else `gone` or `missed`, whichever is likelier.
+    else `gone` with a probability of `SAID_GONE` and more, or `missed`.
     """
     n_visits = seen.shape[1]
     last_look = n_visits - 1 - in_view[:, ::-1].argmax(axis=1)

@@ -12,7 +12,7 @@ from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.places import looked_at, surroundings_of, towards_camera
 from pomona.identity.visits import SeenVisit, Sights
 
-__all__ = ["SHARES_OF_VIEWS", "Looks", "looks_of", "quantile_of_rows", "visibility_classes"]
+__all__ = ["Looks", "looks_of", "quantile_of_rows", "visibility_classes"]
 
 SAME_SIDE = 0.5
 """Cosine of the angle between two looks at a fruit, 60 degrees, under which one tells of the other."""
