@@ -24,9 +24,7 @@ def main() -> None:
     parser.add_argument("--rendered", type=Path, nargs="*", default=[], help="recordings of `pomona synth video`")
     parser.add_argument("--batches", type=int, default=Plan.batches)
     parser.add_argument("--device", default=Plan.device, help="cpu or cuda")
-    parser.add_argument(
-        "--teacher", type=int, default=Plan.teacher, help="times the channels of one to learn from"
-    )
+    parser.add_argument("--teacher", type=int, default=Plan.teacher, help="times the channels of one to learn from")
     parser.add_argument("--workers", type=int, default=0, help="processes that draw crops")
     given = parser.parse_args()
     torch.set_num_threads(1)

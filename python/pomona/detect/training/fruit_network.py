@@ -6,7 +6,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-__all__ = ["SIZE_PX", "FruitNetwork", "folded"]
+__all__ = ["SIZE_PX", "WIDTHS", "FruitNetwork", "folded"]
 
 SIZE_PX = 16.0
 """Half of the side of a usual fruit: what a distance to an edge of its box is told against."""
@@ -39,6 +39,7 @@ class FruitNetwork(nn.Module):
 
     def __init__(self, normalised: bool = True, wider: int = 1) -> None:
         super().__init__()
+        self.wider = wider
         half, quarter, eighth, sixteenth, thirtysecond = (wider * made for made in WIDTHS)
 
         def block(given: int, made: int, stride: int = 1) -> nn.Sequential:
@@ -79,7 +80,7 @@ def _doubled(features: torch.Tensor) -> torch.Tensor:
 
 def folded(network: FruitNetwork) -> FruitNetwork:
     """Give a copy without normalisations: they have gone into the convolutions before them."""
-    plain = FruitNetwork(normalised=False).eval()
+    plain = FruitNetwork(normalised=False, wider=network.wider).eval()
     weights = network.state_dict()
     for name, module in network.named_modules():
         if isinstance(module, nn.BatchNorm2d):

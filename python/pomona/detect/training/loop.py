@@ -14,13 +14,13 @@ from torch.utils.data import DataLoader, Dataset
 
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
-from pomona.detect.training.fruit_network import FruitNetwork
+from pomona.detect.training.fruit_network import WIDTHS, FruitNetwork
 from pomona.detect.training.learner import Learner
 from pomona.detect.training.loss import loss_of, unlike_teacher
 from pomona.detect.training.shown_crops import drawn_crop
 from pomona.detect.training.targets import Targets, targets_of
 
-__all__ = ["Plan", "Source", "mean_of", "train"]
+__all__ = ["Plan", "Source", "means_of", "train"]
 
 SAVED_EVERY = 25
 """Batches between two checkpoints: that is what an interruption costs at most."""
@@ -215,9 +215,14 @@ def _restore(state: _State, checkpoint: Path) -> None:
     state.done, state.loss = content["done"], content["loss"]
 
 
-def mean_of(checkpoint: Path) -> tuple[FruitNetwork, int]:
-    """Give the mean network of a checkpoint, and how many batches it has seen."""
+def means_of(checkpoint: Path) -> tuple[FruitNetwork, FruitNetwork | None, int]:
+    """Give the mean network of a checkpoint, that of its teacher, None where it had none, and the batches they saw."""
     content = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    mean = FruitNetwork()
-    mean.load_state_dict(content["mean"])
-    return mean.eval(), content["done"]
+    teacher = content.get("teacher")
+    return _holding(content["mean"]), None if teacher is None else _holding(teacher["mean"]), content["done"]
+
+
+def _holding(weights: dict[str, torch.Tensor]) -> FruitNetwork:
+    network = FruitNetwork(wider=weights["stem.0.0.weight"].shape[0] // WIDTHS[0])
+    network.load_state_dict(weights)
+    return network.eval()
