@@ -58,7 +58,8 @@ def test_wrong_labels_are_one_line(pomona, own, tmp_path, lines, told):
 
 
 @needs_torch
-def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path):
+@pytest.mark.parametrize("teacher", [0, 2])
+def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path, teacher):
     import torch
 
     from pomona.detect.training import loop
@@ -67,7 +68,7 @@ def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path):
 
     torch.set_num_threads(1)
     samples = cached(labelled_pictures([own], tmp_path / "boxes.csv"), tmp_path / "cache")
-    plan = loop.Plan(batches=3, batch=2, warm_up=1, half_precision=False)
+    plan = loop.Plan(batches=3, batch=2, warm_up=1, half_precision=False, teacher=teacher)
     ends = []
     for stops in ((), (1,)):
         checkpoint = tmp_path / f"{len(ends)}.pt"
@@ -84,6 +85,28 @@ def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path):
         network = loop.train([loop.Source(samples, 1.0)], plan, checkpoint, None, lambda _done, _loss: None)
         ends.append(network.state_dict())
     assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+    kept, taught_by, batches = loop.means_of(checkpoint)
+    assert batches == plan.batches
+    assert all(torch.equal(ends[0][name], weights) for name, weights in kept.state_dict().items())
+    assert (taught_by.wider if taught_by else 0) == teacher
+
+
+@needs_torch
+def test_a_teacher_that_agrees_asks_for_nothing():
+    import torch
+
+    from pomona.detect.training.loss import unlike_teacher
+
+    torch.manual_seed(0)
+    maps = torch.randn(2, 6, 8, 8)
+    wanted = {"heat": torch.zeros(2, 8, 8)}
+    assert unlike_teacher(maps, maps, wanted) == 0
+    farther = maps.clone()
+    farther[:, 1] += 1  # the left edges
+    unsure = maps.clone()
+    unsure[:, 0] /= 2
+    assert unlike_teacher(farther, maps, wanted) > 0
+    assert unlike_teacher(unsure, maps, wanted) > 0
 
 
 @needs_torch

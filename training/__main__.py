@@ -12,7 +12,7 @@ from pomona.detect.training.cache import cached
 from pomona.detect.training.loop import Plan, Source, train
 from training.sources import TEST_ROWS, VALIDATION_ROWS, photographs, rendered
 
-RENDERED_SHARE = 0.35
+RENDERED_SHARE = 0.45
 """Of the pictures that are drawn, where there are rendered ones."""
 
 
@@ -24,9 +24,11 @@ def main() -> None:
     parser.add_argument("--rendered", type=Path, nargs="*", default=[], help="recordings of `pomona synth video`")
     parser.add_argument("--batches", type=int, default=Plan.batches)
     parser.add_argument("--device", default=Plan.device, help="cpu or cuda")
+    parser.add_argument("--teacher", type=int, default=Plan.teacher, help="times the channels of one to learn from")
     parser.add_argument("--workers", type=int, default=0, help="processes that draw crops")
     given = parser.parse_args()
     torch.set_num_threads(1)
+    torch.backends.cudnn.benchmark = True  # crops are all of one size
     given.output.mkdir(parents=True, exist_ok=True)
     begun_s = time.monotonic()
 
@@ -35,7 +37,7 @@ def main() -> None:
             print(f"{done} of {given.batches} batches, loss {loss:.3f}, {time.monotonic() - begun_s:.0f} s", flush=True)
 
     sources = _sources(given.data, given.rendered, given.output / "cache")
-    plan = Plan(batches=given.batches, device=given.device)
+    plan = Plan(batches=given.batches, device=given.device, teacher=given.teacher)
     train(sources, plan, given.output / "checkpoint.pt", None, tell, workers=given.workers)
 
 

@@ -1,4 +1,4 @@
-"""Write the models of a run into the package: calibrated on rows that were not trained on, in 32 and in 8 bits."""
+"""Write the models of a run: calibrated on rows that were not trained on, in 32 and in 8 bits, and its teacher in 8."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from pomona.detect.picture_file import read_picture
 from pomona.detect.shipped import EXACT, SHIPPED, model_named
 from pomona.detect.training.eight_bits import write_eight_bits
 from pomona.detect.training.finishing import finished
-from pomona.detect.training.fruit_network import folded
+from pomona.detect.training.fruit_network import FruitNetwork, folded
 from pomona.detect.training.graph import write_network
 from pomona.detect.training.labels import Labelled
-from pomona.detect.training.loop import mean_of
+from pomona.detect.training.loop import means_of
+from training import WIDE
 from training.sources import TEST_ROWS, VALIDATION_ROWS, photographs
 
 DATA = (
@@ -30,7 +31,7 @@ SHOWN = 64
 
 
 def main() -> None:
-    """Write both models and say what they were written with."""
+    """Write the models and say what they were written with."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder with orchard_photos/")
     parser.add_argument("run", type=Path, help="folder of the run")
@@ -40,7 +41,16 @@ def main() -> None:
         for kind in ("apple_76", "apple_81")
         for labelled in photographs(given.data / "orchard_photos", kind, VALIDATION_ROWS)
     ]
-    network, batches = mean_of(given.run / "checkpoint.pt")
+    network, teacher, batches = means_of(given.run / "checkpoint.pt")
+    _write(network, batches, validation, model_named(SHIPPED), model_named(EXACT))
+    if teacher is not None:
+        WIDE.parent.mkdir(exist_ok=True)
+        _write(teacher, batches, validation, WIDE)
+
+
+def _write(
+    network: FruitNetwork, batches: int, validation: list[Labelled], eight_bits: Path, halved: Path | None = None
+) -> None:
     network, min_score, scaled = finished(folded(network), validation)
     about = {
         "data": DATA,
@@ -51,9 +61,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         exact = Path(folder) / "exact.onnx"
         write_network(exact, network, min_score, about)
-        write_eight_bits(model_named(SHIPPED), exact, _prepared(validation))
-    write_network(model_named(EXACT), network, min_score, about, halved=True)
-    print(f"{batches} batches, {scaled}, least score {min_score:.3f}")
+        write_eight_bits(eight_bits, exact, _prepared(validation))
+    if halved is not None:
+        write_network(halved, network, min_score, about, halved=True)
+    print(f"{eight_bits.name}: {batches} batches, {scaled}, least score {min_score:.3f}")
 
 
 def _prepared(pictures: list[Labelled]) -> Iterator[NDArray[np.float32]]:

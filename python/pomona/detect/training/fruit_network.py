@@ -6,13 +6,16 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-__all__ = ["SIZE_PX", "FruitNetwork", "folded"]
+__all__ = ["SIZE_PX", "WIDTHS", "FruitNetwork", "folded"]
 
 SIZE_PX = 16.0
 """Half of the side of a usual fruit: what a distance to an edge of its box is told against."""
 
 CHANNELS = 6
 """Of the map: logit of a fruit's centre; log of left, top, right, bottom over `SIZE_PX`; logit of the visible share."""
+
+WIDTHS = (16, 32, 80, 144, 192)
+"""Channels where the picture is a half, a quarter ... of its size: few where there are many cells."""
 
 RARE = -4.6
 """Logit that the map begins with: one cell in a hundred is a fruit's centre."""
@@ -30,22 +33,29 @@ class FruitNetwork(nn.Module):
     ----------
     normalised : bool
         With a normalisation by batches after each convolution: for training from nothing.
+    wider : int
+        Times the channels of the network that ships: a teacher has more.
     """
 
-    def __init__(self, normalised: bool = True) -> None:
+    def __init__(self, normalised: bool = True, wider: int = 1) -> None:
         super().__init__()
+        self.wider = wider
+        half, quarter, eighth, sixteenth, thirtysecond = (wider * made for made in WIDTHS)
 
         def block(given: int, made: int, stride: int = 1) -> nn.Sequential:
             return _convolution(given, made, normalised, stride)
 
-        self.stem = nn.Sequential(block(3, 16, 2), block(16, 32, 2), block(32, 32))
-        self.eighth = nn.Sequential(block(32, 96, 2), block(96, 96), block(96, 96))
-        self.sixteenth = nn.Sequential(block(96, 144, 2), block(144, 144), block(144, 144))
-        self.thirtysecond = nn.Sequential(block(144, 160, 2), block(160, 160), block(160, 160))
-        self.to_sixteenth, self.at_sixteenth = nn.Conv2d(160, 144, 1), block(144, 144)
-        self.to_eighth, self.at_eighth = nn.Conv2d(144, 96, 1), block(96, 96)
-        self.to_quarter, self.at_quarter = nn.Conv2d(96, 32, 1), block(32, 32)
-        self.map = nn.Conv2d(32, CHANNELS, 1)
+        def thrice(given: int, made: int) -> nn.Sequential:
+            return nn.Sequential(block(given, made, 2), block(made, made), block(made, made))
+
+        self.stem = nn.Sequential(block(3, half, 2), block(half, quarter, 2), block(quarter, quarter))
+        self.eighth = thrice(quarter, eighth)
+        self.sixteenth = thrice(eighth, sixteenth)
+        self.thirtysecond = thrice(sixteenth, thirtysecond)
+        self.to_sixteenth, self.at_sixteenth = nn.Conv2d(thirtysecond, sixteenth, 1), block(sixteenth, sixteenth)
+        self.to_eighth, self.at_eighth = nn.Conv2d(sixteenth, eighth, 1), block(eighth, eighth)
+        self.to_quarter, self.at_quarter = nn.Conv2d(eighth, quarter, 1), block(quarter, quarter)
+        self.map = nn.Conv2d(quarter, CHANNELS, 1)
         nn.init.normal_(self.map.weight, std=0.01)
         nn.init.zeros_(self.map.bias)
         self.map.bias.data[0] = RARE
@@ -70,7 +80,7 @@ def _doubled(features: torch.Tensor) -> torch.Tensor:
 
 def folded(network: FruitNetwork) -> FruitNetwork:
     """Give a copy without normalisations: they have gone into the convolutions before them."""
-    plain = FruitNetwork(normalised=False).eval()
+    plain = FruitNetwork(normalised=False, wider=network.wider).eval()
     weights = network.state_dict()
     for name, module in network.named_modules():
         if isinstance(module, nn.BatchNorm2d):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -15,21 +14,16 @@ from torch.utils.data import DataLoader, Dataset
 
 from pomona.atomic import whole_file
 from pomona.detect.training.cache import Sample
-from pomona.detect.training.fruit_network import FruitNetwork
-from pomona.detect.training.loss import loss_of
+from pomona.detect.training.fruit_network import WIDTHS, FruitNetwork
+from pomona.detect.training.learner import Learner
+from pomona.detect.training.loss import loss_of, unlike_teacher
 from pomona.detect.training.shown_crops import drawn_crop
 from pomona.detect.training.targets import Targets, targets_of
 
-__all__ = ["Plan", "Source", "mean_of", "train"]
+__all__ = ["Plan", "Source", "means_of", "train"]
 
 SAVED_EVERY = 25
 """Batches between two checkpoints: that is what an interruption costs at most."""
-
-KEPT = 0.998
-"""Of the mean of the weights, from one batch to the next; at the beginning less."""
-
-CLIPPED = 10.0
-"""Norm of a gradient, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +60,9 @@ class Plan:
         bfloat16 where it helps: on processors that calculate with it.
     device : str
         As PyTorch names it: cpu, cuda.
+    teacher : int
+        Times the channels of a second network that learns from the same crops, and from whose mean the first one
+        learns too; 0 for none.
     """
 
     batches: int = 13000
@@ -76,6 +73,7 @@ class Plan:
     seed: int = 1
     half_precision: bool = True
     device: str = "cpu"
+    teacher: int = 0
 
     def rate_at(self, number: int) -> float:
         """Give the rate of a batch."""
@@ -89,9 +87,8 @@ Progress = Callable[[int, float], None]
 
 @dataclass(eq=False)
 class _State:
-    network: FruitNetwork
-    mean: FruitNetwork
-    optimiser: torch.optim.Optimizer
+    learner: Learner
+    teacher: Learner | None
     done: int = 0
     loss: float = float("nan")
 
@@ -126,7 +123,8 @@ def train(
         The mean of its weights over the last batches.
     """
     torch.manual_seed(plan.seed)
-    state = _begun(FruitNetwork() if begin is None else begin, plan)
+    learner = Learner.begun(FruitNetwork() if begin is None else begin, plan.device)
+    state = _State(learner, Learner.begun(FruitNetwork(wider=plan.teacher), plan.device) if plan.teacher else None)
     if checkpoint.is_file():
         _restore(state, checkpoint)
     for pictures, wanted in _batches(sources, plan, state.done, workers):
@@ -134,41 +132,24 @@ def train(
         progress(state.done, state.loss)
         if state.done % SAVED_EVERY == 0 or state.done == plan.batches:
             _save(state, checkpoint)
-    return state.mean.cpu()
-
-
-def _begun(network: FruitNetwork, plan: Plan) -> _State:
-    network = network.to(plan.device, memory_format=torch.channels_last)
-    bent = [weights for weights in network.parameters() if weights.ndim > 1]
-    plain = [weights for weights in network.parameters() if weights.ndim == 1]
-    groups = [{"params": bent, "weight_decay": 0.02}, {"params": plain, "weight_decay": 0.0}]
-    return _State(network, copy.deepcopy(network), torch.optim.AdamW(groups, lr=plan.rate))
+    return state.learner.mean.cpu()
 
 
 def _step(state: _State, pictures: torch.Tensor, wanted: dict[str, torch.Tensor], plan: Plan) -> None:
-    for group in state.optimiser.param_groups:
-        group["lr"] = plan.rate_at(state.done)
-    state.network.train()
+    rate, told = plan.rate_at(state.done), None
     with torch.autocast(pictures.device.type, torch.bfloat16, enabled=plan.half_precision):
-        maps = state.network(pictures)
-    loss = loss_of(maps.float(), wanted)
-    state.optimiser.zero_grad(set_to_none=True)
-    loss.backward()
-    torch.nn.utils.clip_grad_norm_(state.network.parameters(), CLIPPED)
-    state.optimiser.step()
+        maps = state.learner.network(pictures).float()
+        if state.teacher is not None:
+            taught = state.teacher.network(pictures).float()
+            with torch.no_grad():
+                told = state.teacher.mean(pictures).float()
+    loss = loss_of(maps, wanted)
+    state.learner.follow(loss if told is None else loss + unlike_teacher(maps, told, wanted), rate, state.done)
+    if state.teacher is not None:
+        state.teacher.follow(loss_of(taught, wanted), rate, state.done)
     state.done += 1
-    _follow(state.mean, state.network, min(KEPT, state.done / (state.done + 10)))
     late = loss.item()
     state.loss = late if np.isnan(state.loss) else 0.98 * state.loss + 0.02 * late
-
-
-@torch.no_grad()
-def _follow(mean: FruitNetwork, network: FruitNetwork, kept: float) -> None:
-    for ours, theirs in zip(mean.state_dict().values(), network.state_dict().values(), strict=True):
-        if ours.is_floating_point():
-            ours.lerp_(theirs, 1 - kept)
-        else:
-            ours.copy_(theirs)
 
 
 _Batch = tuple[torch.Tensor, dict[str, torch.Tensor]]
@@ -219,28 +200,29 @@ def _drawn(sources: Sequence[Source], draw: np.random.Generator) -> list[Sample]
 
 
 def _save(state: _State, checkpoint: Path) -> None:
-    content: dict[str, Any] = {
-        "network": state.network.state_dict(),
-        "mean": state.mean.state_dict(),
-        "optimiser": state.optimiser.state_dict(),
-        "done": state.done,
-        "loss": state.loss,
-    }
+    content: dict[str, Any] = {**state.learner.state(), "done": state.done, "loss": state.loss}
+    if state.teacher is not None:
+        content["teacher"] = state.teacher.state()
     with whole_file(checkpoint) as partial:
         torch.save(content, partial)
 
 
 def _restore(state: _State, checkpoint: Path) -> None:
     content = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    state.network.load_state_dict(content["network"])
-    state.mean.load_state_dict(content["mean"])
-    state.optimiser.load_state_dict(content["optimiser"])
+    state.learner.restore(content)
+    if state.teacher is not None:
+        state.teacher.restore(content["teacher"])
     state.done, state.loss = content["done"], content["loss"]
 
 
-def mean_of(checkpoint: Path) -> tuple[FruitNetwork, int]:
-    """Give the mean network of a checkpoint, and how many batches it has seen."""
+def means_of(checkpoint: Path) -> tuple[FruitNetwork, FruitNetwork | None, int]:
+    """Give the mean network of a checkpoint, that of its teacher, None where it had none, and the batches they saw."""
     content = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    mean = FruitNetwork()
-    mean.load_state_dict(content["mean"])
-    return mean.eval(), content["done"]
+    teacher = content.get("teacher")
+    return _holding(content["mean"]), None if teacher is None else _holding(teacher["mean"]), content["done"]
+
+
+def _holding(weights: dict[str, torch.Tensor]) -> FruitNetwork:
+    network = FruitNetwork(wider=weights["stem.0.0.weight"].shape[0] // WIDTHS[0])
+    network.load_state_dict(weights)
+    return network.eval()

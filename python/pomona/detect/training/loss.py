@@ -7,7 +7,7 @@ from torch.nn import functional
 
 from pomona.detect.training.fruit_network import SIZE_PX
 
-__all__ = ["edges_of", "loss_of"]
+__all__ = ["edges_of", "loss_of", "unlike_teacher"]
 
 BOXES = 2.0
 SHARES = 0.2
@@ -30,6 +30,20 @@ def loss_of(maps: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor
     known = torch.isfinite(wanted["visible"]) & (weights > 0)
     shares = functional.binary_cross_entropy_with_logits(maps[:, 5][known], wanted["visible"][known], reduction="sum")
     return centres + BOXES * boxes + SHARES * shares / total
+
+
+def unlike_teacher(maps: torch.Tensor, told: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Give how far maps are from a teacher's, both (N, 6, h, w), for one fruit in the mean.
+
+    Where it is sure and where it doubts tells more than centres that are there or not: the quality focal loss of Li et
+    al. (2020, eq. 6) against its scores, and its boxes as far as it is sure of them.
+    """
+    scores = told[:, 0].sigmoid()
+    off = (maps[:, 0].sigmoid() - scores) ** 2
+    centres = (off * functional.binary_cross_entropy_with_logits(maps[:, 0], scores, reduction="none")).sum()
+    n_fruits = (wanted["heat"] == 1).sum().clamp(min=1)
+    boxes = (scores * _unlike(edges_of(maps), edges_of(told))).sum() / scores.sum().clamp(min=1)
+    return centres / n_fruits + BOXES * boxes
 
 
 def _centres(logits: torch.Tensor, wanted: dict[str, torch.Tensor]) -> torch.Tensor:

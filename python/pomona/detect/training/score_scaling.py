@@ -47,7 +47,7 @@ def fitted_scaling(found: Judged) -> Scaling:
 @torch.no_grad()
 def scaled_network(network: FruitNetwork, scaling: Scaling) -> FruitNetwork:
     """Give a network whose logits of centres are scaled: no decoder needs to know of it."""
-    made = FruitNetwork(normalised=False).eval()
+    made = FruitNetwork(normalised=False, wider=network.wider).eval()
     made.load_state_dict(network.state_dict())
     made.map.weight[0] *= scaling.slope
     made.map.bias[0] = made.map.bias[0] * scaling.slope + scaling.offset

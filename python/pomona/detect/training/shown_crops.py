@@ -18,10 +18,16 @@ SIDE_PX = 320
 """Of a crop; half of it is the side of one of four pictures in a crop."""
 
 MAX_ENLARGED = 1.6
-"""Of a picture alone; beyond that it is blurred more than any that it stands for. One of four gets half as large."""
+"""Of a picture alone; beyond that it is blurred more than any that it stands for."""
 
-FOUR = 0.6
+MAX_OF_FOUR = 1.1
+"""The same of one of four: larger, too little is left of what is around a fruit."""
+
+FOUR = 0.45
 """Share of crops made of four pictures: the only way in which a picture gets smaller than a crop."""
+
+STRETCHED = 0.06
+"""Standard deviation of the logarithm by which a picture gets wider, and as much lower."""
 
 AGAIN = 2
 """Times that a square without a fruit is drawn again: most of what is learnt is learnt at fruits."""
@@ -79,16 +85,17 @@ def _joined(pixels: NDArray[np.uint8], parts: Sequence[PictureCrop]) -> PictureC
 
 
 def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Generator) -> PictureCrop:
-    """Cut a square of a picture, scaled and turned over at random, to lie at a corner of the crop."""
-    height, width = sample.pixels.shape[:2]
-    least = side / min(height, width)
-    scale = np.exp(draw.uniform(np.log(least), np.log(max(MAX_ENLARGED * side / SIDE_PX, least))))
-    seen = min(int(np.ceil(side / scale)), height, width)
+    """Cut a part of a picture, scaled, stretched and turned over at random, to lie at a corner of the crop."""
+    size = np.array(sample.pixels.shape[1::-1])
+    least, most = side / size.min(), MAX_ENLARGED if side == SIDE_PX else MAX_OF_FOUR
+    scale = np.exp(draw.uniform(np.log(least), np.log(max(most, least))))
+    stretch = np.exp(draw.normal(0, STRETCHED) * np.array([0.5, -0.5]))
+    seen = np.minimum(np.ceil(side / (scale * stretch)).astype(int), size)
     left, top = _corner(sample, seen, draw)
-    pixels = _resized(sample.pixels[top : top + seen, left : left + seen], side)
-    labelled, by = sample.labelled, side / seen
+    pixels = _resized(sample.pixels[top : top + seen[1], left : left + seen[0]], side)
+    labelled, by = sample.labelled, np.tile(side / seen, 2).astype(np.float32)
     boxes_px, ignored_px = (
-        (boxes - np.array([left, top, left, top], np.float32)) * np.float32(by)
+        (boxes - np.array([left, top, left, top], np.float32)) * by
         for boxes in (labelled.boxes_px, labelled.ignored_px)
     )
     for axis, chance in ((0, 0.5), (1, 0.1)):
@@ -98,19 +105,19 @@ def _part(sample: Sample, side: int, corner: tuple[int, int], draw: np.random.Ge
     return _cut(pixels, boxes_px, labelled.visible, ignored_px, corner)
 
 
-def _corner(sample: Sample, seen: int, draw: np.random.Generator) -> tuple[int, int]:
-    """Draw where a square of a picture lies; mostly again where there is no fruit in it, but not for ever."""
-    height, width = sample.pixels.shape[:2]
+def _corner(sample: Sample, seen: NDArray[np.int64], draw: np.random.Generator) -> tuple[int, int]:
+    """Draw where a part of a picture, (2,) px, lies; mostly again where there is no fruit in it, but not for ever."""
+    free = np.array(sample.pixels.shape[1::-1]) - seen + 1
     middles = (sample.labelled.boxes_px[:, :2] + sample.labelled.boxes_px[:, 2:]) / 2
     for _ in range(AGAIN + 1):
-        corner = np.array([draw.integers(width - seen + 1), draw.integers(height - seen + 1)])
+        corner = draw.integers(free)
         if ((middles >= corner) & (middles < corner + seen)).all(axis=1).any():
             break
     return int(corner[0]), int(corner[1])
 
 
 def _resized(pixels: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
-    how = cv2.INTER_AREA if len(pixels) > side else cv2.INTER_LINEAR
+    how = cv2.INTER_AREA if min(pixels.shape[:2]) > side else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(pixels, (side, side), interpolation=how), np.uint8)
 
 

@@ -79,16 +79,18 @@ def _paint(made: Targets, box_px: NDArray[np.float32], visible: np.float32) -> N
     middle, sides = (box_px[:2] + box_px[2:]) / (2 * STRIDE), (box_px[2:] - box_px[:2]) / STRIDE
     spread = np.maximum(SPREAD * sides, LEAST_SPREAD)
     rows, columns = _cells_in(box_px)
-    y, x = np.mgrid[rows, columns][:, : len(made.heat), : len(made.heat)]
-    rows, columns = slice(y[0, 0], y[-1, 0] + 1), slice(x[0, 0], x[0, -1] + 1)
+    y, x = (np.arange(cells.start, min(cells.stop, len(made.heat))) for cells in (rows, columns))
     centre = np.minimum(middle.astype(int), len(made.heat) - 1)
-    off = ((x - centre[0]) / spread[0]) ** 2 + ((y - centre[1]) / spread[1]) ** 2
-    heat = np.exp(-off / 2).astype(np.float32)
-    made.heat[rows, columns] = np.maximum(made.heat[rows, columns], heat)
+    across, down = (
+        np.exp(-(((at - mid) / wide) ** 2) / 2) for at, mid, wide in zip((x, y), centre, spread, strict=True)
+    )
+    heat = (down[:, None] * across).astype(np.float32)
+    np.maximum(made.heat[rows, columns], heat, out=made.heat[rows, columns])
     nearer = (heat >= REGRESSED) & (heat >= made.weights[rows, columns])
     # The weights of a fruit add up to about the same, whatever its size.
     made.weights[rows, columns][nearer] = heat[nearer]
-    x_px, y_px = (x + 0.5) * STRIDE, (y + 0.5) * STRIDE
+    at_row, at_column = np.nonzero(nearer)
+    x_px, y_px = (x[at_column] + 0.5) * STRIDE, (y[at_row] + 0.5) * STRIDE
     edges_px = np.stack([x_px - box_px[0], y_px - box_px[1], box_px[2] - x_px, box_px[3] - y_px])
-    made.edges_px[:, rows, columns][:, nearer] = np.maximum(edges_px, 0.5)[:, nearer]
+    made.edges_px[:, rows, columns][:, nearer] = np.maximum(edges_px, 0.5)
     made.visible[rows, columns][nearer] = visible

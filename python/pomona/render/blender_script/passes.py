@@ -25,7 +25,7 @@ def light_pass(scene: Any, job: dict[str, Any]) -> None:
     _common(scene, job, job["samples"])
     cycles = scene.cycles
     cycles.seed, cycles.use_animated_seed = job["seed"] % 2**31, True
-    cycles.use_denoising, cycles.denoiser = True, "OPENIMAGEDENOISE"
+    cycles.use_denoising, cycles.denoiser, cycles.denoising_use_gpu = True, "OPENIMAGEDENOISE", job["gpu"]
     cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", "ACCURATE"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.transmission_bounces = 5, 4, 4
     cycles.glossy_bounces, cycles.transparent_max_bounces = 2, 2
