@@ -106,7 +106,7 @@ pub(super) struct Log {
     /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
     pub(super) best: f64,
     pub(super) settled: f64,
-    /// Evidence that a grown pose had to exceed, nats.
+    /// Evidence that a grown pose has to exceed, as far as the search shows, nats.
     pub(super) threshold: f64,
     /// The same once it is settled, nats.
     pub(super) settled_threshold: f64,
@@ -148,10 +148,10 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Evidence that a grown pose must exceed, nats.
-    pub(super) fn threshold(&self) -> f64 {
-        let (poses, share) = self.offered();
-        self.config.threshold(poses, share)
+    /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
+    pub(super) fn threshold(&self, share: f64) -> f64 {
+        let (poses, _) = self.offered();
+        self.config.threshold(poses, self.model.vertical.map_or(1.0, |_| share))
     }
 
     /// Evidence from which on another pose counts as a rival, accepted or not, nats.

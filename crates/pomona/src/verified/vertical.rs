@@ -24,7 +24,14 @@ impl Vertical {
 
     /// Share of all turns that keep the vertical: the cap of directions within the lean, over the sphere.
     pub(crate) fn share_of_turns() -> f64 {
-        (1.0 - MAX_LEAN_RAD.cos()) / 2.0
+        cap(MAX_LEAN_RAD)
+    }
+
+    /// How a pose stands whose turn about each axis has the `variance` (rad^2).
+    pub(crate) fn stand(&self, pose: &Placement, variance: f64) -> Stands {
+        let within = gate(variance).min(std::f64::consts::FRAC_PI_2);
+        let inverted = f64::from(u8::from(std::f64::consts::PI - self.lean(pose) < within));
+        Stands { all: 1.0, inverted, by_chance: cap(within) }
     }
 
     pub(crate) fn admits(&self, pose: &Placement) -> bool {
@@ -38,20 +45,66 @@ impl Vertical {
     /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the
     /// vertical is surer than the pose; `None` where the two contradict each other.
     pub(crate) fn straightened(&self, pose: &Placement, middle: &Vector3<f64>, variance: f64) -> Option<Placement> {
-        let (lean, both) = (self.lean(pose), variance + LEAN_RAD * LEAN_RAD);
-        if lean > GATE * both.sqrt() {
+        let lean = self.lean(pose);
+        if lean > gate(variance) {
             return None;
         }
         let Some(axis) = Unit::try_new((pose.rotation * self.query).cross(&self.map), f64::EPSILON) else {
             return Some(*pose);
         };
-        Some(pose.turned(middle, &Rotation3::from_axis_angle(&axis, lean * variance / both)))
+        Some(pose.turned(middle, &Rotation3::from_axis_angle(&axis, lean * variance / (variance + LEAN_RAD * LEAN_RAD))))
+    }
+}
+
+/// How far a pose may lean whose turn about each axis has the `variance`, radians.
+fn gate(variance: f64) -> f64 {
+    GATE * (variance + LEAN_RAD * LEAN_RAD).sqrt()
+}
+
+/// Share of all directions within an angle of one.
+fn cap(angle: f64) -> f64 {
+    (1.0 - angle.cos()) / 2.0
+}
+
+/// How poses stand that seeds propose.
+///
+/// Wrong poses are turned alike in all directions only where fruits hang so. Wires and tiers of branches lie on themselves
+/// upright, and as often upside down. A pose that is upside down is wrong for sure, so these are counted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Stands {
+    all: f64,
+    /// Upside down, as nearly as a pose is taken for upright.
+    inverted: f64,
+    /// As many as would be, were all turns alike.
+    by_chance: f64,
+}
+
+impl std::ops::Add for Stands {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            all: self.all + other.all,
+            inverted: self.inverted + other.inverted,
+            by_chance: self.by_chance + other.by_chance,
+        }
+    }
+}
+
+impl Stands {
+    /// Share of the wrong poses that a known vertical leaves: that of all turns, and those that lie on themselves.
+    ///
+    /// As many more as have one upright by chance are taken for turned alike, so that few poses say little.
+    pub(crate) fn share_left(&self) -> f64 {
+        let alike = Vertical::share_of_turns();
+        alike + (self.inverted - self.by_chance).max(0.0) / (self.all + 1.0 / alike)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verified::fixture::Dice;
+    use nalgebra::{Quaternion, UnitQuaternion};
 
     #[test]
     fn a_sure_pose_stays_and_an_unsure_one_is_pulled_upright() {
@@ -74,6 +127,33 @@ mod tests {
         let middle = Vector3::new(0.4, -0.2, 1.0);
         let pose = Placement::identity().turned(&middle, &Rotation3::new(Vector3::z() * 0.7));
         assert_eq!(up.straightened(&pose, &middle, 0.1), Some(pose));
+    }
+
+    /// Poses that `turn_of` gives, counted.
+    fn counted(turn_of: impl Fn(&mut Dice) -> Rotation3<f64>) -> Stands {
+        let (up, mut dice) = (Vertical::new([Vector3::z(); 2]), Dice(5));
+        let stand = |_| {
+            let pose = Placement { rotation: turn_of(&mut dice).into_inner(), ..Placement::identity() };
+            up.stand(&pose, 0.01)
+        };
+        (0..2000).map(stand).fold(Stands::default(), std::ops::Add::add)
+    }
+
+    #[test]
+    fn what_lies_on_itself_upside_down_counts_and_what_is_turned_alike_does_not() {
+        let turned = |dice: &mut Dice| {
+            let [x, y, z, w] = [0; 4].map(|_| dice.normal().x);
+            Rotation3::from(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
+        };
+        let alike = Vertical::share_of_turns();
+        assert!((alike..2.0 * alike).contains(&counted(turned).share_left()));
+        assert!((Stands::default().share_left() - alike).abs() < 1e-12);
+        // One in ten is upside down, by some degrees more or less.
+        let wires = |dice: &mut Dice| match dice.uniform() < 0.1 {
+            true => Rotation3::new(dice.normal() * 0.1) * Rotation3::new(Vector3::x() * std::f64::consts::PI),
+            false => turned(dice),
+        };
+        assert!((0.07..0.13).contains(&counted(wires).share_left()));
     }
 
     #[test]
