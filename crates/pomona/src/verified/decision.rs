@@ -111,7 +111,7 @@ pub(crate) fn pairs_under(
     let growth = hold(search.query, search.map, &seed, &model);
     let mut finding = Finding::new(growth, seed);
     search.settle(&mut finding);
-    search.answer(Findings { accepted: vec![finding], others: Vec::new() }, Vec::new())
+    search.answer(Findings { accepted: vec![finding], ..Findings::default() }, Vec::new())
 }
 
 impl<'a> Search<'a> {
@@ -144,6 +144,7 @@ impl<'a> Search<'a> {
             findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        findings.pattern = self.pattern(log.effort.stands.share_left());
         let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
     }
@@ -165,6 +166,7 @@ impl<'a> Search<'a> {
             self.doubt(&mut findings, &[], &mut log);
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        findings.pattern = self.pattern(log.effort.stands.share_left());
         let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
     }

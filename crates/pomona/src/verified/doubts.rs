@@ -147,9 +147,9 @@ impl<'a> Search<'a> {
     /// Whether another optimum has nearly as much evidence elsewhere.
     ///
     /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere.
-    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
+    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap, pattern: f64) -> bool {
         let elsewhere = self.elsewhere(best, other);
-        elsewhere > MOST && elsewhere * other.log_odds > self.pattern().max(RIVAL * best.log_odds)
+        elsewhere > MOST && elsewhere * other.log_odds > pattern.max(RIVAL * best.log_odds)
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.

@@ -1,7 +1,7 @@
 //! A vertical that is known in both clouds: what it leaves of a pose.
 
 use super::placement::Placement;
-use nalgebra::{Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// How far the vertical of the true pose may lean from the one given: 10 degrees, two standard deviations.
 const MAX_LEAN_RAD: f64 = 0.175;
@@ -45,14 +45,20 @@ impl Vertical {
     /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the
     /// vertical is surer than the pose; `None` where the two contradict each other.
     pub(crate) fn straightened(&self, pose: &Placement, middle: &Vector3<f64>, variance: f64) -> Option<Placement> {
-        let lean = self.lean(pose);
-        if lean > gate(variance) {
-            return None;
-        }
+        let precision = Matrix3::identity() / variance.max(f64::MIN_POSITIVE);
+        (self.lean(pose) <= gate(variance)).then(|| self.upheld(pose, middle, &precision))
+    }
+
+    /// The pose that pairs, which fix its turn with the `precision` (rad^-2), and the vertical say together.
+    ///
+    /// A cordon fixes its own roll badly and all else well: it is the roll that is pulled upright.
+    pub(crate) fn upheld(&self, pose: &Placement, middle: &Vector3<f64>, precision: &Matrix3<f64>) -> Placement {
         let Some(axis) = Unit::try_new((pose.rotation * self.query).cross(&self.map), f64::EPSILON) else {
-            return Some(*pose);
+            return *pose;
         };
-        Some(pose.turned(middle, &Rotation3::from_axis_angle(&axis, lean * variance / (variance + LEAN_RAD * LEAN_RAD))))
+        let level = (Matrix3::identity() - self.map * self.map.transpose()) / (LEAN_RAD * LEAN_RAD);
+        let turn = (precision + level).cholesky().map(|both| both.solve(&(level * axis.scale(self.lean(pose)))));
+        turn.map_or(*pose, |turn| pose.turned(middle, &Rotation3::new(turn)))
     }
 }
 
@@ -93,10 +99,12 @@ impl std::ops::Add for Stands {
 impl Stands {
     /// Share of the wrong poses that a known vertical leaves: that of all turns, and those that lie on themselves.
     ///
-    /// As many more as have one upright by chance are taken for turned alike, so that few poses say little.
+    /// What counts is what exceeds chance by more than its standard deviation, and as many more poses as have one upright by
+    /// chance are taken for turned alike: few poses say little.
     pub(crate) fn share_left(&self) -> f64 {
         let alike = Vertical::share_of_turns();
-        alike + (self.inverted - self.by_chance).max(0.0) / (self.all + 1.0 / alike)
+        let beyond_chance = self.inverted - self.by_chance - self.by_chance.sqrt();
+        alike + beyond_chance.max(0.0) / (self.all + 1.0 / alike)
     }
 }
 
@@ -119,6 +127,17 @@ mod tests {
         let fallen = Placement::identity().turned(&middle, &Rotation3::new(Vector3::x() * 1.0));
         assert!(up.straightened(&fallen, &middle, 0.01).is_none());
         assert!(up.admits(&leaning) && !up.admits(&fallen));
+    }
+
+    #[test]
+    fn pairs_along_a_line_keep_its_direction_and_give_up_its_roll() {
+        let up = Vertical::new([Vector3::z(); 2]);
+        let leaning = Placement::identity().turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.1, 0.1, 0.1)));
+        let held = up.upheld(&leaning, &Vector3::zeros(), &Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
+        let along = |pose: &Placement| pose.rotation * Vector3::x();
+        assert!((along(&held) - along(&leaning)).norm() < 0.01);
+        assert!(up.lean(&held) < 0.12 && (up.lean(&leaning) - 0.141).abs() < 0.01);
+        assert!((held.rotation * Vector3::y()).z.abs() < 0.02 && (leaning.rotation * Vector3::y()).z > 0.09);
     }
 
     #[test]
