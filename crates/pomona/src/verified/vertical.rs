@@ -99,12 +99,10 @@ impl std::ops::Add for Stands {
 impl Stands {
     /// Share of the wrong poses that a known vertical leaves: that of all turns, and those that lie on themselves.
     ///
-    /// What counts is what exceeds chance by more than its standard deviation, and as many more poses as have one upright by
-    /// chance are taken for turned alike: few poses say little.
+    /// As many more as have one upright by chance are taken for turned alike, so that few poses say little.
     pub(crate) fn share_left(&self) -> f64 {
         let alike = Vertical::share_of_turns();
-        let beyond_chance = self.inverted - self.by_chance - self.by_chance.sqrt();
-        alike + beyond_chance.max(0.0) / (self.all + 1.0 / alike)
+        alike + (self.inverted - self.by_chance).max(0.0) / (self.all + 1.0 / alike)
     }
 }
 
