@@ -48,6 +48,9 @@ const FEW_SEEDS: u64 = 1500;
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
 
+/// Rows laid along rows that are held against each other over all of the query.
+const LAID: usize = 3;
+
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
 const LEAST_LAID: f64 = 16.0;
 
@@ -308,7 +311,7 @@ impl<'a> Search<'a> {
         log.refined += hypotheses.len();
         let few = Model { detection: offsets::FEW_AGAIN, ..self.model };
         let grown = |seed: &Hypothesis| lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few });
-        for seed in hypotheses.iter().take(offsets::LAID).filter(|seed| seed.log_odds > LEAST_LAID) {
+        for seed in hypotheses.iter().take(LAID).filter(|seed| seed.log_odds > LEAST_LAID) {
             if !findings.accepted.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
                 log.grown += 1;
                 findings.accepted.push(Finding::new(grown(seed), *seed));

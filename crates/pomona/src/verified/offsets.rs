@@ -6,7 +6,7 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is looked at, and the best is refined on all
 //! fruits at once, under the share that is seen again where ordinary shares have found nothing.
 
-use super::hypothesis::{Hypothesis, Model, Scratch, refine};
+use super::hypothesis::{Evidence, GATE, Hypothesis, Model, Scratch, refine};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::votes::{Peak, Rows};
@@ -17,21 +17,13 @@ use rayon::prelude::*;
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
 
-/// Poses that are refined at the width of a cell, and how many of them at that of the noise.
-const LOOKED_AT: usize = 128;
+/// Poses that are looked at, and how many of them are refined.
+const LOOKED_AT: usize = 64;
 const REFINED: usize = 12;
 
 /// Two peaks within so many spacings, and turned by less than so many radians, are one.
 const SAME: f64 = 0.5;
 const SAME_TURN_RAD: f64 = 0.06;
-
-/// Turns about each axis, radians, from which a pose is refined once more, and how often: the votes' turns are 2 and 4 degrees
-/// apart, and at the ends of a row half of that is as far as fruits hang from each other.
-const TILTS: [f64; 2] = [-0.04, 0.04];
-const TILTINGS: usize = 3;
-
-/// The best poses: these are tilted, and held against each other over all of the query.
-pub(super) const LAID: usize = 3;
 
 /// Noise of a peak, in that of a pair: its cell is wider than the noise.
 const WIDE: f64 = 2.5;
@@ -49,27 +41,17 @@ pub(super) fn hypotheses(
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
     let wide = Model { sigma: WIDE * model.sigma, ..model };
-    let refined = |poses: &[Placement], model: &Model| -> Vec<Hypothesis> {
-        let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-        let from = |scratch: &mut Scratch, pose: &Placement| {
-            refine(query, map, pose, &Vector3::zeros(), reach, model, scratch)
-        };
-        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(Scratch::default, from).flatten_iter().collect();
-        found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-        found
+    let mut looks: Vec<(f64, Placement)> = distinct(rows.peaks(admits), map.spacing)
+        .par_iter()
+        .map(|pose| (look(query, map, &wide, pose), *pose))
+        .collect();
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    looks.truncate(REFINED);
+    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+    let refined = |scratch: &mut Scratch, (_, pose): &(f64, Placement)| {
+        refine(query, map, pose, &Vector3::zeros(), reach, &model, scratch)
     };
-    let looks = refined(&distinct(rows.peaks(admits), map.spacing), &wide);
-    let best: Vec<Placement> = looks.iter().take(REFINED).map(|look| look.pose).collect();
-    let mut found = refined(&best, &model);
-    for seed in found.iter_mut().take(LAID) {
-        for _ in 0..TILTINGS {
-            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &TILTS).collect();
-            match refined(&tilted, &model).first() {
-                Some(better) if better.log_odds > seed.log_odds => *seed = *better,
-                _ => break,
-            }
-        }
-    }
+    let mut found: Vec<Hypothesis> = looks.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }
@@ -87,6 +69,20 @@ fn distinct(mut peaks: Vec<Peak>, spacing: f64) -> Vec<Placement> {
         }
     }
     kept
+}
+
+/// What the fruits of the query meet under a pose, nats.
+fn look(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement) -> f64 {
+    let variance = model.sigma * model.sigma;
+    let mut evidence = Evidence::default();
+    for p in &query.points {
+        let place = pose.apply(p);
+        evidence.multiply(match map.nearest(&place, GATE * model.sigma) {
+            Some((partner, d2)) => model.met(d2, variance, map.density[partner as usize]),
+            None => model.missed(map.support(&place)),
+        });
+    }
+    evidence.log_odds()
 }
 
 #[cfg(test)]
