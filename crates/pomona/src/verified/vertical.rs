@@ -131,7 +131,8 @@ mod tests {
     fn pairs_along_a_line_keep_its_direction_and_give_up_its_roll() {
         let up = Vertical::new([Vector3::z(); 2]);
         let leaning = Placement::identity().turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.1, 0.1, 0.1)));
-        let held = up.upheld(&leaning, &Vector3::zeros(), &Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
+        let precision = leaning.seen_from_map(&Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
+        let held = up.upheld(&leaning, &Vector3::zeros(), &precision);
         let along = |pose: &Placement| pose.rotation * Vector3::x();
         assert!((along(&held) - along(&leaning)).norm() < 0.01);
         assert!(up.lean(&held) < 0.12 && (up.lean(&leaning) - 0.141).abs() < 0.01);
