@@ -75,6 +75,8 @@ pub(super) struct Findings<'a> {
     pub(super) accepted: Vec<Finding<'a>>,
     /// Other poses that it grew: what chance and the planting's own pattern reach.
     pub(super) others: Vec<Finding<'a>>,
+    /// Evidence from which on these show a pattern, nats.
+    pub(super) pattern: f64,
 }
 
 impl<'a> Finding<'a> {
@@ -106,7 +108,7 @@ pub(super) struct Log {
     /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
     pub(super) best: f64,
     pub(super) settled: f64,
-    /// Evidence that a grown pose had to exceed, nats.
+    /// Evidence that a grown pose has to exceed, as far as the search shows, nats.
     pub(super) threshold: f64,
     /// The same once it is settled, nats.
     pub(super) settled_threshold: f64,
@@ -148,16 +150,14 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Evidence that a grown pose must exceed, nats.
-    pub(super) fn threshold(&self) -> f64 {
-        let (poses, share) = self.offered();
-        self.config.threshold(poses, share)
+    /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
+    pub(super) fn threshold(&self, share: f64) -> f64 {
+        self.config.threshold(self.offered(), self.model.vertical.map_or(1.0, |_| share))
     }
 
     /// Evidence from which on another pose counts as a rival, accepted or not, nats.
-    pub(super) fn pattern(&self) -> f64 {
-        let (poses, share) = self.offered();
-        pattern(poses, share)
+    pub(super) fn pattern(&self, share: f64) -> f64 {
+        pattern(self.offered(), self.model.vertical.map_or(1.0, |_| share))
     }
 
     /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
@@ -165,10 +165,9 @@ impl<'a> Search<'a> {
         self.config.threshold(poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
     }
 
-    /// Poses that the two clouds offer, and the share of all turns that a known vertical leaves.
-    fn offered(&self) -> (f64, f64) {
-        let share = self.model.vertical.map_or(1.0, |_| Vertical::share_of_turns());
-        (poses(self.query.len(), self.map_fruits, self.model.scale), share)
+    /// Poses that the two clouds offer.
+    fn offered(&self) -> f64 {
+        poses(self.query.len(), self.map_fruits, self.model.scale)
     }
 
     pub(super) fn admits(&self, pose: &Placement) -> bool {

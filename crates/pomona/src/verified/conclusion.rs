@@ -9,13 +9,13 @@ impl Search<'_> {
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
     /// The other optima of the same search show what wrong poses reach on this very planting.
-    pub(super) fn answer(&self, Findings { accepted, others }: Findings, mut stages: Stages) -> Match {
+    pub(super) fn answer(&self, Findings { accepted, others, pattern }: Findings, mut stages: Stages) -> Match {
         let mut accepted = accepted.into_iter();
         let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
-        let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap);
+        let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap, pattern);
         let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
         let outdone = others.iter().any(rivals);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);

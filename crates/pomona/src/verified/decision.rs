@@ -12,6 +12,7 @@ use super::placement::Placement;
 use super::search::{Contender, Effort, Starts, of_some_fruits, refined, round};
 use super::seeds::{self, Seed};
 use super::size::Diameters;
+use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
@@ -110,25 +111,26 @@ pub(crate) fn pairs_under(
     let growth = hold(search.query, search.map, &seed, &model);
     let mut finding = Finding::new(growth, seed);
     search.settle(&mut finding);
-    search.answer(Findings { accepted: vec![finding], others: Vec::new() }, Vec::new())
+    search.answer(Findings { accepted: vec![finding], ..Findings::default() }, Vec::new())
 }
 
 impl<'a> Search<'a> {
     /// Rounds of seeds until a pose is accepted, then the outline.
     fn run(&self) -> (Findings<'a>, Stages) {
-        let mut log = Log::new(self.threshold());
+        let mut log = Log::new(self.threshold(Vertical::share_of_turns()));
         let mut findings = Findings::default();
         let mut longest = Vec::new();
         for (index, plan) in ROUNDS.into_iter().enumerate() {
             let seeds = self.seeds_of(index, &mut longest);
             let (hypotheses, rest) = self.round(&seeds, plan, &mut log);
-            log.grown += self.grow_distinct(&hypotheses, &mut findings.accepted);
+            self.grow_distinct(&hypotheses, &mut findings.accepted, &mut log);
             self.sift(&mut findings, &mut log);
             if !findings.accepted.is_empty() {
                 self.doubt(&mut findings, &rest, &mut log);
             } else if index == 1 {
                 // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
                 findings.accepted.extend(self.by_outline());
+                log.threshold = self.threshold(extent::UPRIGHT);
                 self.sift(&mut findings, &mut log);
             }
             if !findings.accepted.is_empty() {
@@ -142,18 +144,19 @@ impl<'a> Search<'a> {
             findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        findings.pattern = self.pattern(log.effort.stands.share_left());
         let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
     }
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
     pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> (Findings<'a>, Stages) {
-        let mut log = Log { effort, ..Log::new(self.threshold()) };
+        let mut log = Log { effort, ..Log::new(self.threshold(effort.stands.share_left())) };
         let mut findings = Findings::default();
         let hypotheses = refined(self.query, self.map, contenders, &self.model, Starts::Straight);
         log.refined = hypotheses.len();
         for some in hypotheses.chunks(GROWN) {
-            log.grown += self.grow_distinct(some, &mut findings.accepted);
+            self.grow_distinct(some, &mut findings.accepted, &mut log);
         }
         self.sift(&mut findings, &mut log);
         if findings.accepted.is_empty() {
@@ -163,6 +166,7 @@ impl<'a> Search<'a> {
             self.doubt(&mut findings, &[], &mut log);
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        findings.pattern = self.pattern(log.effort.stands.share_left());
         let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
     }
@@ -184,17 +188,17 @@ impl<'a> Search<'a> {
 
     /// Looks for rivals of what was found, and for better optima near it.
     fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender], log: &mut Log) {
-        log.grown += self.look_for_rivals(rest, &mut findings.accepted);
+        self.look_for_rivals(rest, &mut findings.accepted, log);
         // A pose found with few seeds has shown little of where else the query might lie.
         if log.seeds < FIRST_FRUITS {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
             let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
-            log.grown += self.grow_distinct(&more, &mut findings.accepted);
+            self.grow_distinct(&more, &mut findings.accepted, log);
         }
         self.sift(findings, log);
-        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * self.threshold();
+        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * log.threshold;
         findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
         self.sift(findings, log);
     }
@@ -204,6 +208,7 @@ impl<'a> Search<'a> {
         let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, seeds, plan);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
+        log.threshold = self.threshold(log.effort.stands.share_left());
         log.refined += hypotheses.len();
         (hypotheses, rest)
     }
@@ -240,13 +245,14 @@ impl<'a> Search<'a> {
         ]
     }
 
-    /// Grows the best hypotheses that no finding explains yet; returns how many.
-    pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
+    /// Grows the best hypotheses that no finding explains yet.
+    pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>, log: &mut Log) {
         let mut grown = 0;
         let mut left = hypotheses;
         while grown < GROWN {
             // What one of them explains of the next is thrown away: the others do not depend on how many grow at once.
-            let (some, after) = self.worth_growing(left, findings, rayon::current_num_threads().min(GROWN - grown));
+            let (some, after) =
+                self.worth_growing(left, findings, log.threshold, rayon::current_num_threads().min(GROWN - grown));
             if some.is_empty() {
                 break;
             }
@@ -256,13 +262,13 @@ impl<'a> Search<'a> {
                 .map(|seed| Finding::new(grow(self.query, self.map, seed, &self.model), **seed))
                 .collect();
             for finding in new {
-                if !self.worth_growing(&[finding.seed], findings, 1).0.is_empty() {
+                if !self.worth_growing(&[finding.seed], findings, log.threshold, 1).0.is_empty() {
                     grown += 1;
                     findings.push(finding);
                 }
             }
         }
-        grown as u32
+        log.grown += grown as u32;
     }
 
     /// The first `most` hypotheses that no finding explains yet, and those after them; none where they are too weak to be rivals.
@@ -270,9 +276,10 @@ impl<'a> Search<'a> {
         &self,
         hypotheses: &'h [Hypothesis],
         findings: &[Finding],
+        threshold: f64,
         most: usize,
     ) -> (Vec<&'h Hypothesis>, &'h [Hypothesis]) {
-        let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > self.threshold());
+        let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > threshold);
         let least = RIVAL_SEED * accepted.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
         let mut some: Vec<&Hypothesis> = Vec::new();
         for (at, seed) in hypotheses.iter().enumerate() {

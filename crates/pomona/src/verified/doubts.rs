@@ -1,6 +1,6 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
-use super::case::{Finding, Search};
+use super::case::{Finding, Log, Search};
 use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Scratch, refine};
 use super::nearest::single;
@@ -44,7 +44,7 @@ const POLISH_TURNS: [f64; 4] = [-0.175, -0.087, 0.087, 0.175];
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
     /// the true one may have more of the best.
-    pub(super) fn look_for_rivals(&self, rest: &[Contender], findings: &mut Vec<Finding<'a>>) -> u32 {
+    pub(super) fn look_for_rivals(&self, rest: &[Contender], findings: &mut Vec<Finding<'a>>, log: &mut Log) {
         let others: Vec<Contender> = rest
             .iter()
             .filter(|candidate| {
@@ -53,7 +53,7 @@ impl<'a> Search<'a> {
             .take(RIVAL_CANDIDATES)
             .copied()
             .collect();
-        self.grow_distinct(&refined(self.query, self.map, &others, &self.model, Starts::Straight), findings)
+        self.grow_distinct(&refined(self.query, self.map, &others, &self.model, Starts::Straight), findings, log);
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
@@ -147,9 +147,9 @@ impl<'a> Search<'a> {
     /// Whether another optimum has nearly as much evidence elsewhere.
     ///
     /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere.
-    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap) -> bool {
+    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap, pattern: f64) -> bool {
         let elsewhere = self.elsewhere(best, other);
-        elsewhere > MOST && elsewhere * other.log_odds > self.pattern().max(RIVAL * best.log_odds)
+        elsewhere > MOST && elsewhere * other.log_odds > pattern.max(RIVAL * best.log_odds)
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.

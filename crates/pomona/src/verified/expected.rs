@@ -14,6 +14,7 @@ use super::proposal::Proposer;
 use super::search::{Contender, Effort, RADIUS, by_evidence, distinct, of_some_fruits};
 use super::seeds::{Quad, SHORTEST, STARS, Seed};
 use super::size::Diameters;
+use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
@@ -44,7 +45,7 @@ pub(crate) fn search_expected(
     let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let contenders = search.contenders(&expected);
     let (findings, stages) = search.weigh(&contenders, Effort::default());
-    let least = SURE * search.threshold();
+    let least = SURE * search.threshold(Vertical::share_of_turns());
     if findings.accepted.first().is_some_and(|best| best.overlap.log_odds > least) {
         answer_of(&search, (findings, stages))
     } else {

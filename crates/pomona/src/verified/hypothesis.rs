@@ -31,6 +31,13 @@ impl Model {
         1.0 - self.detection + self.detection * gaussian(d2, variance) / density
     }
 
+    /// One least-squares step from `start`, of pairs whose noise is `sigma` and of a vertical that is known.
+    pub(crate) fn step(&self, pairs: &Moments, start: &Placement, sigma: f64) -> Option<Placement> {
+        let pose = pairs.step(start, self.scale, 0.0)?;
+        let Some(vertical) = self.vertical else { return Some(pose) };
+        Some(vertical.upheld(&pose, &pairs.centroid(), &(pairs.inertia_under(&pose) / (sigma * sigma))))
+    }
+
     /// Likelihood ratio of a fruit without a partner at a place of `support`; of a fruit of either visit.
     #[inline]
     pub(crate) fn missed(&self, support: f64) -> f64 {
@@ -148,7 +155,7 @@ pub(crate) fn refine(
         if step + 1 == STEPS {
             break;
         }
-        pose = moments.step(&pose, model.scale, 0.0)?;
+        pose = model.step(&moments, &pose, sigma)?;
         centroid = moments.centroid();
         freedom = 1.0 / moments.weight;
         inertia = moments.inertia();

@@ -184,7 +184,7 @@ impl Growth<'_> {
         if all.weight < FIXING {
             return;
         }
-        if let Some(pose) = all.step(&self.pose, self.model.scale, 0.0) {
+        if let Some(pose) = self.model.step(&all, &self.pose, self.sigma) {
             self.pose = pose;
         }
         let refitted = |(cell, wide): (&Cell, &Option<Moments>)| match wide {

@@ -146,6 +146,13 @@ impl Moments {
         self.weight * self.spread().trace() * 2.0 / 3.0
     }
 
+    /// Inertia of the query's points about their centroid as `pose` turns and scales them; over the variance of a pair it is
+    /// the inverse covariance of the turn.
+    pub(crate) fn inertia_under(&self, pose: &Placement) -> Matrix3<f64> {
+        let turned = pose.seen_from_map(&self.spread()) * self.weight;
+        Matrix3::identity() * turned.trace() - turned
+    }
+
     /// One Gauss-Newton step of the Procrustes problem from `start`, whose rotation must be near.
     ///
     /// Minimises the sum of w |m - s exp(w x) R q - t|^2 to first order in the turn: three linear equations instead

@@ -4,6 +4,7 @@ use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::seeds::{Quad, STARS, frame_of};
+use super::vertical::Stands;
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -115,10 +116,21 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     #[inline]
     pub(crate) fn upright(&self, pose: Placement) -> Option<Placement> {
         let Some(vertical) = self.model.vertical else { return Some(pose) };
+        vertical.straightened(&pose, &self.centroid, self.turn_variance(&pose))
+    }
+
+    /// How the pose stands, where a vertical is known.
+    #[inline]
+    pub(crate) fn stand(&self, pose: &Placement) -> Stands {
+        self.model.vertical.map_or(Stands::default(), |vertical| vertical.stand(pose, self.turn_variance(pose)))
+    }
+
+    /// Variance of the turn about each axis.
+    #[inline]
+    fn turn_variance(&self, pose: &Placement) -> f64 {
         // The noise is in metres of the map, the inertia in those of the query.
         let sigma = self.model.sigma / pose.scale;
-        let variance = sigma * sigma * self.inverse_inertia.trace() / 3.0;
-        vertical.straightened(&pose, &self.centroid, variance)
+        sigma * sigma * self.inverse_inertia.trace() / 3.0
     }
 
     /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.

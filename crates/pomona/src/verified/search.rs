@@ -5,6 +5,7 @@ use super::landscape::Landscape;
 use super::placement::Placement;
 use super::proposal::Proposer;
 use super::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
+use super::vertical::Stands;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -36,6 +37,8 @@ pub(crate) struct Effort {
     pub(crate) codes: u64,
     pub(crate) candidates: u64,
     pub(crate) fitted: u64,
+    /// How those stood that fit in space.
+    pub(crate) stands: Stands,
 }
 
 impl std::ops::Add for Effort {
@@ -45,6 +48,7 @@ impl std::ops::Add for Effort {
             codes: self.codes + other.codes,
             candidates: self.candidates + other.candidates,
             fitted: self.fitted + other.fitted,
+            stands: self.stands + other.stands,
         }
     }
 }
@@ -123,6 +127,7 @@ fn candidates_of(
             if residual > 2.0 * (apart * model.sigma).powi(2) {
                 continue;
             }
+            effort.stands = effort.stands + proposer.stand(&pose);
             let Some(pose) = proposer.upright(pose) else { continue };
             effort.fitted += 1;
             let log_odds = proposer.first_look(&pose);

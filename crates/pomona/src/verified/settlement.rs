@@ -14,6 +14,7 @@ use super::cut::{Cell, Cut, key_of, surroundings, total};
 use super::displacement::{carried_on, shared_by_neighbours, told_by_neighbours};
 use super::evidence::evidence;
 use super::growth::{Growth, Partner};
+use super::hypothesis::Model;
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
 use super::overlap::Overlap;
@@ -64,7 +65,7 @@ type Target = Option<(Vector3<f64>, f64)>;
 struct Settlement<'a> {
     query: &'a Landscape,
     map: &'a Landscape,
-    scale: Scale,
+    model: Model,
     expected: KnownNoise,
     cells: Vec<Cell>,
     cut: &'a Cut,
@@ -126,7 +127,7 @@ impl<'a> Settlement<'a> {
         Self {
             query: growth.query,
             map: growth.map,
-            scale: growth.model.scale,
+            model: growth.model,
             expected: match noise_m {
                 Some(noise_m) => KnownNoise::Given(noise_m),
                 None if growth.whole => KnownNoise::Outlined(growth.sigma),
@@ -241,7 +242,7 @@ impl<'a> Settlement<'a> {
     fn refit(&mut self, marginals: &Marginals) {
         self.follow(marginals);
         let all = total(self.cells.iter().map(|cell| (&cell.moments, 1.0)));
-        self.pose = all.step(&self.pose, self.scale, 0.0).unwrap_or(self.pose);
+        self.pose = self.model.step(&all, &self.pose, self.sigma).unwrap_or(self.pose);
         self.cells.iter_mut().for_each(|cell| cell.pose = self.pose);
         self.holds[1] = self.hold(WIDE_HOLDS);
         self.fit(surroundings, self.holds[1]);

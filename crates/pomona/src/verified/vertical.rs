@@ -1,7 +1,7 @@
 //! A vertical that is known in both clouds: what it leaves of a pose.
 
 use super::placement::Placement;
-use nalgebra::{Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// How far the vertical of the true pose may lean from the one given: 10 degrees, two standard deviations.
 const MAX_LEAN_RAD: f64 = 0.175;
@@ -24,7 +24,14 @@ impl Vertical {
 
     /// Share of all turns that keep the vertical: the cap of directions within the lean, over the sphere.
     pub(crate) fn share_of_turns() -> f64 {
-        (1.0 - MAX_LEAN_RAD.cos()) / 2.0
+        cap(MAX_LEAN_RAD)
+    }
+
+    /// How a pose stands whose turn about each axis has the `variance` (rad^2).
+    pub(crate) fn stand(&self, pose: &Placement, variance: f64) -> Stands {
+        let within = gate(variance).min(std::f64::consts::FRAC_PI_2);
+        let inverted = f64::from(u8::from(std::f64::consts::PI - self.lean(pose) < within));
+        Stands { all: 1.0, inverted, by_chance: cap(within) }
     }
 
     pub(crate) fn admits(&self, pose: &Placement) -> bool {
@@ -38,20 +45,72 @@ impl Vertical {
     /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the
     /// vertical is surer than the pose; `None` where the two contradict each other.
     pub(crate) fn straightened(&self, pose: &Placement, middle: &Vector3<f64>, variance: f64) -> Option<Placement> {
-        let (lean, both) = (self.lean(pose), variance + LEAN_RAD * LEAN_RAD);
-        if lean > GATE * both.sqrt() {
-            return None;
-        }
+        let precision = Matrix3::identity() / variance.max(f64::MIN_POSITIVE);
+        (self.lean(pose) <= gate(variance)).then(|| self.upheld(pose, middle, &precision))
+    }
+
+    /// The pose that pairs, which fix its turn with the `precision` (rad^-2), and the vertical say together.
+    ///
+    /// A cordon fixes its own roll badly and all else well: it is the roll that is pulled upright.
+    pub(crate) fn upheld(&self, pose: &Placement, middle: &Vector3<f64>, precision: &Matrix3<f64>) -> Placement {
         let Some(axis) = Unit::try_new((pose.rotation * self.query).cross(&self.map), f64::EPSILON) else {
-            return Some(*pose);
+            return *pose;
         };
-        Some(pose.turned(middle, &Rotation3::from_axis_angle(&axis, lean * variance / both)))
+        let level = (Matrix3::identity() - self.map * self.map.transpose()) / (LEAN_RAD * LEAN_RAD);
+        let turn = (precision + level).cholesky().map(|both| both.solve(&(level * axis.scale(self.lean(pose)))));
+        turn.map_or(*pose, |turn| pose.turned(middle, &Rotation3::new(turn)))
+    }
+}
+
+/// How far a pose may lean whose turn about each axis has the `variance`, radians.
+fn gate(variance: f64) -> f64 {
+    GATE * (variance + LEAN_RAD * LEAN_RAD).sqrt()
+}
+
+/// Share of all directions within an angle of one.
+fn cap(angle: f64) -> f64 {
+    (1.0 - angle.cos()) / 2.0
+}
+
+/// How poses stand that seeds propose.
+///
+/// Wrong poses are turned alike in all directions only where fruits hang so. Wires and tiers of branches lie on themselves
+/// upright, and as often upside down. A pose that is upside down is wrong for sure, so these are counted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Stands {
+    all: f64,
+    /// Upside down, as nearly as a pose is taken for upright.
+    inverted: f64,
+    /// As many as would be, were all turns alike.
+    by_chance: f64,
+}
+
+impl std::ops::Add for Stands {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            all: self.all + other.all,
+            inverted: self.inverted + other.inverted,
+            by_chance: self.by_chance + other.by_chance,
+        }
+    }
+}
+
+impl Stands {
+    /// Share of the wrong poses that a known vertical leaves: that of all turns, and those that lie on themselves.
+    ///
+    /// As many more as have one upright by chance are taken for turned alike, so that few poses say little.
+    pub(crate) fn share_left(&self) -> f64 {
+        let alike = Vertical::share_of_turns();
+        alike + (self.inverted - self.by_chance).max(0.0) / (self.all + 1.0 / alike)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verified::fixture::Dice;
+    use nalgebra::{Quaternion, UnitQuaternion};
 
     #[test]
     fn a_sure_pose_stays_and_an_unsure_one_is_pulled_upright() {
@@ -69,11 +128,50 @@ mod tests {
     }
 
     #[test]
+    fn pairs_along_a_line_keep_its_direction_and_give_up_its_roll() {
+        let up = Vertical::new([Vector3::z(); 2]);
+        let leaning = Placement::identity().turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.1, 0.1, 0.1)));
+        let precision = leaning.seen_from_map(&Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
+        let held = up.upheld(&leaning, &Vector3::zeros(), &precision);
+        let along = |pose: &Placement| pose.rotation * Vector3::x();
+        assert!((along(&held) - along(&leaning)).norm() < 0.01);
+        assert!(up.lean(&held) < 0.12 && (up.lean(&leaning) - 0.141).abs() < 0.01);
+        assert!((held.rotation * Vector3::y()).z.abs() < 0.02 && (leaning.rotation * Vector3::y()).z > 0.09);
+    }
+
+    #[test]
     fn a_pose_that_does_not_lean_is_kept_exactly() {
         let up = Vertical::new([Vector3::z(); 2]);
         let middle = Vector3::new(0.4, -0.2, 1.0);
         let pose = Placement::identity().turned(&middle, &Rotation3::new(Vector3::z() * 0.7));
         assert_eq!(up.straightened(&pose, &middle, 0.1), Some(pose));
+    }
+
+    /// Poses that `turn_of` gives, counted.
+    fn counted(turn_of: impl Fn(&mut Dice) -> Rotation3<f64>) -> Stands {
+        let (up, mut dice) = (Vertical::new([Vector3::z(); 2]), Dice(5));
+        let stand = |_| {
+            let pose = Placement { rotation: turn_of(&mut dice).into_inner(), ..Placement::identity() };
+            up.stand(&pose, 0.01)
+        };
+        (0..2000).map(stand).fold(Stands::default(), std::ops::Add::add)
+    }
+
+    #[test]
+    fn what_lies_on_itself_upside_down_counts_and_what_is_turned_alike_does_not() {
+        let turned = |dice: &mut Dice| {
+            let [x, y, z, w] = [0; 4].map(|_| dice.normal().x);
+            Rotation3::from(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
+        };
+        let alike = Vertical::share_of_turns();
+        assert!((alike..2.0 * alike).contains(&counted(turned).share_left()));
+        assert!((Stands::default().share_left() - alike).abs() < 1e-12);
+        // One in ten is upside down, by some degrees more or less.
+        let wires = |dice: &mut Dice| match dice.uniform() < 0.1 {
+            true => Rotation3::new(dice.normal() * 0.1) * Rotation3::new(Vector3::x() * std::f64::consts::PI),
+            false => turned(dice),
+        };
+        assert!((0.07..0.13).contains(&counted(wires).share_left()));
     }
 
     #[test]

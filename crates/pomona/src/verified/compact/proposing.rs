@@ -145,7 +145,8 @@ pub(super) fn proposals(
         some.iter().filter_map(proposed).collect::<Vec<_>>()
     };
     let found = glanced.par_chunk_by(|a, b| a.look == b.look).flat_map_iter(of_look).collect();
-    (found, Effort { codes: looks.len() as u64, candidates: met, fitted: glanced.len() as u64 })
+    let fitted = glanced.len() as u64;
+    (found, Effort { codes: looks.len() as u64, candidates: met, fitted, ..Effort::default() })
 }
 
 /// What the looks meet and a glance does not drop, and how many they meet.
