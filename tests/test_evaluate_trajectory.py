@@ -162,7 +162,7 @@ def test_no_way_is_shrunk_to_a_point_or_mirrored_to_have_no_error() -> None:
     goes, still = placed([[0.1 * row, 0.0, 0.0] for row in range(9)]), placed([[0.1, 0.2, 0.3]] * 9)
     back = placed([[-0.1 * row, 0.0, 0.0] for row in range(9)])
     for estimate, truth in ((goes, still), (goes, back)):
-        with pytest.raises(PomonaError, match="--align scale: found .* as the scale, expected one above 0"):
+        with pytest.raises(PomonaError, match=r"--align scale: found .* as the scale, expected one above 0"):
             score_trajectory(estimate, truth, align="scale")
     assert score_trajectory(still, goes, align="scale").truth_from_estimate.scale == 1.0
     assert score_trajectory(goes, still, align="rigid").absolute.translation_m.max() > 0.3
