@@ -189,6 +189,14 @@ def test_one_tree_is_a_map(row):
     [
         (lambda here: here.update(EMPTY, np.eye(3)), "moved"),
         (lambda here: here.update(EMPTY, 2.0 * np.eye(4)), "moved"),
+        (lambda here: here.update(EMPTY, np.eye(4) + np.diag([np.inf] * 4)), "moved"),
+        (lambda here: here.update(EMPTY, np.vstack([np.eye(4)[:3], [1.0, 2.0, 3.0, 4.0]])), "moved"),
+        *[
+            (lambda here, other=other: here.update(EMPTY, other), "moved")
+            for other in ("abc", [[1], [1, 2]], {}, 1j * np.eye(4), [[10**400] * 4] * 4, [[object()] * 4] * 4)
+        ],
+        (lambda here: here.locate(EMPTY, up="up"), "up"),
+        (lambda here: here.locate(EMPTY, up=[[1.0], [1.0, 2.0]]), "up"),
         (lambda here: here.locate(np.full((6, 3), np.nan)), "positions"),
         (lambda here: here.locate(EMPTY, up=[1.0, 2.0]), "up"),
     ],
