@@ -125,12 +125,15 @@ def drive(row: str, visit: Path, boxes: str) -> Drive:
         map = scan(posed, _detector(visit, boxes, posed), depth="stereo").cloud
         seeing = Seeing(bare, _detector(visit, boxes, bare), depth="stereo", colour=False)
         camera = Moving(pose_source_of(bare))
-        both = [(cloud_of(seeing(frame).lifted), camera(frame)) for frame in bare.frames()]
+        clouds, moved = [], []
+        for frame in bare.frames():
+            clouds.append(cloud_of(seeing(frame).lifted))
+            moved.append(camera(frame))
+            camera.use()
         assert posed.trajectory is not None
         poses = posed.trajectory.session_from_camera
     sys.stderr.write(f"{visit.name}, {boxes} boxes: {len(map)} fruits\n")
-    clouds, moved = zip(*both, strict=True)
-    return Drive(row, visit.name, boxes, map, clouds, moved, poses)
+    return Drive(row, visit.name, boxes, map, tuple(clouds), tuple(moved), poses)
 
 
 def _recordings(visit: Path, at_frames: Path) -> tuple[Recording, Recording]:

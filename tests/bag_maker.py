@@ -137,6 +137,9 @@ def message(store, kind: str, fields: dict[str, Any]):
 
 
 def _quaternion(store, pose):
+    """Of a pose that is NaN in its last row, too."""
+    if np.isnan(np.asarray(pose)[3]).any():
+        return store.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=float("nan"))
     turn = Rotation.from_matrix(np.asarray(pose)[:3, :3]).as_quat()
     return store.types["geometry_msgs/msg/Quaternion"](**dict(zip("xyzw", turn.tolist(), strict=True)))
 

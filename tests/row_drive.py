@@ -40,15 +40,17 @@ def drawn_row(
     own_m: float = 0.01,
     shared_m: float = 0.008,
     reach_m: float = 0.5,
+    all_m: float = 0.0,
 ) -> Row:
-    """Draw a row whose fruits moved each for itself and with their neighbours, as the localiser supposes."""
+    """Draw a row whose fruits moved each for itself, with their neighbours, and all together."""
     rng = np.random.default_rng(seed)
     hanging = rng.uniform((0.0, -0.35, 0.5), (length_m, 0.35, 2.5), (n, 3))
     apart = hanging[:, None] - hanging
     together = shared_m**2 * np.exp(-0.5 * (apart**2).sum(axis=2) / reach_m**2) + 1e-12 * np.eye(n)
     sag = np.linalg.cholesky(together) @ rng.normal(size=(n, 3))
     on_map = hanging + rng.normal(0, 0.005, (n, 3))
-    return Row(on_map, hanging + sag + rng.normal(0, own_m, (n, 3)))
+    today = hanging + sag + rng.normal(0, own_m, (n, 3))
+    return Row(on_map, today + rng.normal(0, all_m, 3))
 
 
 def pose_at(x_m: float, *, turn_deg: float = 0.0) -> Array:

@@ -9,6 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pomona import Localizer
+from pomona.detect.opening import open_detector
+from pomona.localize import following
+from pomona.recording import open_recording
 from pomona.recording.poses import read_tum
 from recording_maker import make_recording
 from row_drive import step_to
@@ -133,3 +137,26 @@ def test_nothing_is_destroyed(tmp_path, precious):
     done = localize(own, folder, "-o", target)
     assert done.returncode == 2
     assert target.read_bytes() == before
+
+
+class Told(Localizer):
+    """Notes what it is told of the motion."""
+
+    def __init__(self, map: object) -> None:
+        super().__init__(map)
+        self.moved_m: list[float | None] = []
+
+    def update(self, cloud, moved=None, *, up=None):
+        self.moved_m.append(None if moved is None else round(float(moved[0, 3]), 6))
+        return super().update(cloud, moved, up=up)
+
+
+def test_the_motion_past_a_picture_that_cannot_be_read_is_not_lost(tmp_path):
+    folder = make_recording(tmp_path / "broken", (0.0, 0.02, 0.06, 0.12, 0.2))
+    for frame in (1, 2):
+        (folder / "depth" / f"000{frame}.png").write_bytes(b"no picture")
+    localizer = Told(MAP)
+    recording = open_recording(folder)
+    way = following.localize(recording, open_detector(folder / "detections.csv", None, recording), localizer)
+    assert sorted(way.skipped) == [1, 2]
+    assert localizer.moved_m == [None, 0.12, 0.08]

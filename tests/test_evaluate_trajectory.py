@@ -137,12 +137,35 @@ def test_poses_of_one_time_are_paired_once() -> None:
 
 
 def test_too_few_common_times_are_told() -> None:
-    with pytest.raises(PomonaError, match=r"found 1 poses within 0.01 s .*, expected 2 or more"):
+    with pytest.raises(PomonaError, match=r"found 1 pose within 0.01 s .*, expected 2 or more"):
         paired_rows(timed([0.0, 0.1]), timed([0.0, 0.5]))
     with pytest.raises(PomonaError, match=r"found 3 poses, expected as many as the 2 of"):
         paired_rows(timed(None, 3), timed([0.0, 0.1]))
     with pytest.raises(PomonaError, match="found 0 poses"):
         paired_rows(timed([0.0, 0.1]), timed([]))
+
+
+def test_times_that_are_not_those_of_the_truth_are_told_from_those_that_are_off() -> None:
+    with pytest.raises(PomonaError, match=r"its times, 1000000000 to 1000000001 s, lie beside those there, 0 to 0.5 s"):
+        paired_rows(timed([1e9, 1e9 + 1]), timed([0.0, 0.5]))
+    with pytest.raises(PomonaError, match=r"found 0 poses .*: in the median the nearest there is 0.05 s off, see --w"):
+        paired_rows(timed([0.05, 0.15, 0.25]), timed([0.0, 0.1, 0.2, 0.3]))
+
+
+def placed(places: list[list[float]]) -> TimedPoses:
+    poses = np.tile(np.eye(4), (len(places), 1, 1))
+    poses[:, :3, 3] = places
+    return TimedPoses(Path("placed.tum"), poses, np.arange(float(len(places))))
+
+
+def test_no_way_is_shrunk_to_a_point_or_mirrored_to_have_no_error() -> None:
+    goes, still = placed([[0.1 * row, 0.0, 0.0] for row in range(9)]), placed([[0.1, 0.2, 0.3]] * 9)
+    back = placed([[-0.1 * row, 0.0, 0.0] for row in range(9)])
+    for estimate, truth in ((goes, still), (goes, back)):
+        with pytest.raises(PomonaError, match=r"--align scale: found .* as the scale, expected one above 0"):
+            score_trajectory(estimate, truth, align="scale")
+    assert score_trajectory(still, goes, align="scale").truth_from_estimate.scale == 1.0
+    assert score_trajectory(goes, still, align="rigid").absolute.translation_m.max() > 0.3
 
 
 def test_a_camera_that_stands_still_has_errors_too() -> None:
@@ -215,11 +238,13 @@ def test_wrong_flags_are_one_line(pomona: Pomona, flags: tuple[str, ...], compla
         ("1 0 0 0 0 1 0 0 0 0 -1 0\n", "found a pose that mirrors"),
         ("2 0 0 0 0 1 0 0 0 0 1 0\n", "does not turn but stretch"),
         ("0 1 2 3\n", "line 1: found 4 numbers, expected time tx ty tz qx qy qz qw"),
-        ("", "found 0 poses"),
+        ("", "found no pose, expected lines of poses"),
+        ("0_1 0 0 0 0 0 0 1\n", "line 1: pose: found '0_1', expected a number"),
+        ("\uff11 0 0 0 0 0 0 1\n", "expected a number"),
     ],
 )
 def test_wrong_files_are_one_line(pomona: Pomona, tmp_path: Path, text: str, complaint: str) -> None:
-    (tmp_path / "poses.txt").write_text(text)
+    (tmp_path / "poses.txt").write_text(text, encoding="utf-8")
     code, _, err = pomona("evaluate", "trajectory", tmp_path / "poses.txt", DATA / "true.tum")
     assert (code, len(err.splitlines())) == (2, 1), err
     assert complaint in err

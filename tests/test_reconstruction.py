@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from model_maker import NUMBERS, Model
 from pomona import PomonaError
 from pomona.reconstruction import open_reconstruction, write_reconstruction
+from pomona.reconstruction.picture_camera import PictureCamera
 
 NAMES = ["left/0003.png", "left/0001.png", "caf\u00e9 1.jpg"]
 SUFFIX = {"text": "txt", "binary": "bin"}
@@ -105,6 +106,34 @@ def test_each_camera_looks_as_opencv_has_it(tmp_path, form, camera, numbers):
     assert optics.directions(expected[:, 0]) == pytest.approx(directions, abs=1e-9)
 
 
+@pytest.mark.parametrize("bent", [(0.5, 0, 0, 0), (1.5, 2.0, 0, 0), (-0.2, 0, 0, 0), (-0.35, 0.12, 0.01, -0.02)])
+def test_a_lens_that_bends_much_is_looked_through_backwards(bent):
+    camera = PictureCamera((1920, 1080), np.array([900.0, 910.0]), np.array([950.0, 545.0]), np.array(bent, float))
+    directions = np.random.Generator(np.random.PCG64(1)).uniform(-1.1, 1.1, (400, 2))
+    places = np.pad(directions, ((0, 0), (0, 1)), constant_values=1.0)
+    matrix = np.array([[900.0, 0, 950], [0, 910, 545], [0, 0, 1]])
+    points_px = cv2.projectPoints(places, np.zeros(3), np.zeros(3), matrix, np.array(bent, float))[0][:, 0]
+    inside = ((points_px > 0) & (points_px < camera.size_px)).all(axis=1)
+    inside &= np.linalg.norm(directions, axis=1) < 1.2  # before the lens folds
+    assert inside.sum() > 50
+    assert camera.directions(points_px[inside]) == pytest.approx(directions[inside], abs=1e-9)
+
+
+def test_beyond_where_a_lens_folds_there_is_no_direction():
+    """r - r^3 / 2 + r^5 / 10 has its top, 0.6, at 1, falls, and grows again: r = 1.7 shows 0.65, no lens does."""
+    camera = PictureCamera((640, 480), np.array([500.0, 500.0]), np.zeros(2), np.array([-0.5, 0.1, 0.0, 0.0]))
+    looks = camera.directions(np.array([[0.59, 0.0], [0.65, 0.0]]) * 500)
+    assert 0.8 < looks[0, 0] < 1
+    assert np.isnan(looks[1]).all()
+
+
+@pytest.mark.parametrize("k1", [-1.5, -1e6, 1e300, -1e300])
+@pytest.mark.parametrize("form", ["text", "binary"])
+def test_a_lens_that_does_not_show_its_picture_is_refused(tmp_path, form, k1):
+    made(tmp_path, form, camera="SIMPLE_RADIAL", parameters=(500.0, 320.0, 180.0, k1))
+    assert "expected" in refused(tmp_path)
+
+
 @pytest.mark.parametrize("form", ["text", "binary"])
 def test_other_cameras_are_refused(tmp_path, form):
     assert "FULL_OPENCV" in NUMBERS
@@ -157,6 +186,9 @@ def test_text_and_binary_are_not_mixed(tmp_path):
         ("points3D", "0.5 1 0", "0.5 8 0", "found key point 0 of image 8 in a track"),
         ("points3D", "0.5 1 0", "0.5 1 9", "found key point 9 of image 1 in a track"),
         ("points3D", "\n2 1.0", "\n1 1.0", "found point 1 twice"),
+        ("images", "10.5 20.25 1", "10.5 20.25 0_1", "expected X Y POINT3D_ID"),
+        ("points3D", "0.5 1 0", "0.5 0_1 0", "expected R G B ERROR"),
+        ("points3D", "0.1 0.2 3.0", "0_1 0.2 3.0", "found '0_1', expected a number"),
         ("rigs", "3 2 CAMERA", "3 99999999 CAMERA", "missing, the line ends before it"),
         ("frames", "2 3 ", "2 4 ", "frame 2: found the rig 4, which is not there"),
         ("frames", "1 CAMERA 7 2", "1 CAMERA 7 77", "frame 2: found the image 77, which is not there"),

@@ -163,3 +163,30 @@ def test_the_baseline_can_come_from_the_frames_of_reference(tmp_path):
         entries.append((topic, at, kind, fields))
     entries.append(tf("/tf_static", START_NS, ("left_optical", "right_optical", pose((0.07, 0, 0)))))
     assert open_recording(write_bag(tmp_path / "row", entries, "mcap")).calibration.baseline_m == pytest.approx(0.07)
+
+
+LOST = np.full((4, 4), np.nan)
+"""What odometry says that has lost its way."""
+
+
+@pytest.mark.parametrize("told", ["odometry", "tree"])
+def test_poses_that_are_no_numbers_are_left_out(tmp_path, told):
+    turned, far = pose(), pose((np.inf, 0.0, 0.0))
+    turned[3] = np.nan
+    entries = [*stereo(), *statics()]
+    for row, at in enumerate(times_ns()):
+        say = {2: LOST, 5: turned, 8: far}.get(row, odom_from_base(at))
+        entries.append(odometry("/odom", at, say) if told == "odometry" else tf("/tf", at, ("odom", "base_link", say)))
+    entries.append(tf("/tf_static", START_NS - 10**9, ("base_link", "imu", LOST)))
+    recording = open_recording(write_bag(tmp_path / "bag", entries, "ros2 mcap"))
+    assert recording.trajectory is not None
+    assert np.isfinite(recording.trajectory.session_from_camera).all()
+    true = np.array([odom_from_base(START_NS + row * STEP_NS) @ BASE_FROM_CAMERA for row in recording.numbers])
+    assert np.abs(recording.trajectory.session_from_camera - true).max() < 0.02
+
+
+def test_a_tree_whose_frames_go_in_a_circle_says_nothing(tmp_path):
+    motion = [tf("/tf", at, ("odom", "base_link", odom_from_base(at))) for at in times_ns()]
+    circle = tf("/tf_static", START_NS - 10**9, ("base_link", "odom", pose()))
+    recording = open_recording(write_bag(tmp_path / "bag", [*stereo(), *statics(), *motion, circle], "ros2 mcap"))
+    assert recording.trajectory is None

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from bag_maker import ROS2, message
+from pomona import Localizer
 from pomona.ros import store_types, transforms_message
 from robot_bag import BASE, BASE_FROM_CAMERA, CAMERA, MAP, ODOM_FROM_MAP, RobotBag, entries, true_poses
 from test_ros_messages import matrix, strict_class
@@ -171,6 +172,18 @@ def test_without_a_place_of_the_camera_on_the_robot_no_pose_is_told(graph, drive
 def test_before_the_cameras_are_known_nothing_is_said(graph, drive):
     graph.callbacks["pair"](*(drive[f"/stereo/{side}/image_rect_color"][0] for side in ("left", "right")))
     assert not any(graph.sent.values())
+
+
+def test_the_motion_past_a_pair_that_cannot_be_looked_at_is_not_lost(graph, drive, monkeypatch):
+    moved = []
+    update = Localizer.update
+    monkeypatch.setattr(Localizer, "update", lambda self, cloud, step: moved.append(step) or update(self, cloud, step))
+    intact = drive["/stereo/left/image_rect_color"]
+    broken = [intact[0], SimpleNamespace(**{**vars(intact[1]), "encoding": "secret"}), *intact[2:]]
+    drive_past(graph, {**drive, "/stereo/left/image_rect_color": broken}, 3)
+    assert len(graph.warnings) == 1
+    assert moved[0] is None
+    np.testing.assert_allclose(moved[1], np.linalg.solve(*true_poses()[[0, 2]]), atol=1e-9)
 
 
 def test_a_picture_that_is_none_is_a_warning(graph, drive):

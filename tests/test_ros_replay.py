@@ -17,14 +17,18 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bag_maker import START_NS, image, info, stereo, tf, write_bag
-from pomona import FruitCloud, PomonaWarning
+from pomona import FruitCloud, PomonaError, PomonaWarning
+from pomona.recording import open_recording
+from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.kinds import open_messages
 from pomona.recording.bags.message_file import Message, Topic
 from pomona.ros import known_store
+from pomona.ros.bag_frames import frames_of_bag
 from pomona.ros.ros1_as_ros2 import AsRos2
 from robot_bag import BASE, BASE_FROM_CAMERA, CAMERA, FRAMES, MAP, ODOM_FROM_MAP, STEP_NS, entries, make_robot_bag
 from test_ros_messages import matrix
 
+EYE = np.eye(4)
 OURS = {"pose", "odometry", "path", "detections", "status", "fruits", "robot"}
 
 
@@ -358,3 +362,53 @@ def test_a_strangers_type_that_makes_no_sense_is_left_out_and_told(kind, definit
         made = [as_ros2(a_message(kind, definition, body)) for _ in range(2)]
     assert made == [None, None]
     assert len(told) == 1
+
+
+def with_tree(tmp_path: Path, *told: tuple[str, str, str, np.ndarray]) -> BagRecording:
+    """The robot's bag with another tree: topic, parent, child and where, told at the time of each picture."""
+    pictures = [entry for entry in entries("none") if entry[0] != "/goal"]
+    tree = [
+        tf(topic, START_NS + row * STEP_NS, (parent, child, where))
+        for row in range(len(FRAMES))
+        for topic, parent, child, where in told
+    ]
+    return open_recording(write_bag(tmp_path / "drive", [*pictures, *tree], "ros2 mcap"))
+
+
+FIXED, MOVING = "/tf_static", "/tf"
+
+
+def test_frames_in_a_circle_are_refused(tmp_path):
+    bag = with_tree(tmp_path, (FIXED, BASE, CAMERA, BASE_FROM_CAMERA), (FIXED, "a", BASE, EYE), (FIXED, BASE, "a", EYE))
+    with pytest.raises(PomonaError, match=r"drive.*: found frames in a circle, 'base_link' in 'a' in 'base_link', exp"):
+        frames_of_bag(bag, "map", EYE)
+
+
+def test_of_two_frames_that_a_frame_is_told_to_be_in_the_last_counts(tmp_path):
+    away = np.eye(4)
+    away[0, 3] = 100.0
+    bag = with_tree(
+        tmp_path,
+        (FIXED, BASE, CAMERA, BASE_FROM_CAMERA),
+        (MOVING, "world", BASE, away),
+        (MOVING, "odom", BASE, EYE),
+    )
+    with pytest.warns(PomonaWarning, match="found the frame 'base_link' in 'odom', 'world': the last, 'odom', counts"):
+        frames = frames_of_bag(bag, "map", EYE)
+    assert frames.root == "odom"
+    np.testing.assert_allclose(frames.map_from_root(away, START_NS), away, atol=1e-12)
+
+
+def test_frames_without_a_name_in_themselves_or_nowhere_are_none(tmp_path):
+    """As tf2 has it, which ignores them."""
+    lost = np.full((4, 4), np.nan)
+    bag = with_tree(
+        tmp_path,
+        (FIXED, BASE, CAMERA, BASE_FROM_CAMERA),
+        (FIXED, CAMERA, CAMERA, EYE),
+        (FIXED, "", BASE, EYE),
+        (FIXED, "nowhere", BASE, lost),
+        (MOVING, "odom", BASE, EYE),
+    )
+    frames = frames_of_bag(bag, "map", EYE)
+    assert (frames.root, frames.robot.base, frames.robot.camera) == ("odom", BASE, CAMERA)

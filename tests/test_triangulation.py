@@ -6,6 +6,9 @@ from scipy.spatial import cKDTree
 
 from pomona.reconstruction.picture_camera import PictureCamera
 from pomona.triangulation import triangulated_fruits
+from pomona.triangulation.box_evidence import BoxEvidence
+from pomona.triangulation.hypotheses import Hypotheses
+from pomona.triangulation.posed_boxes import PosedBoxes, PosedPictures
 from posed_row import CENTRE_PX, FOCAL_PX, SIZE_PX, posed_row
 
 CAMERA = PictureCamera(SIZE_PX, np.array([FOCAL_PX, FOCAL_PX]), CENTRE_PX, np.zeros(4))
@@ -97,3 +100,61 @@ def test_no_boxes_give_no_fruits(row):
     n = len(row.boxes_px)
     found = triangulated_fruits(row.camera_from_map, [CAMERA] * n, [np.empty((0, 4))] * n, [None] * n)
     assert len(found.cloud) == 0
+
+
+def said_of(place: np.ndarray, covariance: np.ndarray, diameter: float, boxes: PosedBoxes, area: float):
+    """What each box of one picture says of a place, as the docs have it: one by one, without a search."""
+    (x, y, z), sigma0, sigma1 = place, 0.25, 0.7
+    slopes = np.array([[1 / z, 0, -x / z**2], [0, 1 / z, -y / z**2]])
+    said = []
+    for direction, half_sines, sigma in zip(boxes.directions, boxes.half_sines, boxes.sigmas, strict=True):
+        spread = slopes @ covariance @ slopes.T + sigma**2 * np.eye(2)
+        off = direction - np.array([x, y]) / z
+        squared = off @ np.linalg.solve(spread, off)
+        shown = 2 * max(np.hypot(x, z) * half_sines[0], np.hypot(y, z) * half_sines[1])
+        ratio = np.log(shown / diameter)
+        alike = np.log(sigma1 / sigma0) - ratio**2 / 2 * (1 / sigma0**2 - 1 / sigma1**2)
+        near = -squared / 2 - np.log(2 * np.pi * np.sqrt(np.linalg.det(spread))) - np.log(len(boxes) / area)
+        said.append(near + alike + np.log(0.6) if squared < 9 else -np.inf)
+    return np.array(said)
+
+
+def test_boxes_say_of_places_what_all_of_them_would_one_by_one(row):
+    n = len(row.boxes_px)
+    pictures, boxes = PosedPictures.of(row.camera_from_map, [CAMERA] * n), PosedBoxes.of(row.boxes_px, [CAMERA] * n)
+    rng = np.random.Generator(np.random.PCG64(4))
+    places = row.positions + rng.normal(0, 0.01, row.positions.shape)
+    covariances = np.tile(np.diag([1e-4, 1e-4, 9e-4]), (len(places), 1, 1))
+    asked = Hypotheses(
+        np.zeros((len(places), 2), np.int64), places, covariances, row.diameters_m, np.zeros(len(places))
+    )
+    judge, rows, n_spoke = BoxEvidence(pictures, boxes), np.arange(len(places)), 0
+    for picture in range(0, n, 5):
+        heard = judge(asked, rows, np.full(len(rows), picture))
+        own = np.flatnonzero(boxes.pictures == picture)
+        low, high = np.split(pictures.corners[picture], 2)
+        for place, gain, box in zip(rows, heard.gains, heard.boxes, strict=True):
+            seen = pictures.rotations[picture] @ (places[place] - pictures.centres[picture])
+            if not ((seen[:2] / seen[2] > low) & (seen[:2] / seen[2] < high)).all():
+                assert (gain, box) == (0.0, -1)
+                continue
+            turned = pictures.rotations[picture] @ covariances[place] @ pictures.rotations[picture].T
+            said = said_of(seen, turned, row.diameters_m[place], boxes.select(own), float(np.prod(high - low)))
+            assert gain == pytest.approx(max(said.max(), np.log(0.4)), abs=1e-9)
+            assert box == (own[said.argmax()] if said.max() > np.log(0.4) else -1)
+            n_spoke += box >= 0
+    assert n_spoke > 50
+
+
+def test_boxes_where_a_lens_shows_nothing_are_of_no_fruit(row):
+    wide = PictureCamera(SIZE_PX, np.array([FOCAL_PX, FOCAL_PX]), CENTRE_PX, np.array([-0.3, 0.0, 0.0, 0.0]))
+    assert np.isnan(wide.directions(np.zeros((1, 2)))).all()
+    assert np.isfinite(wide.edges()).all()
+    n = len(row.boxes_px)
+    corner = [np.vstack([boxes, [[1.0, 1.0, 30.0, 30.0]]]) for boxes in row.boxes_px]
+    for names in (None, [tuple(map(str, [*ids, 999])) for ids in row.ids]):
+        found = triangulated_fruits(row.camera_from_map, [wide] * n, corner, names or [None] * n)
+        assert len(found.cloud) > 20
+        assert np.isfinite(found.cloud.positions).all()
+        assert (found.fruits[np.cumsum([len(boxes) for boxes in corner]) - 1] == -1).all()
+        assert "999" not in (found.cloud.ids if names else ())

@@ -15,6 +15,8 @@ __all__ = ["checked_array"]
 def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
     """Return `values` as a contiguous array of `dtype`; None in `shape` takes any length."""
     try:
+        if isinstance(values, np.ndarray) and np.iscomplexobj(values):
+            raise TypeError  # NumPy leaves the imaginary part out, with a warning
         array = np.ascontiguousarray(values, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
         raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None

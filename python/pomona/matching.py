@@ -426,7 +426,10 @@ def core_vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
     """Return the vertical in the query and in the map as the core reads it; one direction holds for both."""
     if up is None:
         return None
-    vectors = np.asarray(up, np.float64)
+    try:
+        vectors = np.asarray(up, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PomonaError("up: expected one direction, (3,), or two, (2, 3)") from None
     if vectors.shape == (3,):
         vectors = np.stack((vectors, vectors))
     if vectors.shape != (2, 3):

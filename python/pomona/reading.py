@@ -23,6 +23,7 @@ __all__ = [
     "number_in",
     "parsed_json",
     "path_inside",
+    "plain_text",
     "read_given_text",
     "read_text",
     "require_file",
@@ -174,6 +175,11 @@ def whole_number(where: str, text: str, expected: str) -> int:
     return int(text)
 
 
+def plain_text(text: str) -> bool:
+    """Tell whether numbers in a text are what everybody takes for them: Python reads 1_0 as ten, and other digits."""
+    return "_" not in text and text.isascii()
+
+
 def number_in(where: str, field: str, cell: object) -> float:
     """Give a finite number out of a cell of text or a JSON value.
 
@@ -183,7 +189,8 @@ def number_in(where: str, field: str, cell: object) -> float:
         One line that begins with `where`; numbers beyond `MOST_NUMBER` are refused too.
     """
     try:
-        value = math.nan if isinstance(cell, bool) else float(cell)  # type: ignore[arg-type] # what fails is caught
+        refused = isinstance(cell, bool) or (isinstance(cell, str) and not plain_text(cell))
+        value = math.nan if refused else float(cell)  # type: ignore[arg-type] # what fails is caught
     except (TypeError, ValueError, OverflowError):
         value = math.nan
     if not abs(value) <= MOST_NUMBER:  # nor is what is NaN

@@ -116,7 +116,9 @@ class LocalizerNode(Node):
         stamp, optical = left.header.stamp, left.header.frame_id
         stamp_ns = stamp.sec * 10**9 + stamp.nanosec
         odom_from_optical = self._between(self._told("odom_frame"), optical, stamp)
-        fruits, found = camera.look(left, right, self._moved(camera, odom_from_optical))
+        odom_from_camera = None if odom_from_optical is None else odom_from_optical @ camera.optical_from_camera
+        fruits, found = camera.look(left, right, self._moved(odom_from_camera))
+        self._odom_from_camera = odom_from_camera  # of a pair that could not be looked at, the motion is not lost
         seen, known = fruits.transformed(camera.optical_from_camera), sightings_of(found, self._fruits)
         self._say("status", installed_types("std_msgs/msg/String")(data=str(found.status)))
         self._say("detections", detections_message(installed_types, stamp_ns, optical, seen, known))
@@ -143,11 +145,10 @@ class LocalizerNode(Node):
         self._say("odometry", odometry_message(installed_types, frames.map, frames.base, pose, self._before))
         self._before = pose
 
-    def _moved(self, camera: LiveCamera, odom_from_optical: np.ndarray | None) -> np.ndarray | None:
+    def _moved(self, odom_from_camera: np.ndarray | None) -> np.ndarray | None:
         """How the rectified camera moved since the pair before, where the tree tells it for both."""
-        now = None if odom_from_optical is None else odom_from_optical @ camera.optical_from_camera
-        before, self._odom_from_camera = self._odom_from_camera, now
-        return None if before is None or now is None else np.linalg.solve(before, now)
+        before = self._odom_from_camera
+        return None if before is None or odom_from_camera is None else np.linalg.solve(before, odom_from_camera)
 
     def _between(self, target: str, source: str, stamp: Any) -> np.ndarray | None:
         """Give target_from_source of the tree of transforms, None where it does not tell."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.match_options import Unit
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Writes
@@ -110,7 +111,7 @@ def export(
         cloud = _observed(source) if observations else FruitCloud.read(source, unit=unit.value)
     anchor = None if local or source.suffix.lower() != ".gpkg" else OrchardMap(source).anchor()
     export_cloud(cloud, output, wanted, anchor)
-    say(f"{output}: {len(cloud)} {'observations' if observations else 'fruits'}")
+    say(f"{output}: {amount(len(cloud), 'observation' if observations else 'fruit')}")
 
 
 def _export_by_date(source: Path, output: Path, *, plain: bool) -> None:

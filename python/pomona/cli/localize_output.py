@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from pomona.amounts import amount
+
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
@@ -73,7 +75,8 @@ def _row(step: Step) -> dict[str, Any]:
 
 def as_lines(found: dict[str, Any]) -> list[str]:
     """Say the same in words."""
-    frames = f"{found['n_found']} of {found['n_frames']} frames found among {found['n_map']} fruits"
+    among = amount(found["n_map"], "fruit")
+    frames = f"{found['n_found']} of {found['n_frames']} frames found among {among}"
     sigma_m = found["median_sigma_m"]
     sure = "" if sigma_m is None else f", to {1000 * sigma_m:.0f} mm (median of what the poses say of themselves)"
     lines = [f"{found['output']}: {frames}{sure}"]

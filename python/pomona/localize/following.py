@@ -19,7 +19,7 @@ from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.depth import Lifted
-from pomona.survey.pose_source import PoseSource, pose_source_of
+from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.seeing import Seeing, looked_ahead
 
@@ -84,6 +84,8 @@ def localize(
                 continue
             cloud = cloud_of(look.lifted)
             found = localizer.locate(cloud, up=up) if single else localizer.update(cloud, moved, up=up)
+            if camera is not None:
+                camera.use()
             # Where nobody noted the time, frames are numbered: order is all that is known.
             time_s = float(frame.number if frame.time_s is None else frame.time_s)
             steps.append(Step(frame.number, time_s, cloud, found))
@@ -102,23 +104,24 @@ def cloud_of(lifted: Lifted) -> FruitCloud:
 
 
 class Moving:
-    """How the camera moved since the frame before, None where nobody knows; frames are given in order."""
+    """How the camera moved since the frame that was used last, None where nobody knows; frames are given in order."""
 
     def __init__(self, source: PoseSource) -> None:
-        self._source, self._part = source, -1
-        self._session_from_previous: NDArray[np.float64] | None = None
+        self._source = source
+        self._used = self._now = Place(None)
         self.needs = source.needs
 
     def __call__(self, frame: Frame) -> NDArray[np.float64] | None:
-        """Follow the camera to the next frame; give its pose in the frame of the camera before, (4, 4)."""
+        """Follow the camera to the next frame; give its pose in the frame of the camera that was used last, (4, 4)."""
         try:
-            place = self._source(frame)
+            self._now = self._source(frame)
         except UnreadablePictureError:
-            self._session_from_previous = None
-            return None
-        before, pose = self._session_from_previous, place.session_from_camera
-        same = place.part == self._part
-        self._session_from_previous, self._part = pose, place.part
-        if before is None or pose is None or not same:
+            self._now = Place(None)
+        before, pose = self._used.session_from_camera, self._now.session_from_camera
+        if before is None or pose is None or self._used.part != self._now.part:
             return None
         return np.asarray(np.linalg.solve(before, pose))
+
+    def use(self) -> None:
+        """Use the frame: the next motion is since this one. Of a frame that is skipped the motion is not lost so."""
+        self._used = self._now

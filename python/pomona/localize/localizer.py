@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
+from pomona.arrays import checked_array
 from pomona.cards import as_card
 from pomona.cloud import Cloud, as_cloud
 from pomona.core_settings import core_settings
@@ -200,10 +201,9 @@ class Localizer:
 
 
 def _rigid(moved: ArrayLike) -> NDArray[np.float64]:
-    step = np.ascontiguousarray(moved, np.float64)
-    if step.shape != (4, 4):
-        raise PomonaError(f"moved: found an array of shape {step.shape}, expected (4, 4)")
-    stray = np.abs(step[:3, :3] @ step[:3, :3].T - np.eye(3)).max()
-    if not (stray < RIGID and np.linalg.det(step[:3, :3]) > 0 and np.isfinite(step).all()):
+    step = checked_array("moved", moved, np.float64, (4, 4))
+    is_rigid = np.isfinite(step).all() and np.linalg.det(step[:3, :3]) > 0
+    is_rigid = is_rigid and np.abs(step[:3, :3] @ step[:3, :3].T - np.eye(3)).max() < RIGID
+    if not (is_rigid and np.abs(step[3] - (0, 0, 0, 1)).max() < RIGID):
         raise PomonaError("moved: found a matrix that does not turn and move, expected a rigid one")
     return step

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
-from pomona.reading import number_in, read_text, shown, whole_number
+from pomona.reading import number_in, plain_text, read_text, shown, whole_number
 from pomona.reconstruction.model_poses import pose_of, quaternion_and_place
 from pomona.reconstruction.picture_camera import PictureCamera, camera_model
 from pomona.reconstruction.sparse_model import ModelFrame, ModelImage, ModelPoints, ModelRig, RigSensor, SensorId
@@ -105,6 +105,7 @@ def _point_ids(where: str, line: str) -> NDArray[np.int64]:
     if len(cells) % 3:
         raise PomonaError(f"{where}: found {len(cells)} cells, expected X Y POINT3D_ID of each key point")
     try:
+        _require_plain(line)
         places, ids = np.array([cells[0::3], cells[1::3]], np.float64), np.array(cells[2::3], np.int64)
     except (ValueError, OverflowError):
         raise PomonaError(f"{where}: found {shown(line)}, expected X Y POINT3D_ID of each key point") from None
@@ -130,11 +131,17 @@ def read_points(path: Path) -> ModelPoints:
 def _track(where: str, cells: list[str]) -> NDArray[np.int64]:
     expected = "R G B ERROR, then IMAGE_ID POINT2D_IDX of each image"
     try:
+        _require_plain(" ".join(cells))
         track = np.array(cells[4:], np.int64).reshape(-1, 2)
         np.array(cells[:4], np.float64).reshape(4)
     except (ValueError, OverflowError):
         raise PomonaError(f"{where}: found {shown(' '.join(cells))}, expected {expected}") from None
     return track
+
+
+def _require_plain(text: str) -> None:
+    if not plain_text(text):
+        raise ValueError
 
 
 def read_rigs(path: Path) -> dict[int, ModelRig]:

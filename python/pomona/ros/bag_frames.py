@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.errors import PomonaError
+from pomona.reading import shown
 from pomona.recording.bags.bag_recording import BagRecording
 from pomona.recording.bags.frames_of_reference import bare_name
 from pomona.ros.robot_frames import BODY_FROM_OPTICAL, RobotFrames
@@ -58,9 +60,18 @@ class BagFrames:
 
 
 def frames_of_bag(recording: BagRecording, map_frame: str, map_from_fruits: Array) -> BagFrames:
-    """Read the tree of a bag: the body is the topmost frame that is fixed to the camera, `base_link` as a rule."""
+    """Read the tree of a bag: the body is the topmost frame that is fixed to the camera, `base_link` as a rule.
+
+    Raises
+    ------
+    PomonaError
+        When the frames above the camera go in a circle.
+    """
     tree = read_tree(recording.file)
     camera = bare_name(next(iter(recording.pictures.values())).frame) or NAMELESS
+    if circle := tree.circle(camera):
+        names = " in ".join(map(shown, (*circle, circle[0])))
+        raise PomonaError(f"{recording.path}: found frames in a circle, {names}, expected a tree")
     root, body = tree.chain(camera)[-1], tree.body_of(camera)
     body_is_new = body == camera
     body_from_optical = BODY_FROM_OPTICAL if body_is_new else tree.at(body, camera, np.zeros(1, np.int64))[0][0]

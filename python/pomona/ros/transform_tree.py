@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.recording.bags.frames_of_reference import bare_name, matrix_of
+from pomona.errors import PomonaWarning
+from pomona.reading import shown
+from pomona.recording.bags.frames_of_reference import bare_name, joint_of, matrix_of
 from pomona.recording.bags.message_file import TREES, MessageFile, counted, decoded, stamp_ns
 from pomona.recording.poses_in_time import poses_at
 
@@ -17,6 +20,9 @@ __all__ = ["ODOMETRY", "TransformTree", "read_tree"]
 Array = NDArray[np.float64]
 
 ODOMETRY = "nav_msgs/msg/Odometry"
+
+Samples: TypeAlias = dict[str, dict[str, list[tuple[int, Array]]]]
+"""Of each frame that moves and each that it was told to be in, when and where."""
 
 LONGEST_GAP_S = 0.5
 """A joint is thought to move evenly for so long: a vehicle in a row moves half a metre."""
@@ -47,6 +53,12 @@ class TransformTree:
             chain.append(above)
         return chain
 
+    def circle(self, frame: str) -> list[str]:
+        """Give the frames above a frame that go in a circle, none in a tree."""
+        chain = self.chain(frame)
+        above = self.parents.get(chain[-1])
+        return [] if above is None else chain[chain.index(above) :]
+
     def body_of(self, frame: str) -> str:
         """Give the topmost frame that is fixed to a frame."""
         chain = self.chain(frame)
@@ -70,39 +82,51 @@ class TransformTree:
 def read_tree(file: MessageFile) -> TransformTree:
     """Read the transforms of a bag; where none moves what its only odometry is of, that moves as the odometry says."""
     tree = TransformTree()
-    samples: dict[str, list[tuple[int, Array]]] = {}
+    samples: Samples = {}
+    _add_joints(file, tree, samples)
+    odometries = [name for name, topic in file.topics.items() if topic.type == ODOMETRY]
+    if len(odometries) == 1:
+        _add_odometry(file, odometries[0], tree, samples)
+    for child, by_parent in samples.items():
+        parent = tree.parents[child]
+        if len(by_parent) > 1:
+            names = ", ".join(map(shown, sorted(by_parent)))
+            told = f"{file.path}: found the frame {shown(child)} in {names}: the last, {shown(parent)}, counts"
+            warnings.warn(told, PomonaWarning, stacklevel=3)
+        if parent in by_parent:
+            tree.moving[child] = _ascending(by_parent[parent])
+    return tree
+
+
+def _add_joints(file: MessageFile, tree: TransformTree, samples: Samples) -> None:
     topics = {name for name, topic in file.topics.items() if topic.type in TREES}
     for message in counted(file.path, file.messages(topics)):
         static = message.topic.name.rpartition("/")[2] == "tf_static"
         for each in decoded(message).transforms:
-            child = bare_name(str(each.child_frame_id))
-            matrix = matrix_of(each.transform.translation, each.transform.rotation)
-            tree.parents[child] = bare_name(str(each.header.frame_id))
+            joint, stamp = joint_of(each), each.header.stamp
+            if joint is None:
+                continue
+            tree.parents[joint.child] = joint.parent
             if static:
-                tree.fixed[child] = matrix
-            else:
-                stamp = each.header.stamp
-                at_ns = int(stamp.sec) * 10**9 + int(stamp.nanosec) or message.logged_ns
-                samples.setdefault(child, []).append((at_ns, matrix))
-    odometries = [name for name, topic in file.topics.items() if topic.type == ODOMETRY]
-    if len(odometries) == 1:
-        _add_odometry(file, odometries[0], tree, samples)
-    tree.moving.update({child: _ascending(taken) for child, taken in samples.items()})
-    return tree
+                tree.fixed[joint.child] = joint.parent_from_child
+                continue
+            at_ns = int(stamp.sec) * 10**9 + int(stamp.nanosec) or message.logged_ns
+            of_child = samples.setdefault(joint.child, {})
+            of_child.setdefault(joint.parent, []).append((at_ns, joint.parent_from_child))
 
 
-def _add_odometry(
-    file: MessageFile, topic: str, tree: TransformTree, samples: dict[str, list[tuple[int, Array]]]
-) -> None:
+def _add_odometry(file: MessageFile, topic: str, tree: TransformTree, samples: Samples) -> None:
     taken: list[tuple[int, Array]] = []
     child = parent = ""
     for message in counted(file.path, file.messages({topic})):
         content: Any = decoded(message)
         child, parent = bare_name(str(content.child_frame_id)), bare_name(str(content.header.frame_id))
         pose = content.pose.pose
-        taken.append((stamp_ns(message) or message.logged_ns, matrix_of(pose.position, pose.orientation)))
-    if child and parent and child not in tree.parents:
-        tree.parents[child], samples[child] = parent, taken
+        matrix = matrix_of(pose.position, pose.orientation)
+        if matrix is not None:
+            taken.append((stamp_ns(message) or message.logged_ns, matrix))
+    if taken and child and parent and child != parent and child not in tree.parents:
+        tree.parents[child], samples[child] = parent, {parent: taken}
 
 
 def _ascending(taken: list[tuple[int, Array]]) -> tuple[NDArray[np.int64], Array]:

@@ -27,6 +27,12 @@ LEVER_M = 1.0
 LONGEST_LEVER_M = 1e6
 """Beside which no way counts."""
 
+ROUNDING = 1e-12
+"""Of a place, in parts of its coordinates: a camera that moves by no more stands still."""
+
+LEAST_SCALE = 1e-9
+"""Metres a unit: below, a way has shrunk to a point, where all errors are 0, or was mirrored."""
+
 
 @dataclass(frozen=True, eq=False)
 class TruthFit:
@@ -75,7 +81,7 @@ def alignment(found: Array, true: Array, align: Align = "rigid", lever_m: float 
     Raises
     ------
     PomonaError
-        A lever that is no length.
+        A lever that is no length, or ways that no scale above 0 brings together.
     """
     if not 0.0 <= lever_m <= LONGEST_LEVER_M:
         raise PomonaError(f"--lever: found {lever_m:g}, expected 0 to {LONGEST_LEVER_M:g} m")
@@ -83,14 +89,24 @@ def alignment(found: Array, true: Array, align: Align = "rigid", lever_m: float 
         return TruthFit(np.eye(3), np.zeros(3))
     middle, true_middle = found[:, :3, 3].mean(axis=0), true[:, :3, 3].mean(axis=0)
     centred, true_centred = found[:, :3, 3] - middle, true[:, :3, 3] - true_middle
-    spread, true_spread = (float((one**2).sum()) for one in (centred, true_centred))
+    spread, true_spread = _spread(found), _spread(true)
     stretch = np.sqrt(true_spread / spread) if align == "scale" and spread > 0 < true_spread else 1.0
     tips = np.einsum("fij,fkj->ik", true[:, :3, :3], found[:, :3, :3])
     rotation = _nearest_rotation(stretch * true_centred.T @ centred + lever_m**2 * tips)
     scale = 1.0
     if align == "scale" and spread > 0:
         scale = float((true_centred * (centred @ rotation.T)).sum()) / spread
+        if not scale > LEAST_SCALE:
+            why = "the true way stands still, or runs against the other"
+            raise PomonaError(f"--align scale: found {scale:.3g} as the scale, expected one above 0: {why}")
     return TruthFit(rotation, true_middle - scale * rotation @ middle, scale)
+
+
+def _spread(poses: Array) -> float:
+    """Sum of the squared distances from the middle, 0 where only rounding makes one."""
+    places = poses[:, :3, 3]
+    squared = float(((places - places.mean(axis=0)) ** 2).sum())
+    return squared if squared > len(places) * (ROUNDING * float(np.abs(places).max())) ** 2 else 0.0
 
 
 def _nearest_rotation(matrix: Array) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.errors import PomonaError
 from pomona.recording.poses import is_kitti, read_kitti, read_tum
 
@@ -45,13 +46,13 @@ def read_poses(path: Path) -> TimedPoses:
     Raises
     ------
     PomonaError
-        The file is none of them, or a session without poses.
+        The file is none of them, or has no pose.
     """
     if path.suffix.lower() == ".gpkg":
         return _of_session(path)
-    if is_kitti(path):
-        return TimedPoses(path, read_kitti(path), None)
-    times_s, poses = read_tum(path)
+    times_s, poses = (None, read_kitti(path)) if is_kitti(path) else read_tum(path)
+    if not len(poses):
+        raise PomonaError(f"{path}: found no pose, expected lines of poses: TUM or KITTI")
     return TimedPoses(path, poses, times_s)
 
 
@@ -87,9 +88,23 @@ def paired_rows(
     _, first = np.unique(nearest[order], return_index=True)
     rows = np.sort(order[first])
     if len(rows) < 2:
-        found = f"found {len(rows)} poses within {within_s:g} s of one of {truth.path}"
-        raise PomonaError(f"{estimate.path}: {found}, expected 2 or more")
+        n_found = amount(len(rows), "pose")
+        found = f"found {n_found} within {within_s:g} s of one of {truth.path}, expected 2 or more"
+        raise PomonaError(f"{estimate.path}: {found}: {_why_apart(estimate.times_s, truth.times_s, apart_s)}")
     return rows, nearest[rows]
+
+
+def _why_apart(times_s: NDArray[np.float64], true_s: NDArray[np.float64], apart_s: NDArray[np.float64]) -> str:
+    """Say of times that are not those of the truth whether they lie elsewhere or beside them."""
+    if not (len(times_s) and len(true_s)):
+        return "there is none"
+    if times_s[0] > true_s[-1] or true_s[0] > times_s[-1]:
+        return f"its times, {_range(times_s)}, lie beside those there, {_range(true_s)}"
+    return f"in the median the nearest there is {np.median(apart_s):.3g} s off, see --within"
+
+
+def _range(times_s: NDArray[np.float64]) -> str:
+    return f"{times_s[0]:.10g} to {times_s[-1]:.10g} s"
 
 
 def _by_line(estimate: TimedPoses, truth: TimedPoses) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

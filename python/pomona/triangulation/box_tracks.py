@@ -8,10 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.triangulation.hypotheses import Hypotheses, evidence_of_boxes, hypotheses_of, is_in_view
-from pomona.triangulation.many_views import projected, triangulated
+from pomona.triangulation.box_evidence import BoxEvidence
+from pomona.triangulation.hypotheses import Hypotheses
+from pomona.triangulation.many_views import triangulated
 from pomona.triangulation.neighbouring_pictures import neighbours_of
 from pomona.triangulation.posed_boxes import PosedBoxes, PosedPictures
+from pomona.triangulation.proposals import hypotheses_of
 
 __all__ = ["LEAST_VIEWS", "tracks_of_boxes"]
 
@@ -30,7 +32,8 @@ ROUNDS = 2
 def tracks_of_boxes(pictures: PosedPictures, boxes: PosedBoxes) -> Rows:
     """Give the fruit of each box, (B,), numbered from 0, or -1 where it is of none."""
     first_box = np.searchsorted(boxes.pictures, np.arange(len(pictures) + 1)).astype(np.int64)
-    proposed = [hypotheses_of(pictures, boxes, first_box, row) for row in range(len(pictures))]
+    judge = BoxEvidence(pictures, boxes)
+    proposed = [hypotheses_of(judge, first_box, row) for row in range(len(pictures))]
     fruits, n_fruits = np.full(len(boxes), -1, np.int64), 0
     order = sorted(
         (-float(evidence), int(found.boxes[place, 0]), row, place)
@@ -42,22 +45,20 @@ def tracks_of_boxes(pictures: PosedPictures, boxes: PosedBoxes) -> Rows:
     for _, box, row, place in order:
         if fruits[box] >= 0:
             continue
-        taken, evidence = _taken(pictures, boxes, first_box, fruits, proposed[row].select(np.array([place])), row)
+        taken, evidence = _taken(judge, fruits, proposed[row].select(np.array([place])), row)
         if len(taken) >= LEAST_VIEWS and evidence >= least_evidence:
             fruits[taken], n_fruits = n_fruits, n_fruits + 1
     return fruits
 
 
-def _taken(
-    pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, fruits: Rows, place: Hypotheses, row: int
-) -> tuple[Rows, float]:
+def _taken(judge: BoxEvidence, fruits: Rows, place: Hypotheses, row: int) -> tuple[Rows, float]:
     """Give the boxes that a place takes of those that are left, and what speaks for it by now, nats.
 
     The picture that proposed the place does not: the place is where its box is.
     """
-    nothing = np.empty(0, np.int64), -np.inf
+    pictures, boxes, nothing = judge.pictures, judge.boxes, (np.empty(0, np.int64), -np.inf)
     for _ in range(ROUNDS):
-        _, taken = _asked(pictures, boxes, first_box, fruits, place)
+        _, taken = _asked(judge, fruits, place)
         if len(taken) < LEAST_VIEWS:
             return nothing
         views = triangulated(pictures, boxes, taken, np.zeros(len(taken), np.int64), place.positions)
@@ -65,20 +66,13 @@ def _taken(
             return nothing
         diameter = np.median(boxes.diameters(pictures.in_cameras(views.positions, boxes.pictures[taken]), taken))
         place = Hypotheses(place.boxes, views.positions, views.covariances, np.array([diameter]), place.evidence)
-    gains, taken = _asked(pictures, boxes, first_box, fruits, place)
+    gains, taken = _asked(judge, fruits, place)
     asked = np.setdiff1d(np.union1d(neighbours_of(pictures, row), boxes.pictures[taken]), [row])
     return taken, float(gains[asked].sum())
 
 
-def _asked(
-    pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, fruits: Rows, place: Hypotheses
-) -> tuple[NDArray[np.float64], Rows]:
-    """Ask all pictures that show one place: what each says, (P,), and the boxes that speak."""
-    gains, taken = np.zeros(len(pictures)), np.full(len(pictures), -1, np.int64)
-    all_ = np.arange(len(pictures))
-    in_cameras = pictures.in_cameras(place.positions, all_)
-    for picture in np.flatnonzero(is_in_view(pictures, projected(in_cameras)[0], in_cameras, all_)).tolist():
-        rows = np.arange(first_box[picture], first_box[picture + 1])
-        found, best = evidence_of_boxes(pictures, boxes, rows[fruits[rows] < 0], picture, place)
-        gains[picture], taken[picture] = found[0], best[0]
-    return gains, taken[taken >= 0]
+def _asked(judge: BoxEvidence, fruits: Rows, place: Hypotheses) -> tuple[NDArray[np.float64], Rows]:
+    """Ask all pictures for one place: what each says, (P,), and the boxes that speak."""
+    all_ = np.arange(len(judge.pictures))
+    heard = judge(place, np.zeros(len(all_), np.int64), all_, fruits < 0)
+    return heard.gains, heard.boxes[heard.boxes >= 0]

@@ -45,7 +45,7 @@ class TriangulatedFruits:
     cloud : FruitCloud
         In the model, in its units; with diameters, covariances and views. Frames of the views are rows of pictures.
     fruits : (B,) int64
-        Row of the fruit of each box, -1 where it is of none.
+        Row of the fruit of each box, -1 where it is of none, or of where the lens of its picture shows nothing.
     """
 
     cloud: FruitCloud
@@ -71,10 +71,25 @@ def triangulated_fruits(
         Names of the boxes: where every box has one, they say which are one fruit. Else the boxes are tracked.
     """
     pictures, boxes = PosedPictures.of(camera_from_model, cameras), PosedBoxes.of(boxes_px, cameras)
-    if len(boxes) and all(names is not None for names, found in zip(ids, boxes_px, strict=True) if len(found)):
-        names = [name for listed in ids for name in listed or ()]
-        labels, fruits = np.unique(names, return_inverse=True)
-        return _cloud(pictures, boxes, fruits.astype(np.int64), tuple(labels.tolist()))
+    shown = np.flatnonzero(np.isfinite(boxes.directions).all(axis=1))
+    found = _of_shown(pictures, boxes.select(shown), _named(boxes_px, ids, shown))
+    fruits = np.full(len(boxes), -1, np.int64)
+    fruits[shown] = found.fruits
+    return TriangulatedFruits(found.cloud, fruits)
+
+
+def _named(boxes_px: Sequence[Array], ids: Sequence[tuple[str, ...] | None], shown: Rows) -> list[str] | None:
+    """Give the names of the boxes `shown`; None unless every box has one."""
+    if any(names is None for names, found in zip(ids, boxes_px, strict=True) if len(found)):
+        return None
+    names = [name for listed in ids for name in listed or ()]
+    return [names[row] for row in shown.tolist()]
+
+
+def _of_shown(pictures: PosedPictures, boxes: PosedBoxes, names: list[str] | None) -> TriangulatedFruits:
+    if names:
+        labels, named = np.unique(names, return_inverse=True)
+        return _cloud(pictures, boxes, named.astype(np.int64), tuple(labels.tolist()))
     fruits = tracks_of_boxes(pictures, boxes)
     return _cloud(pictures, boxes, fruits, tuple(map(str, range(1, int(fruits.max(initial=-1)) + 2))))
 

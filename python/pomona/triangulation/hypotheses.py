@@ -1,45 +1,16 @@
-"""Where two boxes might be one fruit, and what other pictures say of it.
-
-Two boxes propose a place where their directions meet within their sigmas (the epipolar distance), in front of both
-cameras, with one size. Each place is judged by a ladder of neighbouring pictures that should show it: a box near where
-it is expected, against one that chance put there, or none although it should show.
-"""
+"""Places where fruits might be."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.triangulation.many_views import projected
-from pomona.triangulation.neighbouring_pictures import neighbours_of
-from pomona.triangulation.posed_boxes import PosedBoxes, PosedPictures
-
-__all__ = ["Hypotheses", "evidence_of_boxes", "hypotheses_of", "is_in_view"]
+__all__ = ["Hypotheses"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-
-GATE = 3.0
-"""Sigmas between two directions that may meet."""
-
-LEAST_PARALLAX = 6.0
-"""Angle between two directions in sigmas of one: below, the distance is known to no better than a fourth."""
-
-SIZE_RATIO_SIGMA = 0.25
-"""Of the logarithm of two diameters of one fruit: leaves hide a part of it."""
-
-SIZE_SPREAD = 0.7
-"""Of the logarithm of the diameters of strangers, which mostly are at wrong distances."""
-
-SEEN = 0.6
-"""Probability that a fruit in view has a box; the others are behind leaves."""
-
-MISSED = float(np.log(1 - SEEN))
-
-KEPT_PER_BOX = 4
-"""Hypotheses of each box that are looked at again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,149 +49,3 @@ class Hypotheses:
             self.evidence[rows],
             self.n_proposed,
         )
-
-
-def hypotheses_of(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, row: int) -> Hypotheses:
-    """Propose places for the boxes of one picture; `first_box` (P + 1,) says where the boxes of each begin."""
-    ladder = neighbours_of(pictures, row)
-    proposed = [_of_two(pictures, boxes, first_box, row, int(other)) for other in ladder]
-    if not proposed:
-        return _none()
-    all_ = Hypotheses(
-        np.concatenate([one.boxes for one in proposed]),
-        np.concatenate([one.positions for one in proposed]),
-        np.concatenate([one.covariances for one in proposed]),
-        np.concatenate([one.diameters for one in proposed]),
-        np.zeros(sum(len(one.evidence) for one in proposed)),
-    )
-    evidence = all_.evidence
-    for other in ladder.tolist():
-        span = slice(int(first_box[other]), int(first_box[other + 1]))
-        gains, _ = evidence_of_boxes(pictures, boxes, np.arange(span.start, span.stop), other, all_)
-        evidence = evidence + gains
-    return _best_of_each(replace(all_, evidence=evidence, n_proposed=len(evidence)))
-
-
-def _none() -> Hypotheses:
-    return Hypotheses(np.empty((0, 2), np.int64), np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0), np.empty(0))
-
-
-def _best_of_each(all_: Hypotheses) -> Hypotheses:
-    order = np.lexsort((-all_.evidence, all_.boxes[:, 0]))
-    anchors = all_.boxes[order, 0]
-    begins = np.searchsorted(anchors, anchors)
-    kept = order[(np.arange(len(order)) - begins < KEPT_PER_BOX) & (all_.evidence[order] > 0)]
-    return all_.select(kept)
-
-
-def _of_two(pictures: PosedPictures, boxes: PosedBoxes, first_box: Rows, one: int, other: int) -> Hypotheses:
-    """Propose places where boxes of two pictures meet."""
-    mine = np.arange(first_box[one], first_box[one + 1])
-    theirs = np.arange(first_box[other], first_box[other + 1])
-    rows = _meeting(pictures, boxes, mine, theirs, one, other)
-    rays = [_rays(pictures, boxes, rows[:, side], picture) for side, picture in enumerate((one, other))]
-    apart = pictures.centres[other] - pictures.centres[one]
-    places, parallax = _midpoints(pictures.centres[one], apart, *rays)
-    in_cameras = [pictures.in_cameras(places, np.full(len(rows), picture)) for picture in (one, other)]
-    sizes = [boxes.diameters(in_camera, rows[:, side]) for side, in_camera in enumerate(in_cameras)]
-    sigmas = np.maximum(*(boxes.sigmas[rows[:, side]] for side in range(2)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alike = np.abs(np.log(sizes[0] / sizes[1])) < GATE * SIZE_RATIO_SIGMA
-    fine = (in_cameras[0][:, 2] > 0) & (in_cameras[1][:, 2] > 0) & alike & (parallax > LEAST_PARALLAX * sigmas)
-    information = _information(pictures, boxes, rows[fine, 0], in_cameras[0][fine], one)
-    information = information + _information(pictures, boxes, rows[fine, 1], in_cameras[1][fine], other)
-    diameters = np.sqrt(sizes[0][fine] * sizes[1][fine])
-    return Hypotheses(rows[fine], places[fine], np.asarray(np.linalg.inv(information)), diameters, np.zeros(fine.sum()))
-
-
-def _meeting(pictures: PosedPictures, boxes: PosedBoxes, mine: Rows, theirs: Rows, one: int, other: int) -> Rows:
-    """Give pairs of rows whose directions meet within `GATE` sigmas: |x'Ex| over its sigma (Sampson, 1982)."""
-    other_from_one = pictures.rotations[other] @ pictures.rotations[one].T
-    x, y, z = pictures.rotations[other] @ (pictures.centres[one] - pictures.centres[other])
-    essential = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ other_from_one
-    here, there = (np.pad(boxes.directions[rows], ((0, 0), (0, 1)), constant_values=1.0) for rows in (mine, theirs))
-    lines_there, lines_here = here @ essential.T, there @ essential
-    errors = lines_there @ there.T
-    variances = (boxes.sigmas[mine] ** 2)[:, None] * (lines_here[:, :2] ** 2).sum(axis=1)[None, :]
-    variances = variances + (boxes.sigmas[theirs] ** 2)[None, :] * (lines_there[:, :2] ** 2).sum(axis=1)[:, None]
-    first, second = np.nonzero(errors**2 < GATE**2 * variances)
-    return np.stack([mine[first], theirs[second]], axis=1)
-
-
-def _rays(pictures: PosedPictures, boxes: PosedBoxes, rows: Rows, picture: int) -> Array:
-    rays = np.pad(boxes.directions[rows], ((0, 0), (0, 1)), constant_values=1.0) @ pictures.rotations[picture]
-    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
-
-
-def _midpoints(centre: Array, apart: Array, first: Array, second: Array) -> tuple[Array, Array]:
-    """Give the middle between two rays where they are nearest, and the sine of the angle between them."""
-    cosines = (first * second).sum(axis=1)
-    sines2 = np.maximum(1 - cosines**2, np.finfo(np.float64).eps)
-    along_first, along_second = first @ apart, second @ apart
-    on_first = (along_first - cosines * along_second) / sines2
-    on_second = (cosines * along_first - along_second) / sines2
-    middles = (on_first[:, None] * first + apart + on_second[:, None] * second) / 2
-    return centre + middles, np.sqrt(sines2)
-
-
-def _information(pictures: PosedPictures, boxes: PosedBoxes, rows: Rows, in_camera: Array, picture: int) -> Array:
-    _, slopes = projected(in_camera)
-    slopes = slopes @ pictures.rotations[picture] / boxes.sigmas[rows][:, None, None]
-    information = np.asarray(np.einsum("hki,hkj->hij", slopes, slopes))
-    return np.asarray(information + 1e-12 * np.trace(information, axis1=1, axis2=2)[:, None, None] * np.eye(3))
-
-
-def is_in_view(pictures: PosedPictures, seen: Array, in_camera: Array, picture: int | Rows) -> NDArray[np.bool_]:
-    """Tell which places show in a picture, by their x and y over z there."""
-    low, high = pictures.corners[picture, :2], pictures.corners[picture, 2:]
-    return np.asarray((in_camera[..., 2] > 0) & (seen > low).all(axis=-1) & (seen < high).all(axis=-1))
-
-
-def evidence_of_boxes(
-    pictures: PosedPictures, boxes: PosedBoxes, rows: Rows, picture: int, places: Hypotheses
-) -> tuple[Array, Rows]:
-    """Give what the boxes `rows` of one picture say of each place, nats, and the row of the box that speaks, else -1.
-
-    A fruit in view has a box with probability `SEEN`, near where it is expected and of its size; strangers lie
-    anywhere in the picture. A place out of view hears nothing.
-    """
-    in_camera = pictures.in_cameras(places.positions, np.full(len(places.positions), picture))
-    seen, slopes = projected(in_camera)
-    visible = is_in_view(pictures, seen, in_camera, picture)
-    gains, best = np.where(visible, MISSED, 0.0), np.full(len(visible), -1, np.int64)
-    if not len(rows) or not visible.any():
-        return gains, best
-    slopes = slopes[visible] @ pictures.rotations[picture]
-    spread = slopes @ places.covariances[visible] @ slopes.transpose(0, 2, 1)
-    near = _nearness(boxes, rows, seen[visible], spread) - _background(pictures, picture, len(rows)) + np.log(SEEN)
-    shown = boxes.diameters(in_camera[visible][:, None], rows[None, :])
-    near += _likeness(shown, places.diameters[visible][:, None])
-    nearest = near.argmax(axis=1)
-    found = near[np.arange(len(near)), nearest]
-    gains[visible] = np.maximum(found, MISSED)
-    best[visible] = np.where(found > MISSED, rows[nearest], -1)
-    return gains, best
-
-
-def _background(pictures: PosedPictures, picture: int, n_boxes: int) -> float:
-    """Logarithm of the density of boxes that lie anywhere."""
-    low, high = pictures.corners[picture, :2], pictures.corners[picture, 2:]
-    return float(np.log(n_boxes / np.prod(high - low)))
-
-
-def _nearness(boxes: PosedBoxes, rows: Rows, expected: Array, spread: Array) -> Array:
-    """Logarithm of the density of boxes around where places (H, 2), with spread (H, 2, 2), are expected, (H, D)."""
-    x, y = np.moveaxis(boxes.directions[rows][None] - expected[:, None], -1, 0)
-    variances = boxes.sigmas[rows][None] ** 2
-    xx, xy, yy = spread[:, 0, 0, None] + variances, spread[:, 0, 1, None], spread[:, 1, 1, None] + variances
-    determinants = xx * yy - xy**2
-    squared = (yy * x**2 - 2 * xy * x * y + xx * y**2) / determinants
-    return np.where(squared < GATE**2, -squared / 2 - np.log(2 * np.pi * np.sqrt(determinants)), -np.inf)
-
-
-def _likeness(shown: Array, diameters: Array) -> Array:
-    """Logarithm of how much likelier a size is of the fruit than of a stranger."""
-    ratios = np.log(np.maximum(shown, np.finfo(np.float64).tiny) / diameters)
-    return np.asarray(
-        ratios**2 * (1 / SIZE_SPREAD**2 - 1 / SIZE_RATIO_SIGMA**2) / 2 + np.log(SIZE_SPREAD / SIZE_RATIO_SIGMA)
-    )

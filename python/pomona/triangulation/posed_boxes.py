@@ -41,7 +41,7 @@ class PosedPictures:
     centres : (P, 3) float64
         Of the cameras, in the model.
     corners : (P, 4) float64
-        Least and greatest x and y over z that each picture shows: xmin, ymin, xmax, ymax.
+        Least and greatest x and y over z that each picture shows, of a bent one at least: xmin, ymin, xmax, ymax.
     """
 
     rotations: Array
@@ -53,7 +53,7 @@ class PosedPictures:
         """Take poses (P, 4, 4) and the camera of each."""
         rotations = camera_from_model[:, :3, :3]
         centres = -np.einsum("pji,pj->pi", rotations, camera_from_model[:, :3, 3])
-        return cls(rotations, centres, np.array([_corners(camera) for camera in cameras]).reshape(-1, 4))
+        return cls(rotations, centres, np.array([camera.edges() for camera in cameras]).reshape(-1, 4))
 
     def __len__(self) -> int:
         return len(self.centres)
@@ -62,13 +62,6 @@ class PosedPictures:
         """Give positions of the model in the frames of the cameras of `pictures`, (..., 3)."""
         apart = positions - self.centres[pictures]
         return np.asarray(np.einsum("...ij,...j->...i", self.rotations[pictures], apart))
-
-
-def _corners(camera: PictureCamera) -> Array:
-    """Look along the edges: of a bent picture what all of it shows at least."""
-    (width, height), (cx, cy) = camera.size_px, camera.centre_px
-    edges = camera.directions(np.array([[0, cy], [cx, 0], [width, cy], [cx, height]], np.float64))
-    return np.array([edges[0, 0], edges[1, 1], edges[2, 0], edges[3, 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +73,9 @@ class PosedBoxes:
     pictures : (B,) int64
         Row of the picture.
     directions : (B, 2) float64
-        x and y over z of the fruit's centre, in the camera.
+        x and y over z of the fruit's centre, in the camera; NaN where the lens shows an edge of the box from nowhere.
     half_sines : (B, 2) float64
-        Of half the angles under which the fruit shows, across and down; 0 where the picture's edge cuts the box.
+        Of half the angles under which the fruit shows, across and down.
     sigmas : (B,) float64
         Standard deviation of each direction.
     """
@@ -105,6 +98,10 @@ class PosedBoxes:
 
     def __len__(self) -> int:
         return len(self.pictures)
+
+    def select(self, rows: NDArray[np.generic]) -> PosedBoxes:
+        """Give some of them."""
+        return PosedBoxes(self.pictures[rows], self.directions[rows], self.half_sines[rows], self.sigmas[rows])
 
     def diameters(self, in_camera: Array, rows: Rows) -> Array:
         """Give the diameters that boxes show of fruits at places in their cameras, (..., 3), by the longer side."""

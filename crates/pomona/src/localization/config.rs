@@ -11,9 +11,9 @@ settings! {
 pub struct LocalizationConfig {
     /// How far a fruit hangs from where the map has it, each for itself: standard deviation per axis, metres.
     pub own_m: f64,
-    /// How far neighbours hang from there together, by sag and drift: standard deviation per axis, metres.
+    /// How far all fruits in view hang from there together, by sag and drift: standard deviation per axis, metres.
     pub shared_m: f64,
-    /// Distance over which neighbours share that, metres.
+    /// Distance over which neighbours move together besides, metres; how far, their residuals show.
     pub reach_m: f64,
     /// Sightings from which on a frame stands alone; with fewer, the frames before are taken too.
     pub enough_fruits: usize,

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.reading import MOST_NUMBER
 from pomona.recording.poses import transforms
 
-__all__ = ["bare_name", "matrix_of", "path_between"]
+__all__ = ["Joint", "bare_name", "joint_of", "matrix_of", "path_between"]
+
+LEAST_TURN = 1e-3
+"""Largest number of a quaternion that says something: one that is written has length 1."""
 
 
 def bare_name(frame: str) -> str:
@@ -19,21 +23,40 @@ def bare_name(frame: str) -> str:
     return frame.lstrip("/")
 
 
-def matrix_of(translation: Any, rotation: Any) -> NDArray[np.float64]:
-    """Rigid transform (4, 4) of a decoded Vector3 or Point and a Quaternion; the identity for a quaternion of zeros."""
+class Joint(NamedTuple):
+    """One frame in another."""
+
+    parent: str
+    child: str
+    parent_from_child: NDArray[np.float64]
+
+
+def joint_of(stamped: Any) -> Joint | None:
+    """Take a decoded `TransformStamped` as tf2 does; None where a frame is nameless or in itself, or no number is."""
+    parent, child = bare_name(str(stamped.header.frame_id)), bare_name(str(stamped.child_frame_id))
+    matrix = matrix_of(stamped.transform.translation, stamped.transform.rotation)
+    return None if matrix is None or not parent or not child or parent == child else Joint(parent, child, matrix)
+
+
+def matrix_of(translation: Any, rotation: Any) -> NDArray[np.float64] | None:
+    """Rigid transform (4, 4) of a decoded Vector3 or Point and a Quaternion; the identity for a quaternion of zeros.
+
+    None where a number is none, as odometry says it that has lost its way.
+    """
     quaternion = np.array([[rotation.x, rotation.y, rotation.z, rotation.w]], np.float64)
+    position = np.array([[translation.x, translation.y, translation.z]], np.float64)
     if not quaternion.any():
         quaternion[0, 3] = 1.0
-    position = np.array([[translation.x, translation.y, translation.z]], np.float64)
+    largest = float(np.abs(quaternion).max())
+    if not (LEAST_TURN <= largest <= MOST_NUMBER and np.abs(position).max() <= MOST_NUMBER):  # nor is what is NaN
+        return None
     return np.asarray(transforms(quaternion, position)[0])
 
 
 def path_between(stamped: Iterable[Any], target: str, source: str) -> NDArray[np.float64] | None:
     """Give target_from_source (4, 4) along decoded `TransformStamped`, None where they do not lead there."""
     steps: dict[str, dict[str, NDArray[np.float64]]] = {}
-    for each in stamped:
-        parent, child = bare_name(each.header.frame_id), bare_name(each.child_frame_id)
-        parent_from_child = matrix_of(each.transform.translation, each.transform.rotation)
+    for parent, child, parent_from_child in filter(None, map(joint_of, stamped)):
         steps.setdefault(parent, {})[child] = parent_from_child
         steps.setdefault(child, {})[parent] = np.asarray(np.linalg.inv(parent_from_child), np.float64)
     target, source = bare_name(target), bare_name(source)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording.bags.contents import Contents
-from pomona.recording.bags.frames_of_reference import bare_name, matrix_of, path_between
+from pomona.recording.bags.frames_of_reference import Joint, bare_name, joint_of, matrix_of, path_between
 from pomona.recording.bags.message_file import TREES, MessageFile, counted, decoded, stamp_ns
 from pomona.recording.bags.topics import Roles
 
@@ -75,9 +74,11 @@ def _of_topic(path: Path, file: MessageFile, contents: Contents, camera: str, to
     for message in counted(path, file.messages({topic})):
         content = decoded(message)
         pose = content.pose.pose if hasattr(content.pose, "pose") else content.pose
-        times_ns.append(stamp_ns(message) or message.logged_ns)
-        poses.append(matrix_of(pose.position, pose.orientation))
         body = str(getattr(content, "child_frame_id", ""))
+        matrix = matrix_of(pose.position, pose.orientation)
+        if matrix is not None:
+            times_ns.append(stamp_ns(message) or message.logged_ns)
+            poses.append(matrix)
     if not poses:
         return None
     if body:
@@ -96,18 +97,17 @@ def _of_topic(path: Path, file: MessageFile, contents: Contents, camera: str, to
 
 def _of_tree(path: Path, file: MessageFile, contents: Contents, camera: str, topic: str) -> Known | None:
     """Walk from the camera up to the world; the joint that moves gives the times."""
-    parents = {bare_name(each.child_frame_id): bare_name(each.header.frame_id) for each in contents.static}
+    parents = {joint.child: joint.parent for joint in filter(None, map(joint_of, contents.static))}
     moving: set[str] = set()
-    for each, _ in _transforms(file, topic):
-        child = bare_name(each.child_frame_id)
-        parents[child] = bare_name(each.header.frame_id)
-        moving.add(child)
+    for each, _ in _joints(file, topic):
+        parents[each.child] = each.parent
+        moving.add(each.child)
     chain = [bare_name(camera)]
     while chain[-1] in parents and parents[chain[-1]] not in chain:
         chain.append(parents[chain[-1]])
     joints = [frame for frame in chain[:-1] if frame in moving]
-    if chain[-1].rpartition("/")[2] not in WORLDS or not joints:
-        return None
+    if chain[-1] in parents or chain[-1].rpartition("/")[2] not in WORLDS or not joints:
+        return None  # frames that go in a circle have no top
     if len(joints) > 1:
         names = ", ".join(f"{parents[joint]} to {joint}" for joint in joints)
         _tell(f"{path}: {topic}: several joints move between {chain[-1]} and the camera ({names}): none is used")
@@ -119,18 +119,19 @@ def _of_tree(path: Path, file: MessageFile, contents: Contents, camera: str, top
         return None
     times_ns: list[int] = []
     poses: list[NDArray[np.float64]] = []
-    for each, at_ns in _transforms(file, topic):
-        if bare_name(each.child_frame_id) == joint:
+    for each, at_ns in _joints(file, topic):
+        if each.child == joint and each.parent == parents[joint]:
             times_ns.append(at_ns)
-            poses.append(matrix_of(each.transform.translation, each.transform.rotation))
+            poses.append(each.parent_from_child)
     return _ascending(times_ns, above @ np.array(poses) @ below)
 
 
-def _transforms(file: MessageFile, topic: str) -> Iterator[tuple[Any, int]]:
+def _joints(file: MessageFile, topic: str) -> Iterator[tuple[Joint, int]]:
     for message in counted(file.path, file.messages({topic})):
         for each in decoded(message).transforms:
-            stamp = each.header.stamp
-            yield each, int(stamp.sec) * 10**9 + int(stamp.nanosec) or message.logged_ns
+            stamp, joint = each.header.stamp, joint_of(each)
+            if joint is not None:
+                yield joint, int(stamp.sec) * 10**9 + int(stamp.nanosec) or message.logged_ns
 
 
 def _ascending(times_ns: list[int], poses: NDArray[np.float64]) -> Known:

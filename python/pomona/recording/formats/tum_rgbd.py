@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError, PomonaWarning
-from pomona.reading import read_text, shown
+from pomona.reading import number_in, read_text, shown
 from pomona.recording.calibration.rig_files import find_optics
 from pomona.recording.formats.listed_recording import ListedRecording
 from pomona.recording.pairing import mutually_nearest
@@ -75,12 +75,11 @@ def _list(path: Path) -> tuple[NDArray[np.float64], tuple[Path, ...]]:
         if not words:
             continue
         try:
-            time_s, file = float(words[0]), words[1].strip()
-        except (ValueError, IndexError):
+            time_s, file = number_in(f"{path}: line {number}", "time", words[0]), words[1].strip()
+        except IndexError:
             raise PomonaError(f"{path}: line {number}: found {shown(line)}, expected a time and a file") from None
-        if not np.isfinite(time_s) or (times_s and time_s <= times_s[-1]):
-            before = f"{times_s[-1]:.6f} s" if times_s else "anything"
-            raise PomonaError(f"{path}: line {number}: time {time_s:.6f} s does not come after {before}")
+        if times_s and time_s <= times_s[-1]:
+            raise PomonaError(f"{path}: line {number}: time {time_s:.6f} s does not come after {times_s[-1]:.6f} s")
         times_s.append(time_s)
         files.append(picture_inside(f"{path}: line {number}", path.parent, file))
     return np.array(times_s), tuple(files)
