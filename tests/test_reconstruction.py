@@ -176,6 +176,7 @@ def test_text_and_binary_are_not_mixed(tmp_path):
         ("cameras", "640 360", "0 360", "found a size of 0x360"),
         ("cameras", "500.0 500.0", "nan 500.0", "found 'nan', expected a number"),
         ("cameras", "500.0 500.0", "-1 500.0", "found the focal length -1"),
+        ("cameras", "500.0 500.0", "500.0 1e-320", "found the focal length 9.99989e-321, expected pixels above 1e-06"),
         ("cameras", " 180.0", "", "missing, the line ends before it"),
         ("images", " 7 left/0003.png", " 6 left/0003.png", "image 1: found the camera 6, which is not there"),
         ("images", "left/0001.png", "left/0003.png", "images 1 and 2: found the same name twice"),

@@ -34,6 +34,9 @@ CAMERA_MODELS = (
 )
 """Those with at most two radial and two tangential terms, which are OpenCV's."""
 
+LEAST_FOCAL_PX = 1e-6
+"""Less shows all there is within one pixel, and pixels over it are more than numbers hold."""
+
 ITERATIONS = 30
 """Of Newton's on the distortion; a phone's lens needs four, one that bends a million times as much twenty."""
 
@@ -91,8 +94,9 @@ class PictureCamera:
             raise PomonaError(f"{where}: found NaN or infinity, expected {' '.join(model.parameters)}")
         value = dict(zip(model.parameters, numbers, strict=True))
         focal_px = np.array([value.get("fx", value.get("f", 0.0)), value.get("fy", value.get("f", 0.0))])
-        if not (focal_px > 0).all():
-            raise PomonaError(f"{where}: found the focal length {focal_px.min():g}, expected pixels above 0")
+        if not (focal_px > LEAST_FOCAL_PX).all():
+            expected = f"expected pixels above {LEAST_FOCAL_PX:g}"
+            raise PomonaError(f"{where}: found the focal length {focal_px.min():g}, {expected}")
         distortion = np.array([value.get(name, 0.0) for name in ("k1", "k2", "p1", "p2")])
         centre_px = np.array([value["cx"], value["cy"]])
         camera = cls(require_size(where, size_px), focal_px, centre_px, distortion)
