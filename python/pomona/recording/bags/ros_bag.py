@@ -39,7 +39,7 @@ class RosBag:
             When it cannot be read.
         """
         with _opened(path) as reader:
-            topics = {each.topic: _topic_of(each) for each in reader.connections}
+            topics = {each.topic: _topic_of(path, each) for each in reader.connections}
         return cls(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, files)
 
     def messages(self, topics: Collection[str], start_ns: int | None = None) -> Iterator[Message]:
@@ -67,7 +67,7 @@ class RosBag:
                 yield Message(self.topics[connection.topic], logged_ns, body)
 
 
-def _topic_of(connection: Any) -> Topic:
+def _topic_of(path: Path, connection: Any) -> Topic:
     from rosbags.interfaces import MessageDefinitionFormat
 
     about, definition = connection.ext, connection.msgdef
@@ -78,8 +78,11 @@ def _topic_of(connection: Any) -> Topic:
         metadata = {QOS: profiles_text(about.offered_qos_profiles)} if about.offered_qos_profiles else {}
     languages = {MessageDefinitionFormat.NONE: "", MessageDefinitionFormat.IDL: "ros2idl"}
     language = languages.get(definition.format, "ros1msg" if ros1 else "ros2msg")
-    encoding, text = "ros1" if ros1 else "cdr", definition.data.encode()
-    return Topic(connection.topic, connection.msgtype, encoding, language, text, metadata)
+    for text in (connection.topic, connection.msgtype, definition.data):
+        if not isinstance(text, str):  # SQLite keeps what it is given
+            raise DamagedBagError(f"{path}: damaged (a topic, its type or definition is {type(text).__name__})")
+    encoding = "ros1" if ros1 else "cdr"
+    return Topic(connection.topic, connection.msgtype, encoding, language, definition.data.encode(), metadata)
 
 
 def _opened(path: Path) -> Any:
