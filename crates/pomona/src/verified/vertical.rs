@@ -167,9 +167,12 @@ mod tests {
         assert!((alike..2.0 * alike).contains(&counted(turned).share_left()));
         assert!((Stands::default().share_left() - alike).abs() < 1e-12);
         // One in ten is upside down, by some degrees more or less.
-        let wires = |dice: &mut Dice| match dice.uniform() < 0.1 {
-            true => Rotation3::new(dice.normal() * 0.1) * Rotation3::new(Vector3::x() * std::f64::consts::PI),
-            false => turned(dice),
+        let wires = |dice: &mut Dice| {
+            if dice.uniform() < 0.1 {
+                Rotation3::new(dice.normal() * 0.1) * Rotation3::new(Vector3::x() * std::f64::consts::PI)
+            } else {
+                turned(dice)
+            }
         };
         assert!((0.07..0.13).contains(&counted(wires).share_left()));
     }
