@@ -6,13 +6,15 @@ precision is .90 and .95, precision and recall at the default threshold, and the
 thread. Writes detector.md; with `--draw FOLDER` the boxes too, to look at.
 """
 
+from __future__ import annotations
+
 import argparse
 import csv
 import json
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -46,28 +48,42 @@ RUNS = 20
 """Looks of which the fastest counts, in CPU time."""
 
 
+@dataclass(frozen=True)
+class Shown:
+    """How much larger the detector is shown the pictures, and in which folder people are shown what it found."""
+
+    enlarged: float
+    folder: Path | None
+
+    def within(self, name: str) -> Shown:
+        """Give the same for one set."""
+        return replace(self, folder=self.folder and self.folder / name)
+
+
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks detector", description=__doc__)
     parser.add_argument("--model", help="a file, or the name of a shipped one; else the shipped one and the wide one")
+    parser.add_argument(
+        "--enlarged", type=float, default=1.0, help="how much larger the detector is shown the pictures"
+    )
     parser.add_argument("--draw", type=Path, help="folder for pictures with boxes")
     options = parser.parse_args(arguments)
     data = shared_data()
     if data is None:
         print("detector: no data at POMONA_DATA or ../shared/data: skipped")
         return
-    tables = [
-        _table(model, data, options.draw) for model in ([options.model] if options.model else (SHIPPED, str(WIDE)))
-    ]
+    shown = Shown(options.enlarged, options.draw)
+    tables = [_table(model, data, shown) for model in ([options.model] if options.model else (SHIPPED, str(WIDE)))]
     text = "\n".join([*tables, _times()])
     print(text)
-    if not options.model:
+    if not options.model and options.enlarged == 1:
         write_text("detector.md", text)
 
 
-def _table(model: str, data: Path, draw: Path | None) -> str:
+def _table(model: str, data: Path, shown: Shown) -> str:
     detector = OnnxDetector.open(model_named(model), min_score=LOW_SCORE, threads=1)
     threshold = detector.signature.min_score or LOW_SCORE
-    rows = [_row(name, pictures, complete, detector, threshold, draw) for name, pictures, complete in _sets(data)]
+    rows = [_row(name, pictures, complete, detector, threshold, shown) for name, pictures, complete in _sets(data)]
     told = f"{detector.path.name}, boxes from a score of {threshold:.3f} on where no other is said.\n"
     return f"{told}\n{markdown(HEADER, rows)}"
 
@@ -88,9 +104,9 @@ HEADER = (
 
 
 def _row(
-    name: str, pictures: list[Labelled], complete: bool, detector: OnnxDetector, threshold: float, draw: Path | None
+    name: str, pictures: list[Labelled], complete: bool, detector: OnnxDetector, threshold: float, shown: Shown
 ) -> tuple[str, ...]:
-    looks = list(_found(pictures, detector, threshold, draw and draw / name.replace(" ", "_")))
+    looks = list(_found(pictures, detector, threshold, shown.within(name.replace(" ", "_"))))
     found, strict = judged(looks), judged(replace(look, smallest_px=0.0) for look in looks)
     precision, recall = found.above(threshold)
     head = (name, str(len(pictures)), str(found.n_fruits))
@@ -104,17 +120,17 @@ def _ratio(found: Judged, threshold: float) -> float:
     return float((found.scores >= threshold).sum() / found.n_fruits)
 
 
-def _found(
-    pictures: Iterable[Labelled], detector: OnnxDetector, threshold: float, draw: Path | None
-) -> Iterator[Found]:
+def _found(pictures: Iterable[Labelled], detector: OnnxDetector, threshold: float, shown: Shown) -> Iterator[Found]:
     for each in pictures:
         picture = read_picture(each.picture)
-        detections = detector.detect(picture)
-        if draw is not None:
-            draw.mkdir(parents=True, exist_ok=True)
-            shown = detections.scores >= threshold
-            kept = type(detections)(detections.boxes_px[shown], detections.scores[shown])
-            draw_boxes(draw / drawn_name(each.picture.name), picture, kept)
+        size_px = [round(shown.enlarged * side) for side in picture.shape[1::-1]]
+        detections = detector.detect(cv2.resize(picture, size_px, interpolation=cv2.INTER_LINEAR))
+        detections = type(detections)(detections.boxes_px / shown.enlarged, detections.scores)
+        if shown.folder is not None:
+            shown.folder.mkdir(parents=True, exist_ok=True)
+            counted = detections.scores >= threshold
+            kept = type(detections)(detections.boxes_px[counted], detections.scores[counted])
+            draw_boxes(shown.folder / drawn_name(each.picture.name), picture, kept)
         yield Found(detections, each.boxes_px, each.ignored_px, each.smallest_px)
 
 

@@ -22,7 +22,7 @@ from pomona.detect.training.targets import Targets, targets_of
 
 __all__ = ["Plan", "Source", "means_of", "train"]
 
-SAVED_EVERY = 25
+SAVED_EVERY = 200
 """Batches between two checkpoints: that is what an interruption costs at most."""
 
 
