@@ -1,15 +1,17 @@
 """Where the camera went, by the constellations of the fruits alone: no corners, no model of motion.
 
 True boxes without their names, depth from the stereo pictures. Both dates of the rendered row and the three of the
-shipped one, whole; and there and back, the frames of the way back being those that the way there left out. Writes
-slam.csv, slam.md and docs/images/slam.png.
+shipped one, whole; and there and back, the frames of the way back being those that the way there left out. And a row
+that the fast renderer draws here, once around it: its loops join what is seen from opposite sides. Writes slam.csv,
+slam.md and docs/images/slam.png.
 """
 
 import argparse
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from pomona.detect.opening import open_detector
 from pomona.localize.following import cloud_of
 from pomona.recording import Recording, open_recording
 from pomona.recording.poses import read_tum
+from pomona.render.filming import Filming, film
 from pomona.survey.seeing import Seeing
 from pomona.survey.slam import FruitWay, way_by_fruits
 from pomona.trajectory_scores import Span, TimedPoses, TrajectoryScore, score_trajectory
@@ -32,9 +35,13 @@ SHIPPED = ("2024-08-09", "2024-08-28", "2024-09-12")
 ROW = Path(__file__).parents[1] / "examples" / "row"
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "slam.png"
+DRAWN_SEED = 3
+"""Of the row that is drawn: five spindles as they come."""
+
 SHOWN = (
     *((f"rendered row, {date}", "whole") for date in RENDERED),
     *((f"shipped row, {date}", "there and back") for date in SHIPPED[:1]),
+    ("drawn row", "around"),
 )
 
 MEDIAN_CHI2 = 5.35
@@ -50,7 +57,8 @@ class Walk:
     name: str
     clouds: list[FruitCloud]
     poses: Array
-    seen_s: float
+    orders: dict[str, list[int]]
+    """Which frames are taken, one after the other, by what that is called."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +79,7 @@ def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks slam", description=__doc__).parse_args(arguments)
     results = []
     for walk in walks():
-        for variant, order in orders(len(walk.clouds)).items():
+        for variant, order in walk.orders.items():
             sys.stderr.write(f"slam: {walk.name}, {variant}\n")
             results.append(found(walk, variant, order))
     rows = [row_of(one) for one in results]
@@ -94,19 +102,22 @@ def walks() -> Iterator[Walk]:
         yield seen(
             f"shipped row, {date}", recording, ROW / date / "boxes.csv", read_tum(ROW / date / "poses_tum.txt")[1]
         )
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "around"
+        sys.stderr.write("slam: drawing a row\n")
+        film(Filming(path="around", seed=DRAWN_SEED), folder)
+        recording = open_recording(folder)
+        poses = np.array([frame.session_from_camera for frame in recording.frames()])
+        around = seen("drawn row", recording, folder / "boxes.csv", poses)
+    yield replace(around, orders={"around": around.orders["whole"]})
 
 
 def seen(name: str, recording: Recording, boxes: Path | None, poses: Array) -> Walk:
     sys.stderr.write(f"slam: {name}, looking\n")
     seeing = Seeing(recording, open_detector(boxes, None, recording), depth="stereo", colour=False)
-    began_s = time.perf_counter()
     clouds = [cloud_of(seeing(frame).lifted) for frame in recording.frames()]
-    return Walk(name, clouds, poses, time.perf_counter() - began_s)
-
-
-def orders(n: int) -> dict[str, list[int]]:
-    """Which frames are taken, one after the other."""
-    return {"whole": list(range(n)), "there and back": [*range(0, n, 2), *reversed(range(1, n, 2))]}
+    there = list(range(len(clouds)))
+    return Walk(name, clouds, poses, {"whole": there, "there and back": [*there[::2], *reversed(there[1::2])]})
 
 
 def found(walk: Walk, variant: str, order: list[int]) -> Found:

@@ -152,6 +152,17 @@ def test_times_that_are_not_those_of_the_truth_are_told_from_those_that_are_off(
         paired_rows(timed([0.05, 0.15, 0.25]), timed([0.0, 0.1, 0.2, 0.3]))
 
 
+def test_frame_numbers_beside_seconds_are_told(pomona: Pomona, tmp_path: Path) -> None:
+    for name, step_s in (("numbers.tum", 1.0), ("seconds.tum", 0.25)):
+        write_poses(tmp_path / name, trajectory(straight(10), step_s))
+    given = ("evaluate", "trajectory", tmp_path / "numbers.tum", tmp_path / "seconds.tum")
+    code, out, err = pomona(*given)
+    assert code == 0
+    assert out.startswith("3 poses of 10 and of 10 true ones")
+    assert err == "pomona: only 3 of 10 times are in both files; --in-order pairs poses line by line\n"
+    assert pomona(*given, "--in-order")[2] == ""
+
+
 def placed(places: list[list[float]]) -> TimedPoses:
     poses = np.tile(np.eye(4), (len(places), 1, 1))
     poses[:, :3, 3] = places

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import PICTURE
 
@@ -82,6 +82,10 @@ def evaluate_trajectory(
         say_json(score.as_json())
     else:
         say(*_as_lines(score))
+    n_known = min(score.n_estimate, score.n_truth)
+    if 2 * len(score.true) < n_known:
+        common = f"only {len(score.true)} of {n_known} times are in both files"
+        tell(f"pomona: {common}; --in-order pairs poses line by line")
 
 
 def _draw(plot: Path, score: TrajectoryScore, estimate: Path) -> None:

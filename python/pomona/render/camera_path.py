@@ -20,6 +20,9 @@ __all__ = ["PATHS", "PathShape", "camera_path", "pairs_along"]
 RATE_HZ = 10.0
 """Pairs a second, where nothing else is asked for."""
 
+AGAIN_M = 1.5
+"""How far a way around goes on past where it began: what the first pictures saw is in view once more."""
+
 SHAKES = 5
 """Sine waves of which each shake is made."""
 
@@ -36,6 +39,8 @@ class PathShape:
         From the trunks and over the ground.
     from_behind
         Whether the camera stands on the row's other side.
+    around
+        Whether it goes on around the end of the row, back along the other side and around to past where it began.
     yaw_rad, pitch_rad, roll_rad
         Turned to the right, up and clockwise against looking straight at the row.
     shake_m, shake_rad
@@ -50,6 +55,7 @@ class PathShape:
     distance_m: float = 1.5
     height_m: float = 1.4
     from_behind: bool = False
+    around: bool = False
     yaw_rad: float = 0.0
     pitch_rad: float = 0.0
     roll_rad: float = 0.0
@@ -78,6 +84,7 @@ PATHS: Mapping[str, PathShape] = {
     "hand-held": _BY_HAND,
     "far": replace(_TRACTOR, distance_m=2.3, height_m=1.6, speed_m_s=-1.8),
     "other-side": replace(_TRACTOR, from_behind=True),
+    "around": replace(_TRACTOR, around=True),
     "angle": replace(_TRACTOR, yaw_rad=0.3, pitch_rad=0.12, height_m=1.2),
     "walking-far": replace(_BY_HAND, distance_m=2.3, height_m=1.6, speed_m_s=-0.9),
     "upside-down": replace(_TRACTOR, roll_rad=np.pi),
@@ -88,7 +95,8 @@ PATHS: Mapping[str, PathShape] = {
 
 def pairs_along(path: str, reach_m: tuple[float, float]) -> int:
     """Give the number of pairs that a path takes from one x to another."""
-    return max(2, round((reach_m[1] - reach_m[0]) / abs(_shape(path).speed_m_s) * RATE_HZ))
+    shape = _shape(path)
+    return max(2, round(_length_m(shape, reach_m) / abs(shape.speed_m_s) * RATE_HZ))
 
 
 def camera_path(path: str, reach_m: tuple[float, float], pairs: int, seed: int, *, jitter: float = 0.0) -> Trajectory:
@@ -114,15 +122,15 @@ def camera_path(path: str, reach_m: tuple[float, float], pairs: int, seed: int, 
     """
     shape, rng = _shape(path), np.random.default_rng([seed, 0xCA3])
     shape = _jittered(shape, rng, jitter)
-    times_s = np.linspace(0.0, (reach_m[1] - reach_m[0]) / abs(shape.speed_m_s), pairs)
+    length_m = _length_m(shape, reach_m)
+    times_s = np.linspace(0.0, length_m / abs(shape.speed_m_s), pairs)
     share = _share_of_way(shape, rng, pairs)
-    along_m = reach_m[0] + (reach_m[1] - reach_m[0]) * (share if shape.speed_m_s > 0 else 1.0 - share)
-    side = 1.0 if shape.from_behind else -1.0
-    places = np.stack([along_m, np.full(pairs, side * shape.distance_m), np.full(pairs, shape.height_m)], axis=1)
+    nearest, towards = _way(shape, reach_m, length_m * (share if shape.speed_m_s > 0 else 1.0 - share))
+    places = nearest - shape.distance_m * towards + [0.0, 0.0, shape.height_m]
     poses = np.tile(np.eye(4), (pairs, 1, 1))
     poses[:, :3, 3] = places + shape.shake_m * _shake(rng, times_s, shape)
     angles = np.array([shape.yaw_rad, shape.pitch_rad, shape.roll_rad]) + shape.shake_rad * _shake(rng, times_s, shape)
-    poses[:, :3, :3] = _looking(side, angles)
+    poses[:, :3, :3] = _looking(towards, angles)
     return Trajectory(np.arange(pairs), times_s, poses)
 
 
@@ -130,6 +138,29 @@ def _shape(path: str) -> PathShape:
     if path not in PATHS:
         raise PomonaError(f"no path is called {path!r}; expected one of {', '.join(PATHS)}")
     return PATHS[path]
+
+
+def _length_m(shape: PathShape, reach_m: tuple[float, float]) -> float:
+    along_m = reach_m[1] - reach_m[0]
+    return 2.0 * (along_m + np.pi * shape.distance_m) + AGAIN_M if shape.around else along_m
+
+
+def _way(
+    shape: PathShape, reach_m: tuple[float, float], gone_m: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give where on the row the camera looks, and in which direction, (N, 3) each, level, after it has gone so far.
+
+    Around an end it looks at the last fruit from all along half a circle.
+    """
+    along_m, bend_m = reach_m[1] - reach_m[0], np.pi * shape.distance_m
+    pieces_m = np.array([along_m, bend_m, along_m, bend_m])
+    since_m = np.mod(gone_m, pieces_m.sum())[:, None] - (np.cumsum(pieces_m) - pieces_m)
+    there_m, round_far_m, back_m, round_near_m = np.clip(since_m, 0.0, pieces_m).T
+    turned = (round_far_m + round_near_m) / shape.distance_m + (np.pi if shape.from_behind else 0.0)
+    nearest, towards = np.zeros((2, len(gone_m), 3))
+    nearest[:, 0] = reach_m[0] + there_m - back_m
+    towards[:, 0], towards[:, 1] = -np.sin(turned), np.cos(turned)
+    return nearest, towards
 
 
 def _jittered(shape: PathShape, rng: np.random.Generator, jitter: float) -> PathShape:
@@ -161,11 +192,10 @@ def _shake(rng: np.random.Generator, times_s: NDArray[np.float64], shape: PathSh
     return np.asarray(waves.sum(axis=1) * np.sqrt(2.0 / SHAKES))
 
 
-def _looking(side: float, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations `session_from_camera` of cameras that look at the row, turned by (N, 3) yaw, pitch and roll."""
+def _looking(towards: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations `session_from_camera` of cameras that look level along (N, 3), turned by (N, 3) yaw, pitch and roll."""
     from scipy.spatial.transform import Rotation
 
-    # Camera axes in the row: x right, y down, z at the row, from its side of negative or positive y.
-    straight = np.array([[-side, 0.0, 0.0], [0.0, 0.0, -side], [0.0, -1.0, 0.0]])
-    turned = Rotation.from_euler("YXZ", angles).as_matrix()
-    return np.asarray(straight @ turned)
+    down = np.broadcast_to([0.0, 0.0, -1.0], towards.shape)
+    straight = np.stack([np.cross(down, towards), down, towards], axis=2)
+    return np.asarray(straight @ Rotation.from_euler("YXZ", angles).as_matrix())
