@@ -14,7 +14,7 @@ from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
 from pomona.survey.refinement import Motions, SeenFruits, refine
-from pomona.survey.slam import Anchors, Constellations, FruitWay, chained, way_by_fruits
+from pomona.survey.slam import Anchors, Constellations, FruitSlam, FruitWay, chained, way_by_fruits
 from pomona.survey.slam.consistency import explained
 from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.identities_of_links import joined_fruits
@@ -191,6 +191,78 @@ def test_a_row_is_known_again_from_its_other_side() -> None:
     way = way_by_fruits(clouds, round_the_end, threads=1)
     assert any(loop.first < 12 <= loop.second for loop in way.loops)
     assert np.linalg.norm(errors_of(way, true)[:, :3], axis=1).max() < 0.06
+
+
+def test_frame_by_frame_a_way_closes_where_it_comes_back_and_ends_as_all_at_once() -> None:
+    rng = np.random.default_rng(3)
+    there = [0.25 * step for step in range(14)]
+    true = wobbling(rng, [facing(x_m) for x_m in (*there, *(x_m + 0.1 for x_m in there[::-1]))])
+    fruits = drawn_row(rng, 3.4)
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    slam = FruitSlam(threads=1)
+    placed = [slam.add(cloud) for cloud in clouds]
+    assert not slam.parts.any()
+    assert {frame.part for frame in placed} == {0}
+    assert any(frame.closed for frame in placed[14:])
+    assert not any(frame.closed for frame in placed[:14])
+    off_m = [
+        np.linalg.norm((frame.session_from_camera - pose)[:3, 3])
+        for frame, pose in zip(placed, np.linalg.inv(true[0]) @ true, strict=True)
+    ]
+    assert max(off_m) < 0.08
+    now, at_once = slam.way(), way_by_fruits(clouds, threads=1)
+    assert np.array_equal(now.session_from_camera, at_once.session_from_camera)
+    assert np.array_equal(now.covariances, at_once.covariances)
+    assert len(now.loops) == len(at_once.loops)
+
+
+def test_a_way_that_broke_off_goes_on_where_it_sees_the_row_again() -> None:
+    """Blind for some frames, then along the other part of the row and back to where it had been."""
+    rng = np.random.default_rng(5)
+    fruits = drawn_row(rng, 7.0)
+    true = wobbling(rng, [facing(0.25 * step) for step in (*range(10), *range(26, -1, -1))])
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    blind = FruitCloud(np.zeros((0, 3)), covariances=np.zeros((0, 3, 3)))
+    clouds[10:12] = [blind, blind]
+    slam = FruitSlam(threads=1)
+    placed = [slam.add(cloud) for cloud in clouds]
+    begun = {frame.part for frame in placed[12:20]}
+    assert len(begun) == 1
+    assert 0 not in begun
+    assert placed[-1].part == 0
+    assert placed[-1].closed or any(frame.closed for frame in placed[24:])
+    seen_rows = [*range(10), *range(12, len(clouds))]
+    assert not slam.parts[seen_rows].any()
+    errors_m = np.linalg.norm((slam.session_from_camera - np.linalg.inv(true[0]) @ true)[seen_rows, :3, 3], axis=1)
+    assert errors_m.max() < 0.15
+    way = slam.way()
+    assert len(np.unique(way.parts[seen_rows])) == 1
+    errors = log_all(np.linalg.inv(way.session_from_camera[seen_rows]) @ np.linalg.inv(true[0]) @ true[seen_rows])
+    assert np.linalg.norm(errors[:, :3], axis=1).max() < 0.1
+
+
+def test_odometry_ties_a_frame_that_saw_nothing() -> None:
+    rng = np.random.default_rng(9)
+    fruits = drawn_row(rng, 2.5)
+    true = wobbling(rng, [facing(0.2 * step) for step in range(8)])
+    clouds = [seen(rng, fruits, pose) for pose in true]
+    clouds[4] = FruitCloud(np.zeros((0, 3)), covariances=np.zeros((0, 3, 3)))
+    slam, sure = FruitSlam(threads=1), np.diag(SIGMAS**-2.0)
+    for row, cloud in enumerate(clouds):
+        if row == 5:  # of which odometry tells where the blind frame was: the two parts are one
+            assert slam.parts.tolist() == [0, 0, 0, 0, 1]
+            slam.add(cloud, np.linalg.inv(true[4]) @ true[5], sure)
+            assert slam.parts.tolist() == [0] * 6
+        else:
+            slam.add(cloud)
+    blind = np.linalg.inv(slam.way().session_from_camera[4]) @ np.linalg.inv(true[0]) @ true[4]
+    assert np.linalg.norm(blind[:3, 3]) < 0.03
+    with pytest.raises(PomonaError, match=r"found shapes \(4, 4\) and none, expected \(4, 4\) and \(6, 6\)"):
+        slam.add(clouds[0], np.eye(4))
+
+
+def log_all(poses: np.ndarray) -> np.ndarray:
+    return np.array([log(pose) for pose in poses])
 
 
 def test_two_parts_are_joined_by_what_several_of_their_frames_saw() -> None:

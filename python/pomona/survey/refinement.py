@@ -96,6 +96,17 @@ class Motions:
         """Give the same with a part of their information."""
         return Motions(self.first, self.second, self.first_from_second, part * self.information, self.doubtful)
 
+    def inside(self, row_of: Rows) -> Motions:
+        """Give those between frames that stay, (F,) rows of which are given, -1 for the others."""
+        kept = np.flatnonzero((row_of[self.first] >= 0) & (row_of[self.second] >= 0))
+        return Motions(
+            row_of[self.first[kept]],
+            row_of[self.second[kept]],
+            self.first_from_second[kept],
+            self.information[kept],
+            self.which_are_doubtful()[kept],
+        )
+
     def which_are_doubtful(self) -> NDArray[np.bool_]:
         """Say it of each, (M,)."""
         return np.zeros(len(self), bool) if self.doubtful is None else np.asarray(self.doubtful, bool)

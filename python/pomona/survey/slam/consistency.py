@@ -16,12 +16,21 @@ from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
 from pomona.survey.slam.constellation_links import motions_of
 from pomona.survey.slam.loops import Loop
 
-__all__ = ["BELIEVED2", "explained"]
+__all__ = ["BELIEVED2", "NO_FRUITS", "explained", "explains"]
 
 BELIEVED2 = 22.5
 """Squared distance up to which a link or a loop is believed: one of a thousand true ones is farther off."""
 
 NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+
+def explains(poses: NDArray[np.float64], loop: Loop) -> bool:
+    """Say whether poses lie as a loop has them, by what it does not know alone."""
+    from scipy.spatial.transform import Rotation
+
+    left = np.linalg.inv(loop.first_from_second) @ np.linalg.inv(poses[loop.first]) @ poses[loop.second]
+    error = np.concatenate([left[:3, 3], Rotation.from_matrix(left[:3, :3]).as_rotvec()])
+    return bool(error @ loop.information @ error <= BELIEVED2)
 
 
 def explained(poses: NDArray[np.float64], motions: Motions, found: Sequence[Loop]) -> tuple[list[int], Refined]:

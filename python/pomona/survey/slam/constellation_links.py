@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.localize import Localizer
 from pomona.survey.refinement import Motions
 
-__all__ = ["ConstellationLink", "Constellations", "chained", "motions_of"]
+__all__ = ["ConstellationLink", "Constellations", "chained", "linked", "motions_of", "once"]
 
 SAME_VISIT: Mapping[str, Mapping[str, float]] = {"localization": {"own_m": 0.005, "shared_m": 0.001}}
 """Within a visit nothing grows or sags: the middle of a fruit differs by what each side shows of it, and wind."""
@@ -59,6 +59,10 @@ class ConstellationLink:
     pairs: NDArray[np.int64]
     probabilities: NDArray[np.float64]
 
+    def renamed(self, row_of: NDArray[np.int64]) -> ConstellationLink:
+        """Name frames by other rows."""
+        return replace(self, first=int(row_of[self.first]), second=int(row_of[self.second]))
+
 
 class Constellations:
     """The fruits of each frame, in which other frames are looked for.
@@ -76,12 +80,16 @@ class Constellations:
     def __init__(
         self, clouds: Sequence[FruitCloud], *, config: Mapping[str, Any] | None = None, threads: int | None = None
     ) -> None:
-        self._clouds, self._threads = clouds, threads
+        self._clouds, self._threads = list(clouds), threads
         self._config = config or {}
         self._ready: dict[int, Localizer] = {}
 
     def __len__(self) -> int:
         return len(self._clouds)
+
+    def add(self, cloud: FruitCloud) -> None:
+        """Take what the next frame saw."""
+        self._clouds.append(cloud)
 
     def cloud(self, row: int) -> FruitCloud:
         """Give what a frame saw."""
@@ -109,16 +117,18 @@ class Constellations:
 
 def chained(constellations: Constellations) -> list[ConstellationLink]:
     """Look for each frame in those just before it."""
-    links: list[ConstellationLink] = []
-    for second in range(1, len(constellations)):
-        found = False
-        for first in range(second - 1, max(second - 1 - REACH, -1), -1):
-            if found and second - first > NEAR:
-                break
-            if (link := constellations.between(first, second)) is not None:
-                links.append(link)
-                found = True
-    return links
+    return [link for second in range(1, len(constellations)) for link in linked(constellations, second)]
+
+
+def linked(constellations: Constellations, second: int) -> Iterator[ConstellationLink]:
+    """Look for one frame in those just before it."""
+    found = False
+    for first in range(second - 1, max(second - 1 - REACH, -1), -1):
+        if found and second - first > NEAR:
+            return
+        if (link := constellations.between(first, second)) is not None:
+            found = True
+            yield link
 
 
 class _Related(Protocol):
@@ -145,6 +155,11 @@ def motions_of(links: Sequence[_Related]) -> Motions:
         information=np.array([link.information for link in links]),
         doubtful=np.ones(len(links), bool),
     )
+
+
+def once(links: Sequence[ConstellationLink], n_frames: int) -> Motions:
+    """Give links of some frames as motions; what each sighting says in several links counts as one."""
+    return motions_of(links).weakened(min(1.0, (n_frames - 1) / max(len(links), 1)))
 
 
 def _over(ours: Mapping[str, Mapping[str, float]], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,11 +16,11 @@ from pomona.cloud import FruitCloud
 from pomona.survey.refinement import Motions, SeenFruits, refine
 from pomona.survey.slam.anchors import Anchors, anchored
 from pomona.survey.slam.consistency import BELIEVED2, NO_FRUITS, explained
-from pomona.survey.slam.constellation_links import ConstellationLink, motions_of
+from pomona.survey.slam.constellation_links import ConstellationLink, once
 from pomona.survey.slam.identities_of_links import joined_fruits, linked_fruits
 from pomona.survey.slam.loops import Loop, SeenMap
 
-__all__ = ["FruitGraph"]
+__all__ = ["FruitGraph", "sightings_of"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -50,7 +50,7 @@ class FruitGraph:
     """
 
     def __init__(self, clouds: Sequence[FruitCloud], motions: Motions, poses: Array) -> None:
-        self._sightings, self._motions = _sightings_of(clouds), motions
+        self._sightings, self._motions = sightings_of(clouds), motions
         self._begins = np.searchsorted(self._sightings.frames, np.arange(len(clouds)))
         self.links: list[ConstellationLink] = []
         self.poses = poses
@@ -64,7 +64,7 @@ class FruitGraph:
         SeenMap
             The fruits where they are then.
         """
-        motions = self._motions.and_those(self._once(links))
+        motions = self._motions.and_those(once(links, len(self.poses)))
         found = refine(self.poses, NO_FRUITS, motions)
         self.poses, errors2 = found.session_from_camera, found.motion_squared_errors[len(self._motions) :]
         self.links = [link for link, error2 in zip(links, errors2, strict=True) if error2 <= BELIEVED2]
@@ -75,7 +75,7 @@ class FruitGraph:
         """Adjust to loops too; those that are believed, which are returned, join fruits."""
         if not found:
             return []
-        motions = self._motions.and_those(self._once(self.links).trusted())
+        motions = self._motions.and_those(once(self.links, len(self.poses)).trusted())
         rows, adjusted = explained(self.poses, motions, found)
         self.poses, believed = adjusted.session_from_camera, [found[row] for row in rows]
         same = np.concatenate([np.empty((0, 2, 2), np.int64), *(loop.pairs for loop in believed)])
@@ -91,10 +91,6 @@ class FruitGraph:
         if found.pose_covariances is not None:
             self.covariances = found.pose_covariances
 
-    def _once(self, links: Sequence[ConstellationLink]) -> Motions:
-        """Give links as motions; what each sighting says in several links counts as one."""
-        return motions_of(links).weakened(min(1.0, (len(self.poses) - 1) / max(len(links), 1)))
-
     def _adjusted(self, sightings: SeenFruits) -> SeenMap:
         """Adjust poses and fruits to the sightings and odometry."""
         found = refine(self.poses, sightings, self._motions, with_pose_covariances=True)
@@ -104,7 +100,7 @@ class FruitGraph:
         return SeenMap(self.poses, sightings.frames, sightings.fruits, found.centres, found.covariances)
 
 
-def _sightings_of(clouds: Sequence[FruitCloud]) -> SeenFruits:
+def sightings_of(clouds: Sequence[FruitCloud]) -> SeenFruits:
     """Give all fruits of all frames, each a fruit of its own as long as no link says otherwise."""
     frames = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
     centres = np.concatenate([np.empty((0, 3)), *(cloud.positions for cloud in clouds)])

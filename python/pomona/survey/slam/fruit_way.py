@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,10 @@ from pomona.survey.refinement import Motions
 from pomona.survey.slam.anchors import Anchors
 from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
 from pomona.survey.slam.fruit_graph import FruitGraph
-from pomona.survey.slam.loops import Loop, SeenMap, joined, loops
+from pomona.survey.slam.loops import TOGETHER, Loop, SeenMap, joined, loops, recognised
 from pomona.survey.slam.spanning import spanned_poses
 
-__all__ = ["FruitWay", "way_by_fruits"]
+__all__ = ["FruitWay", "Known", "adjusted_way", "require_covariances", "way_by_fruits"]
 
 Rows = NDArray[np.int64]
 
@@ -90,14 +91,19 @@ def way_by_fruits(
         A cloud has no covariances, or a setting is wrong. Frames that hang together with no other are parts of one
         frame.
     """
-    _require_covariances(clouds)
+    require_covariances(clouds)
     constellations = Constellations(clouds, config=config, threads=threads)
     known = Known(constellations, Motions.none() if motions is None else motions, anchors, chained(constellations), [])
+    return adjusted_way(known)
+
+
+def adjusted_way(known: Known) -> FruitWay:
+    """Lay out what is known of the frames, join parts, close loops, and adjust it all."""
     parts, start = known.laid_out()
     if joins := list(_joins(known, parts, start)):
         known = replace(known, joins=joins)
         parts, start = known.laid_out()
-    n = len(clouds)
+    n = len(known.constellations)
     way = FruitWay(parts, start, np.zeros((n, 6, 6)), (), len(known.links), (), 0)
     for rows in _rows_of(parts):
         way = _with_part(way, rows, known)
@@ -123,22 +129,24 @@ class Known:
         """Adjust the frames of a part to each other."""
         row_of = _row_of(rows, len(self.constellations))
         clouds = [self.constellations.cloud(row) for row in rows.tolist()]
-        graph = FruitGraph(clouds, _inside(self.motions, row_of), poses[rows])
-        return graph, graph.link([_renamed(link, row_of) for link in self.links if row_of[link.first] >= 0])
+        graph = FruitGraph(clouds, self.motions.inside(row_of), poses[rows])
+        return graph, graph.link(
+            [link.renamed(row_of) for link in self.links if min(row_of[link.first], row_of[link.second]) >= 0]
+        )
 
 
 def _joins(known: Known, parts: Rows, start: NDArray[np.float64]) -> Iterator[Loop]:
-    """Look for each part in the one before it, and in the one before that."""
+    """Look for the beginning of each part where one of the two before ended, else for any of it anywhere before."""
     rows = _rows_of(parts)
     maps = [known.graph(ours, start)[1] for ours in rows] if len(rows) > 1 else []
     for second in range(1, len(maps)):
-        for first in range(second - 1, max(second - 3, -1), -1):
-            if (join := joined(maps[first], maps[second], known.constellations)) is not None:
-                pairs = join.pairs.copy()
-                for side, ours in enumerate((rows[first], rows[second])):
-                    pairs[:, side, 0] = ours[pairs[:, side, 0]]
-                ends = int(rows[first][join.first]), int(rows[second][join.second])
-                yield replace(join, first=ends[0], second=ends[1], pairs=pairs)
+        before = range(second - 1, -1, -1)
+        begins = range(0, len(rows[second]), TOGETHER)
+        ends = ((first, joined(maps[first], maps[second], known.constellations)) for first in before[:2])
+        anywhere = ((first, recognised(maps[first], maps[second], begins, known.constellations)) for first in before)
+        for first, join in chain(ends, anywhere):
+            if join is not None:
+                yield join.renamed(rows[first], rows[second])
                 break
 
 
@@ -146,7 +154,7 @@ def _with_part(way: FruitWay, rows: Rows, known: Known) -> FruitWay:
     """Adjust one part of a way; rows of a part are those of its frames, in order."""
     row_of = _row_of(rows, len(way))
     graph, seen = known.graph(rows, way.session_from_camera)
-    found = [_of_part(join, row_of) for join in known.joins if row_of[join.first] >= 0]
+    found = [join.renamed(row_of) for join in known.joins if row_of[join.first] >= 0]
     n_joins = len(found)
     found += loops(seen, known.constellations)
     believed = graph.close(found)
@@ -159,9 +167,9 @@ def _with_part(way: FruitWay, rows: Rows, known: Known) -> FruitWay:
         parts=way.parts,
         session_from_camera=poses,
         covariances=covariances,
-        links=(*way.links, *(_renamed(link, rows) for link in graph.links)),
+        links=(*way.links, *(link.renamed(rows) for link in graph.links)),
         refused=way.refused - len(graph.links),
-        loops=(*way.loops, *(_of_part(loop, rows) for loop in closed)),
+        loops=(*way.loops, *(loop.renamed(rows) for loop in closed)),
         refused_loops=way.refused_loops + len(found) - n_joins - len(closed),
     )
 
@@ -176,28 +184,8 @@ def _row_of(rows: Rows, n_frames: int) -> Rows:
     return row_of
 
 
-def _renamed(link: ConstellationLink, row_of: Rows) -> ConstellationLink:
-    return replace(link, first=int(row_of[link.first]), second=int(row_of[link.second]))
-
-
-def _of_part(loop: Loop, row_of: Rows) -> Loop:
-    pairs = loop.pairs.copy()
-    pairs[..., 0] = row_of[pairs[..., 0]]
-    return replace(loop, first=int(row_of[loop.first]), second=int(row_of[loop.second]), pairs=pairs)
-
-
-def _inside(motions: Motions, row_of: Rows) -> Motions:
-    kept = np.flatnonzero(row_of[motions.first] >= 0)
-    return Motions(
-        row_of[motions.first[kept]],
-        row_of[motions.second[kept]],
-        motions.first_from_second[kept],
-        motions.information[kept],
-        motions.which_are_doubtful()[kept],
-    )
-
-
-def _require_covariances(clouds: Sequence[FruitCloud]) -> None:
+def require_covariances(clouds: Sequence[FruitCloud]) -> None:
+    """Refuse fruits of which it is not known how well they are placed."""
     bare = next((row for row, cloud in enumerate(clouds) if len(cloud) and cloud.covariances is None), None)
     if bare is not None:
         raise PomonaError(f"clouds: frame {bare} has no covariances, expected those of every fruit")

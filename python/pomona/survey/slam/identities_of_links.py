@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.survey.slam.constellation_links import ConstellationLink
 
-__all__ = ["joined_fruits", "linked_fruits"]
+__all__ = ["joined_fruits", "linked_fruits", "pairs_of"]
 
 Rows = NDArray[np.int64]
 
@@ -29,13 +29,18 @@ def linked_fruits(links: Sequence[ConstellationLink], begins: Rows, frames: Rows
     frames : (S,) int64
         Frame of each sighting.
     """
+    return joined_fruits(np.arange(len(frames)), frames, pairs_of(links, begins))
+
+
+def pairs_of(links: Sequence[ConstellationLink], begins: Rows) -> list[tuple[int, int]]:
+    """Give the two sightings of each pair of fruits that links are sure of, the surest first."""
     pairs = [
         (-probability, int(begins[link.first] + row), int(begins[link.second] + other))
         for link in links
         for (row, other), probability in zip(link.pairs.tolist(), link.probabilities.tolist(), strict=True)
         if probability > SURE
     ]
-    return joined_fruits(np.arange(len(frames)), frames, ((one, other) for _, one, other in sorted(pairs)))
+    return [(one, other) for _, one, other in sorted(pairs)]
 
 
 def joined_fruits(fruits: Rows, frames: Rows, pairs: Iterable[Sequence[int]]) -> Rows:

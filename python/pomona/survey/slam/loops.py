@@ -6,8 +6,8 @@ by their constellations alone: where drift says the camera is, does not matter, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.survey.slam.constellation_links import LEAST_FRUITS, Constellations
 
-__all__ = ["Loop", "SeenMap", "joined", "loops"]
+__all__ = ["TOGETHER", "Loop", "SeenMap", "joined", "loop_at", "loops", "recognised"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -52,6 +52,11 @@ class SeenMap:
         """Give the fruits that the frames of a range saw."""
         return np.unique(self.fruits[(self.frames >= first) & (self.frames < end)])
 
+    def often(self, fruits: Rows) -> Rows:
+        """Leave out fruits that hardly any frame saw."""
+        views = np.bincount(self.fruits, minlength=len(self.centres))
+        return fruits[views[fruits] >= LEAST_VIEWS]
+
     def sightings_of(self, fruits: Rows) -> Rows:
         """Give the frame and the row in it of the first sighting of each fruit, (..., 2)."""
         first = np.unique(self.fruits, return_index=True)[1][fruits]
@@ -87,31 +92,63 @@ class Loop:
     information: Array
     pairs: Rows
 
+    def renamed(self, row_of: Rows, row_of_second: Rows | None = None) -> Loop:
+        """Name frames by other rows, those of the later side by rows of their own where they are of another part."""
+        sides = row_of, row_of if row_of_second is None else row_of_second
+        pairs = self.pairs.copy()
+        for side, rows in enumerate(sides):
+            pairs[:, side, 0] = rows[pairs[:, side, 0]]
+        return replace(self, first=int(sides[0][self.first]), second=int(sides[1][self.second]), pairs=pairs)
+
 
 def loops(seen: SeenMap, constellations: Constellations) -> Iterator[Loop]:
     """Look for what was seen before, stretch by stretch."""
-    views = np.bincount(seen.fruits, minlength=len(seen.centres))
-    often = views >= LEAST_VIEWS
-    for begin in range(2 * TOGETHER, len(seen.poses), TOGETHER):
+    for begin in range(0, len(seen.poses), TOGETHER):
+        if (loop := loop_at(seen, constellations, begin)) is not None:
+            yield loop
+
+
+def loop_at(seen: SeenMap, constellations: Constellations, begin: int) -> Loop | None:
+    """Look for what the stretch that begins with a frame saw among what was seen before, and went out of sight."""
+    end = min(begin + TOGETHER, len(seen.poses))
+    # What never left the sight is no place come back to.
+    before = np.setdiff1d(seen.seen_in(0, begin - TOGETHER), seen.seen_in(begin - TOGETHER, end))
+    return _Known(seen, before, constellations).stretch(seen, begin)
+
+
+def recognised(there: SeenMap, seen: SeenMap, begins: Iterable[int], constellations: Constellations) -> Loop | None:
+    """Look for what a stretch of one part saw anywhere in another; frames by their rows in their parts.
+
+    Stretches begin with the frames given; the first that is found counts.
+    """
+    known = _Known(there, np.arange(len(there.centres)), constellations)
+    return next((loop for begin in begins if (loop := known.stretch(seen, begin)) is not None), None)
+
+
+class _Known:
+    """Some of the fruits of a part, in which stretches are looked for."""
+
+    def __init__(self, there: SeenMap, fruits: Rows, constellations: Constellations) -> None:
+        self._there, self._fruits = there, there.often(fruits)
+        enough = len(self._fruits) >= LEAST_FRUITS
+        self._map = constellations.of(there.cloud(self._fruits, np.eye(4))) if enough else None
+
+    def stretch(self, seen: SeenMap, begin: int) -> Loop | None:
+        """Look for the fruits of a stretch, as its middle frame sees them."""
         end = min(begin + TOGETHER, len(seen.poses))
-        here, before = seen.seen_in(begin, end), seen.seen_in(0, begin - TOGETHER)
-        # What never left the sight is no place come back to.
-        before = np.setdiff1d(before, seen.seen_in(begin - TOGETHER, end))
-        here, before = here[often[here]], before[often[before]]
-        if min(len(here), len(before)) >= LEAST_FRUITS:
-            yield from _found(seen, constellations, (begin + end) // 2, here, before)
-
-
-def _found(seen: SeenMap, constellations: Constellations, second: int, here: Rows, before: Rows) -> Iterator[Loop]:
-    found = constellations.of(seen.cloud(before, np.eye(4))).locate(seen.cloud(here, seen.poses[second]))
-    if not found or found.map_from_camera is None:
-        return
-    fruits = np.stack((before[found.pairs[:, 1]], here[found.pairs[:, 0]]), axis=1)
-    # Of the earlier frames, the one that saw the most of them holds the loop.
-    saw = np.isin(seen.fruits, fruits[:, 0]) & (seen.frames < second)
-    first = int(np.bincount(seen.frames[saw]).argmax())
-    step = np.linalg.inv(seen.poses[first]) @ found.map_from_camera
-    yield Loop(first, second, step, np.asarray(np.linalg.inv(found.covariance), np.float64), seen.sightings_of(fruits))
+        here, second = seen.often(seen.seen_in(begin, end)), (begin + end) // 2
+        if self._map is None or len(here) < LEAST_FRUITS:
+            return None
+        found = self._map.locate(seen.cloud(here, seen.poses[second]))
+        if not found or found.map_from_camera is None:
+            return None
+        there, known = self._there, self._fruits[found.pairs[:, 1]]
+        # Of the earlier frames, the one that saw the most of them holds the loop.
+        saw = np.isin(there.fruits, known) & ((there.frames < second) | (there is not seen))
+        first = int(np.bincount(there.frames[saw]).argmax())
+        step = np.linalg.inv(there.poses[first]) @ found.map_from_camera
+        pairs = np.stack((there.sightings_of(known), seen.sightings_of(here[found.pairs[:, 0]])), axis=1)
+        return Loop(first, second, step, np.asarray(np.linalg.inv(found.covariance), np.float64), pairs)
 
 
 def joined(before: SeenMap, after: SeenMap, constellations: Constellations) -> Loop | None:
