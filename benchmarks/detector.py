@@ -31,8 +31,8 @@ from pomona.detect.picture_file import read_picture
 from pomona.detect.shipped import EXACT, SHIPPED, model_named
 from pomona.detect.training.labels import Labelled
 
-LOW_SCORE = 0.05
-"""Of the boxes that a curve is drawn through."""
+LOW_SCORE = 0.001
+"""Of the boxes that a curve is drawn through: what is below adds nothing to the area."""
 
 RENDERED_DATES = ("2024-08-09", "2024-08-28")
 MIN_VISIBLE, MIN_SIDE_PX = 0.5, 8
