@@ -91,6 +91,19 @@ def test_shared_errors_do_not_average_out(row):
     assert sigmas_m[1] ** 2 - sigmas_m[0] ** 2 == pytest.approx(3 * (0.02**2 - 0.002**2), rel=0.05)
 
 
+def test_where_the_vertical_is_known_fruits_are_thought_to_sink(row):
+    """What all fruits share is whole along the vertical and half of it aside."""
+    true, up = pose_at(4.0), np.array([0.0, 0.0, 1.0])
+    seen, in_map = seen_from(row, true, 3), []
+    for shared_m in (0.002, 0.02):
+        localizer = Localizer(row.map, config={"localization": {"shared_m": shared_m}}, threads=1)
+        found = localizer.locate(seen, up=[(true[:3, :3].T @ up).tolist(), (2 * up).tolist()])
+        turn = found.map_from_camera[:3, :3]
+        in_map.append(turn @ found.covariance[:3, :3] @ turn.T)
+    aside, more = 0.25, 0.02**2 - 0.002**2
+    assert in_map[1] - in_map[0] == pytest.approx(more * np.diag([aside, aside, 1.0]), abs=0.05 * more)
+
+
 @pytest.mark.parametrize("moved_is_known", [True, False])
 def test_frames_are_tracked(row, fresh, moved_is_known):
     before = None

@@ -5,7 +5,7 @@ use super::answer::{Localization, MapPair};
 use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
 use super::known::KnownFruits;
-use super::shared::covariance;
+use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
 use super::slip::Slip;
 use super::told_motions::ToldMotions;
@@ -93,7 +93,8 @@ impl Localizer {
 
     /// Where the camera is, from one frame and nothing else; what [`Self::update`] knows stays as it is.
     ///
-    /// `seen` are fruits in the camera's frame; `up` is the vertical in the camera's and in the map's frame.
+    /// `seen` are fruits in the camera's frame; `up` is the vertical in the camera's and in the map's frame: with it fruits
+    /// are thought to sink rather than to move aside.
     ///
     /// # Errors
     /// A cloud or a direction that is wrong. That the camera is not found is no error.
@@ -122,7 +123,7 @@ impl Localizer {
             (None, None) => self.window.forget(),
         }
         self.window.push(Sighting::of(seen), self.config.window_frames);
-        let found = predicted.and_then(|predicted| self.followed(&predicted, moved.is_some()));
+        let found = predicted.and_then(|predicted| self.followed(&predicted, moved.is_some(), up));
         let found = match found {
             Some(found) => found,
             None => self.found_again(predicted.map(|told| self.motions.ahead(&told)).as_ref(), up)?,
@@ -152,10 +153,10 @@ impl Localizer {
     }
 
     /// The pose near the predicted one, if the fruits agree with it.
-    fn followed(&mut self, told: &Belief, is_measured: bool) -> Option<Localization> {
+    fn followed(&mut self, told: &Belief, is_measured: bool, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
         let settle = if is_measured { ToldMotions::settle } else { ToldMotions::as_before };
         let settled = settle(&self.motions, &self.window, self.config.enough_fruits, &self.map, told);
-        let joint = self.believed(&settled.aligned, 0.0)?;
+        let joint = self.believed(&settled.aligned, up, 0.0)?;
         let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
         let found = Belief { pose: settled.aligned.pose, covariance, motion: told.motion };
         // What few fruits leave open, the motion tells.
@@ -195,7 +196,7 @@ impl Localizer {
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let start = Belief { pose: start, covariance: doubt, motion: None };
         let aligned = align(sightings, &self.map, &start, Slip::none());
-        let Some(joint) = self.believed(&aligned, SEARCHED_NATS) else {
+        let Some(joint) = self.believed(&aligned, up, SEARCHED_NATS) else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
         let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
@@ -205,12 +206,12 @@ impl Localizer {
 
     /// Covariance of a pose and its slip, if there is enough for it; `chosen_nats` is what the choice among many gains
     /// by chance.
-    fn believed(&self, aligned: &Aligned, chosen_nats: f64) -> Option<Joint> {
+    fn believed(&self, aligned: &Aligned, up: Option<[Vector3<f64>; 2]>, chosen_nats: f64) -> Option<Joint> {
         let paired: f64 = aligned.says.iter().map(|say| say.voice * say.weight).sum();
         let needed = FITTED_NATS + chosen_nats - self.config.false_alarm_rate.ln();
         let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
-        let (way, config) = (self.window.way(), &self.config);
-        enough.then(|| covariance(aligned, &self.map, &way, config.shared_m, config.reach_m)).flatten()
+        let sag = Sag::new(&self.config, up.map(|[_, of_map]| of_map));
+        enough.then(|| covariance(aligned, &self.map, &self.window.way(), &sag)).flatten()
     }
 
     fn answer(aligned: &Aligned, sightings: &[Sighting], belief: &Belief, tracked: bool) -> Localization {
