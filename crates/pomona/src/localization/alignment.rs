@@ -96,8 +96,8 @@ pub(super) struct Aligned {
 }
 
 /// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
-pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, slip: Slip) -> Aligned {
-    let (mut pose, mut slip) = (slip.ahead(told).pose, slip);
+pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, slip: &Slip) -> Aligned {
+    let (mut pose, mut slip) = (slip.ahead(told).pose, *slip);
     let (mut doubt, mut share) = (slip.doubt(&told.covariance), FIRST_SHARE);
     for turn in 0..TURNS {
         let says: Vec<Say> = sightings.iter().map(|seen| say(seen, map, &pose, &slip, &doubt, share, None)).collect();
@@ -111,22 +111,22 @@ pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, sl
             break;
         }
     }
-    ended(sightings, map, pose, slip, share)
+    ended(sightings, map, pose, &slip, share)
 }
 
 /// What the sightings say of a pose once it stays.
-fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: Slip, share: f64) -> Aligned {
+fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, share: f64) -> Aligned {
     let mut links = Vec::new();
     let sure = Joint::zeros();
     let says: Vec<Say> = sightings
         .iter()
         .enumerate()
-        .map(|(row, seen)| say(seen, map, &pose, &slip, &sure, share, Some((row, &mut links))))
+        .map(|(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links))))
         .collect();
-    let (information, _) = normal(&says, &slip);
+    let (information, _) = normal(&says, slip);
     let (squared, weight) = says.iter().fold((0.0, 0.0), |sum, say| (sum.0 + say.squared, sum.1 + say.weight));
     let log_odds = best_share(&says).1;
-    Aligned { pose, slip, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
+    Aligned { pose, slip: *slip, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
 }
 
 fn say(

@@ -195,7 +195,7 @@ impl Localizer {
         let (place, turn) = MATCHED;
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let start = Belief { pose: start, covariance: doubt, motion: None };
-        let aligned = align(sightings, &self.map, &start, Slip::none());
+        let aligned = align(sightings, &self.map, &start, &Slip::none());
         let Some(joint) = self.believed(&aligned, up, SEARCHED_NATS) else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };

@@ -80,7 +80,7 @@ impl ToldMotions {
         let motions = self.slip.map_or(*self, |slip| self.taking(&slip, &mut window));
         let (sightings, start) = (window.sightings(enough), self.ahead(told));
         let tried = TRIED.iter().filter(|&&since| since <= oldest);
-        let all = tried.map(|&since| align(&sightings, map, &start, Slip::of_last(since)));
+        let all = tried.map(|&since| align(&sightings, map, &start, &Slip::of_last(since)));
         match all.max_by(|one, other| evidence(one).total_cmp(&evidence(other))) {
             Some(aligned) if evidence(&aligned) > evidence(&usual.aligned) + UNUSUAL_NATS => {
                 let motions = Self { slip: Some(aligned.slip), ..motions };
@@ -93,9 +93,9 @@ impl ToldMotions {
     /// Settles the pose by motions that are as before or right.
     pub fn as_before(&self, window: &Window, enough: usize, map: &KnownFruits, told: &Belief) -> Settled {
         let sightings = window.sightings(enough);
-        let right = align(&sightings, map, told, Slip::none());
+        let right = align(&sightings, map, told, &Slip::none());
         let shown = self.slip.filter(|_| oldest(&sightings) > 0);
-        let slipped = shown.map(|slip| align(&sightings, map, told, slip));
+        let slipped = shown.map(|slip| align(&sightings, map, told, &slip));
         let slipped = slipped.filter(|slipped| evidence(slipped) > evidence(&right));
         let (motions, predicted) = match slipped {
             Some(_) => (*self, self.ahead(told)),
