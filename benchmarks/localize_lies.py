@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from benchmarks.localize import FALSE_M
@@ -87,11 +88,14 @@ class Frames:
 
 def drive(case: Case, seed: int) -> Frames:
     row, rng = drawn_row(seed, length_m=9.0, n=360), np.random.default_rng(1000 + seed)
-    localizer, before, frames = Localizer(row.map, threads=1), None, []
+    localizer, frames = Localizer(row.map, threads=1), []
+    before: Array | None = None
     for number in range(FRAMES):
         true, full = pose_at(1.2 + STEP_M * number), number < FULL
         seen = seen_from(row, true, 100 * seed + number, most=60 if full else case.fruits, share=0.8)
-        moved = None if before is None else np.linalg.solve(before, true) @ _error(case, rng, lies=not full)
+        moved: Array | None = None
+        if before is not None:
+            moved = np.linalg.solve(before, true) @ _error(case, rng, lies=not full)
         begun_s = time.perf_counter()
         found = localizer.update(seen, moved)
         spent_s, before = time.perf_counter() - begun_s, true
@@ -132,7 +136,7 @@ def as_line(case: Case, drives: list[Frames]) -> tuple[str, ...]:
     )
 
 
-def _longest(wrong: Array) -> int:
+def _longest(wrong: NDArray[np.bool_]) -> int:
     most = run = 0
     for one in wrong:
         run = run + 1 if one else 0
