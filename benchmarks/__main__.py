@@ -32,6 +32,7 @@ NAMES = (
     "shipped",
     "localize",
     "localize_loop",
+    "localize_lies",
     "metric",
     "disturbed",
     "endurance",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.row_drive import step_to
 
 from pomona import Localizer
 from pomona.detect.opening import open_detector
@@ -15,7 +16,6 @@ from pomona.localize import following
 from pomona.recording import open_recording
 from pomona.recording.poses import read_tum
 from recording_maker import make_recording
-from row_drive import step_to
 
 ROW = Path(__file__).parents[1] / "examples" / "row"
 MAP, DRIVE = ROW / "2024-08-09" / "fruits.csv", ROW / "2024-08-28"

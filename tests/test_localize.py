@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.localize_lies import Case, drive
+from benchmarks.row_drive import Row, drawn_row, pose_at, seen_from, step_to
 
 from pomona import FruitCloud, Index, Localizer, PomonaError, PomonaWarning, Verdict
-from row_drive import Row, drawn_row, pose_at, seen_from, step_to
 
 EMPTY = FruitCloud(positions=np.empty((0, 3)))
 
@@ -90,6 +91,19 @@ def test_shared_errors_do_not_average_out(row):
     assert sigmas_m[1] ** 2 - sigmas_m[0] ** 2 == pytest.approx(3 * (0.02**2 - 0.002**2), rel=0.05)
 
 
+def test_where_the_vertical_is_known_fruits_are_thought_to_sink(row):
+    """What all fruits share is whole along the vertical and half of it aside."""
+    true, up = pose_at(4.0), np.array([0.0, 0.0, 1.0])
+    seen, in_map = seen_from(row, true, 3), []
+    for shared_m in (0.002, 0.02):
+        localizer = Localizer(row.map, config={"localization": {"shared_m": shared_m}}, threads=1)
+        found = localizer.locate(seen, up=[(true[:3, :3].T @ up).tolist(), (2 * up).tolist()])
+        turn = found.map_from_camera[:3, :3]
+        in_map.append(turn @ found.covariance[:3, :3] @ turn.T)
+    aside, more = 0.25, 0.02**2 - 0.002**2
+    assert in_map[1] - in_map[0] == pytest.approx(more * np.diag([aside, aside, 1.0]), abs=0.05 * more)
+
+
 @pytest.mark.parametrize("moved_is_known", [True, False])
 def test_frames_are_tracked(row, fresh, moved_is_known):
     before = None
@@ -99,6 +113,34 @@ def test_frames_are_tracked(row, fresh, moved_is_known):
         found = fresh.update(seen_from(row, true, 200 + number), moved)
         assert_near(found, true)
         assert found.tracked == (number > 0)
+        before = true
+
+
+@pytest.mark.parametrize(("fruits", "lie_m"), [(3, (0.02, 0.0)), (3, (0.05, 0.0)), (3, (0.0, -0.1)), (9, (0.05, 0.0))])
+def test_odometry_that_lies_steadily_is_noticed(fruits, lie_m):
+    """Told motions too long by centimetres were believed until the camera was metres off, with a NEES of hundreds."""
+    frames = drive(Case(fruits, 0.5, (*lie_m, 0.0)), seed=20)
+    found = np.isfinite(frames.off_m)
+    assert found.mean() > 0.8
+    assert frames.off_m[found].max() < 0.3
+    assert np.mean(frames.nees[found]) < 15
+
+
+@pytest.mark.parametrize("fruits", [3, 9])
+def test_covariances_count_what_motions_err_by(fruits):
+    """Frames that are joined err by what the motions between them do, together: the mean was 11 with three fruits."""
+    nees = np.concatenate([drive(Case(fruits, 1.0), seed).nees for seed in range(30, 34)])
+    assert 3 < np.nanmean(nees) < 9
+
+
+def test_a_lie_that_ends_is_noticed_too(row, fresh):
+    before = None
+    for number, x_m in enumerate(np.arange(1.5, 6.5, 0.1)):
+        true, lie = pose_at(x_m), np.eye(4)
+        lie[0, 3] = 0.05 if 4 <= number < 24 else 0.0
+        moved = None if before is None else np.linalg.solve(before, true) @ lie
+        found = fresh.update(seen_from(row, true, 400 + number, most=60 if number < 4 else 4), moved)
+        assert_near(found, true, within_m=0.2, within_deg=10.0)
         before = true
 
 

@@ -138,7 +138,7 @@ def test_a_lens_that_does_not_show_its_picture_is_refused(tmp_path, form, k1):
 def test_other_cameras_are_refused(tmp_path, form):
     assert "FULL_OPENCV" in NUMBERS
     made(tmp_path, form, camera="FULL_OPENCV", parameters=(500.0, 500.0, 320.0, 180.0, *[0.0] * 8))
-    with pytest.raises(PomonaError, match=r"cameras\..*found the camera model .*expected one of .*undistort"):
+    with pytest.raises(PomonaError, match=r"cameras\..*found the camera model .*FULL_OPENCV.*expected .*undistort"):
         open_reconstruction(tmp_path)
 
 

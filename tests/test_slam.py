@@ -394,6 +394,12 @@ def test_a_scan_with_slam_that_is_stopped_has_what_was_looked_at() -> None:
     assert [done for done, _, _ in told] == [*range(1, 8), *range(49, 56)]
 
 
+def test_one_frame_is_no_way(tmp_path: Path) -> None:
+    recording = open_recording(make_recording(tmp_path / "R", (0.0,)))
+    with pytest.raises(PomonaError, match="found 1 frame to follow, expected two or more; leave out --slam"):
+        pomona_scan(recording, slam=True)
+
+
 def test_a_recording_whose_frames_share_nothing_is_told(tmp_path: Path) -> None:
     recording = open_recording(make_recording(tmp_path / "R", (0.0, 0.1, 0.2)))
     with pytest.raises(

@@ -85,3 +85,33 @@ fn strangers_have_no_pose() {
     assert_ne!(found.verdict, Verdict::Found);
     assert_eq!((found.pose, found.covariance), (None, Matrix6::zeros()));
 }
+
+/// Frames of three fruits, told motions too long by `lie_m` along the row: errors of the poses, metres.
+fn errors_of_a_drive(lie_m: f64, random: &mut Random) -> Vec<f64> {
+    let fruits = row(random, 8);
+    let mut localizer = Localizer::new(&with_covariances(fruits.clone()), Config::default()).expect("a map");
+    let way_m = |step: i32| 1.0 + 0.1 * f64::from(step);
+    let mut errors_m = Vec::new();
+    for step in 0..40 {
+        let pose = camera_at(way_m(step));
+        let mut frame = seen(&fruits, &pose, random);
+        let mut moved = pose.seen_from(&camera_at(way_m(step - 1)));
+        if step > 3 {
+            frame = with_covariances(frame.positions[..frame.len().min(3)].to_vec());
+            moved.translation.x += lie_m;
+        }
+        let found = localizer.update(&frame, (step > 0).then_some(&moved), None).expect("a frame");
+        errors_m.extend(found.pose.map(|pose| error_m(Some(pose), &camera_at(way_m(step)))));
+    }
+    errors_m
+}
+
+#[test]
+fn odometry_that_lies_steadily_is_noticed() {
+    for (seed, lie_m) in [(7, 0.0), (8, 0.02), (9, 0.05), (10, -0.05), (11, 0.1)] {
+        let errors_m = errors_of_a_drive(lie_m, &mut Random::new(seed));
+        assert!(errors_m.len() > 30, "{lie_m}: {}", errors_m.len());
+        let worst_m = errors_m.iter().copied().fold(0.0, f64::max);
+        assert!(worst_m < 0.25, "{lie_m}: {worst_m}");
+    }
+}

@@ -145,7 +145,8 @@ class Localizer:
         cloud : FruitCloud, array_like, str or Path
             Fruits in the camera's frame, metres; with covariances where they are known, as `pomona.lift` gives them.
         up : optional
-            The vertical in the camera's and in the map's frame, where it is known to some 5 degrees.
+            The vertical in the camera's and in the map's frame, where it is known to some 5 degrees. Fruits are thought
+            to sink then rather than to move aside, which the covariance says.
 
         Raises
         ------
@@ -169,7 +170,7 @@ class Localizer:
             The camera's pose now in the frame of the camera at the last call, where odometry tells it; else it is
             thought to move on as it did.
         up : optional
-            As in `locate`; used where the camera has to be found from nothing.
+            As in `locate`; to find the camera it is used from nothing only.
 
         Raises
         ------

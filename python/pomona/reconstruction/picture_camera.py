@@ -34,6 +34,17 @@ CAMERA_MODELS = (
 )
 """Those with at most two radial and two tangential terms, which are OpenCV's."""
 
+OTHER_MODELS = {
+    5: "OPENCV_FISHEYE",
+    6: "FULL_OPENCV",
+    7: "FOV",
+    8: "SIMPLE_RADIAL_FISHEYE",
+    9: "RADIAL_FISHEYE",
+    10: "THIN_PRISM_FISHEYE",
+    11: "RAD_TAN_THIN_PRISM_FISHEYE",
+}
+"""Names of those that are refused: binary files have only their numbers."""
+
 LEAST_FOCAL_PX = 1e-6
 """Less shows all there is within one pixel, and pixels over it are more than numbers hold."""
 
@@ -55,8 +66,9 @@ def camera_model(where: str, said: str | int) -> CameraModel:
     known = next((model for model in CAMERA_MODELS if said in (model.number, model.name)), None)
     if known is None:
         names = ", ".join(model.name for model in CAMERA_MODELS)
+        found = shown(OTHER_MODELS.get(said, said) if isinstance(said, int) else said)
         raise PomonaError(
-            f"{where}: found the camera model {shown(said)}, expected one of {names}: undistort the pictures first"
+            f"{where}: found the camera model {found}, expected one of {names}: undistort the pictures first"
         )
     return known
 

@@ -137,6 +137,8 @@ def _laid_out(
     ]
     way = way_by_fruits(clouds, odometry.motions(usable) if odometry else None, config=config)
     if len(usable) and np.bincount(way.parts).max() < 2:
+        if len(usable) == 1:
+            raise PomonaError(f"{recording.path}: found 1 frame to follow, expected two or more; leave out --slam")
         found = f"found {amount(len(usable), 'frame')} that show no fruits in common"
         raise PomonaError(f"{recording.path}: {found}, expected 5 or more in each two; without --slam odometry follows")
     return MappedWay(looks, usable, way, whole=len(looks) == len(recording))

@@ -10,11 +10,20 @@
 //! Each turn takes a step of Gauss and Newton under these weights. The pose's own covariance widens S at first and
 //! shrinks from turn to turn, so that the first turns see past the nearest fruit.
 
+use super::belief::Belief;
 use super::known::KnownFruits;
 use super::sightings::Sighting;
+use super::slip::Slip;
 use crate::bundle::steps::{moved, skew};
 use crate::pose::Pose;
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix3x6, SMatrix, SVector, Vector3};
+use std::ops::AddAssign;
+
+/// The step of the pose, then the slip.
+pub(super) const UNKNOWNS: usize = 12;
+
+/// Covariance or information of both.
+pub(super) type Joint = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Turns at the most; a good start settles in five.
 const TURNS: usize = 20;
@@ -53,12 +62,14 @@ pub(super) struct Say {
     pub weight: f64,
     /// As the sighting's.
     pub voice: f64,
+    /// As the sighting's.
+    pub age: usize,
     /// Weighted mean of where its fruits are from there.
     pub residual: Vector3<f64>,
     /// Sum of weighted inverse covariances.
     pub information: Matrix3<f64>,
-    /// Slopes of its place by the step of the pose.
-    pub by_pose: Matrix3x6<f64>,
+    /// Slopes of its place by the step of the pose and by the slip.
+    pub slopes: SMatrix<f64, 3, UNKNOWNS>,
     /// The fruit with the largest weight.
     pub best: Option<usize>,
     /// Its pull: the sum of weighted inverse covariances times residuals.
@@ -72,8 +83,10 @@ pub(super) struct Say {
 /// A pose, and what the sightings say of it.
 pub(super) struct Aligned {
     pub pose: Pose,
-    /// Inverse covariance of its step if all sightings erred independently.
-    pub information: Matrix6<f64>,
+    /// By how much the told motions fall short.
+    pub slip: Slip,
+    /// Inverse covariance of both if all sightings erred independently.
+    pub information: Joint,
     pub says: Vec<Say>,
     pub links: Vec<Link>,
     /// Evidence against chance, nats.
@@ -82,52 +95,57 @@ pub(super) struct Aligned {
     pub spread: f64,
 }
 
-/// Settles a pose that starts at `start`, whose step has the covariance `doubt`.
-pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, start: &Pose, doubt: &Matrix6<f64>) -> Aligned {
-    let (mut pose, mut doubt, mut share) = (*start, *doubt, FIRST_SHARE);
+/// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
+pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, slip: &Slip) -> Aligned {
+    let (mut pose, mut slip) = (slip.ahead(told).pose, *slip);
+    let (mut doubt, mut share) = (slip.doubt(&told.covariance), FIRST_SHARE);
     for turn in 0..TURNS {
-        let says: Vec<Say> = sightings.iter().map(|seen| say(seen, map, &pose, &doubt, share, None)).collect();
-        let (information, pull) = normal(&says);
+        let says: Vec<Say> = sightings.iter().map(|seen| say(seen, map, &pose, &slip, &doubt, share, None)).collect();
+        let (information, pull) = normal(&says, &slip);
         let step = solved(&information, &pull);
-        pose = moved(&pose, &step);
+        pose = moved(&pose, &step.fixed_rows::<6>(0).into_owned());
+        slip.step(&step.fixed_rows::<6>(6).into_owned());
         share = best_share(&says).0;
         doubt *= SHRINKING;
         if turn >= WIDE_TURNS && step.norm() < SETTLED {
             break;
         }
     }
-    ended(sightings, map, pose, share)
+    ended(sightings, map, pose, &slip, share)
 }
 
 /// What the sightings say of a pose once it stays.
-fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, share: f64) -> Aligned {
+fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, share: f64) -> Aligned {
     let mut links = Vec::new();
-    let sure = Matrix6::zeros();
+    let sure = Joint::zeros();
     let says: Vec<Say> = sightings
         .iter()
         .enumerate()
-        .map(|(row, seen)| say(seen, map, &pose, &sure, share, Some((row, &mut links))))
+        .map(|(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links))))
         .collect();
-    let (information, _) = normal(&says);
+    let (information, _) = normal(&says, slip);
     let (squared, weight) = says.iter().fold((0.0, 0.0), |sum, say| (sum.0 + say.squared, sum.1 + say.weight));
     let log_odds = best_share(&says).1;
-    Aligned { pose, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
+    Aligned { pose, slip: *slip, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
 }
 
 fn say(
     seen: &Sighting,
     map: &KnownFruits,
     pose: &Pose,
-    doubt: &Matrix6<f64>,
+    slip: &Slip,
+    doubt: &Joint,
     share: f64,
     links: Option<(usize, &mut Vec<Link>)>,
 ) -> Say {
-    let place = pose.to_session(&seen.place);
+    let from_now = slip.corrected(seen);
+    let place = pose.to_session(&from_now);
     let rotation = *pose.rotation.matrix();
     let mut by_pose = Matrix3x6::zeros();
     by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&seen.place)));
-    let own = pose.covariance_to_session(&seen.covariance) + by_pose * doubt * by_pose.transpose();
+    by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&from_now)));
+    let slopes = slip.slopes(seen, &by_pose);
+    let own = pose.covariance_to_session(&seen.covariance) + slopes * doubt * slopes.transpose();
     let near: Vec<Candidate> = map.near(&place).filter_map(|row| candidate(map, row, &place, &own)).collect();
     let density = KnownFruits::density(near.len());
     let total: f64 = near.iter().map(|one| one.height).sum();
@@ -136,9 +154,10 @@ fn say(
         place,
         weight: 0.0,
         voice: seen.voice,
+        age: seen.age,
         residual: Vector3::zeros(),
         information: Matrix3::zeros(),
-        by_pose,
+        slopes,
         best: None,
         pull: Vector3::zeros(),
         squared: 0.0,
@@ -187,19 +206,22 @@ fn candidate(map: &KnownFruits, row: usize, place: &Vector3<f64>, own: &Matrix3<
     Some(Candidate { row, error, inverse, height: (-0.5 * squared).exp() / peak.sqrt(), squared })
 }
 
-fn normal(says: &[Say]) -> (Matrix6<f64>, Vector6<f64>) {
-    let mut matrix = Matrix6::identity() * LEAST_INFORMATION;
-    let mut right = Vector6::zeros();
+fn normal(says: &[Say], slip: &Slip) -> (Joint, SVector<f64, UNKNOWNS>) {
+    let (expected, back) = slip.expected();
+    let mut matrix = Joint::identity() * LEAST_INFORMATION;
+    let mut right = SVector::<f64, UNKNOWNS>::zeros();
+    matrix.fixed_view_mut::<6, 6>(6, 6).add_assign(&expected);
+    right.fixed_rows_mut::<6>(6).copy_from(&back);
     for say in says {
-        let turned = say.by_pose.transpose();
-        matrix += turned * say.information * say.by_pose;
+        let turned = say.slopes.transpose();
+        matrix += turned * say.information * say.slopes;
         right += turned * say.pull;
     }
     (matrix, right)
 }
 
-fn solved(matrix: &Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
-    matrix.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(right))
+fn solved(matrix: &Joint, right: &SVector<f64, UNKNOWNS>) -> SVector<f64, UNKNOWNS> {
+    matrix.cholesky().map_or_else(SVector::zeros, |factor| factor.solve(right))
 }
 
 /// The share of sightings in the map that explains them best, and the evidence under it, nats.

@@ -4,13 +4,15 @@ use crate::bundle::steps::{carried, moved};
 use crate::pose::Pose;
 use nalgebra::{Matrix6, Vector6};
 
+/// Standard deviations of a place per axis, metres, and of a direction, radians.
+pub(super) type Sigmas = (f64, f64);
+
 /// How a pose steps from frame to frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {
     /// `previous_from_camera`.
     pub previous_from_camera: Pose,
-    /// Standard deviation of its place, metres, and of its direction, radians.
-    pub sigmas: (f64, f64),
+    pub sigmas: Sigmas,
 }
 
 /// Of a motion that was measured: half a centimetre and two hundredths of the way.

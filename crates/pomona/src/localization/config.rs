@@ -13,6 +13,8 @@ pub struct LocalizationConfig {
     pub own_m: f64,
     /// How far all fruits in view hang from there together, by sag and drift: standard deviation per axis, metres.
     pub shared_m: f64,
+    /// Part of that across the vertical, where it is known: branches sag.
+    pub sideways: f64,
     /// Distance over which neighbours move together besides, metres; how far, their residuals show.
     pub reach_m: f64,
     /// Sightings from which on a frame stands alone; with fewer, the frames before are taken too.
@@ -30,6 +32,8 @@ impl Default for LocalizationConfig {
             own_m: 0.01,
             // Rendered rows of one to five weeks: what all fruits in view share is 0.3 to 2 cm.
             shared_m: 0.008,
+            // On those rows 3 mm across the vertical and 10 mm along it.
+            sideways: 0.5,
             // Half the spread of a branch.
             reach_m: 0.5,
             enough_fruits: 25,
@@ -55,6 +59,9 @@ impl LocalizationConfig {
             if !(length_m > 0.0 && length_m.is_finite()) {
                 return wrong(name, "expected a length above 0 m");
             }
+        }
+        if !(self.sideways > 0.0 && self.sideways <= 1.0) {
+            return wrong("localization.sideways", "expected a part above 0, at most 1");
         }
         if self.window_frames == 0 {
             return wrong("localization.window_frames", "found 0, expected at least 1");

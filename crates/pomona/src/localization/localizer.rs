@@ -1,12 +1,14 @@
 //! The story of one frame after the other.
 
-use super::alignment::{Aligned, Link, align};
+use super::alignment::{Aligned, Joint, Link, align};
 use super::answer::{Localization, MapPair};
 use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
 use super::known::KnownFruits;
-use super::shared::covariance;
+use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
+use super::slip::Slip;
+use super::told_motions::ToldMotions;
 use super::window::Window;
 use crate::answer::Verdict;
 use crate::assignment::assign;
@@ -52,6 +54,7 @@ pub struct Localizer {
     map: KnownFruits,
     config: LocalizationConfig,
     belief: Option<Belief>,
+    motions: ToldMotions,
     window: Window,
 }
 
@@ -78,12 +81,20 @@ impl Localizer {
         of_search.verified.false_alarm_rate = config.verified.false_alarm_rate.max(SEARCH_RATE);
         let index = index(of_search)?;
         let config = config.localization;
-        Ok(Self { index, map: KnownFruits::new(map, config.own_m), config, belief: None, window: Window::default() })
+        Ok(Self {
+            index,
+            map: KnownFruits::new(map, config.own_m),
+            config,
+            belief: None,
+            motions: ToldMotions::default(),
+            window: Window::default(),
+        })
     }
 
     /// Where the camera is, from one frame and nothing else; what [`Self::update`] knows stays as it is.
     ///
-    /// `seen` are fruits in the camera's frame; `up` is the vertical in the camera's and in the map's frame.
+    /// `seen` are fruits in the camera's frame; `up` is the vertical in the camera's and in the map's frame: with it fruits
+    /// are thought to sink rather than to move aside.
     ///
     /// # Errors
     /// A cloud or a direction that is wrong. That the camera is not found is no error.
@@ -103,27 +114,35 @@ impl Localizer {
         up: Option<[Vector3<f64>; 2]>,
     ) -> Result<Localization> {
         seen.validate()?;
-        let predicted = self.predicted(previous_from_camera);
-        match previous_from_camera.copied().or_else(|| self.belief.and_then(|belief| belief.motion)) {
-            Some(step) => self.window.step(&step),
-            None => self.window.forget(),
+        let moved = self.motions.next(previous_from_camera, &mut self.window);
+        let predicted = self.predicted(moved.as_ref());
+        match (moved, self.belief.and_then(|belief| belief.motion)) {
+            (Some(step), _) => self.window.step(&step, Motion::measured(step).sigmas),
+            // Where fruits tell how it moved, that is corrected at once.
+            (None, Some(step)) => self.window.step(&step, (0.0, 0.0)),
+            (None, None) => self.window.forget(),
         }
         self.window.push(Sighting::of(seen), self.config.window_frames);
-        let found = predicted.and_then(|predicted| self.followed(&predicted));
+        let found = predicted.and_then(|predicted| self.followed(&predicted, moved.is_some(), up));
         let found = match found {
             Some(found) => found,
-            None => self.found_again(predicted.as_ref(), up)?,
+            None => self.found_again(predicted.map(|told| self.motions.ahead(&told)).as_ref(), up)?,
         };
-        if let (None, Some(predicted), Some(pose)) = (previous_from_camera, predicted, found.pose) {
+        if let (None, Some(predicted), Some(pose)) = (moved, predicted, found.pose) {
             self.window.correct(&pose.seen_from(&predicted.pose));
         }
-        self.learn(&found, previous_from_camera);
+        if !found.tracked {
+            // Whatever the camera lost itself by may be what was learned.
+            self.motions = ToldMotions::default();
+        }
+        self.learn(&found, moved.as_ref());
         Ok(found)
     }
 
     /// Forgets where the camera was: the next update starts from nothing.
     pub fn reset(&mut self) {
         self.belief = None;
+        self.motions = ToldMotions::default();
         self.window.forget();
     }
 
@@ -134,13 +153,19 @@ impl Localizer {
     }
 
     /// The pose near the predicted one, if the fruits agree with it.
-    fn followed(&self, predicted: &Belief) -> Option<Localization> {
-        let sightings = self.window.sightings(self.config.enough_fruits);
-        let aligned = align(&sightings, &self.map, &predicted.pose, &predicted.covariance);
-        let found = self.believed(&aligned, 0.0)?;
+    fn followed(&mut self, told: &Belief, is_measured: bool, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
+        let settle = if is_measured { ToldMotions::settle } else { ToldMotions::as_before };
+        let settled = settle(&self.motions, &self.window, self.config.enough_fruits, &self.map, told);
+        let joint = self.believed(&settled.aligned, up, 0.0)?;
+        let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
+        let found = Belief { pose: settled.aligned.pose, covariance, motion: told.motion };
         // What few fruits leave open, the motion tells.
-        let both = Belief { pose: aligned.pose, covariance: found, motion: predicted.motion }.joined(predicted);
-        Some(Self::answer(&aligned, &sightings, &both, true))
+        let both = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
+        self.motions = settled.motions.with(&settled.aligned.slip.known(&joint));
+        if let Some(window) = settled.window {
+            self.window = window;
+        }
+        Some(Self::answer(&settled.aligned, &settled.sightings, &both, true))
     }
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
@@ -169,20 +194,24 @@ impl Localizer {
         };
         let (place, turn) = MATCHED;
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
-        let aligned = align(sightings, &self.map, &start, &doubt);
-        let Some(covariance) = self.believed(&aligned, SEARCHED_NATS) else {
+        let start = Belief { pose: start, covariance: doubt, motion: None };
+        let aligned = align(sightings, &self.map, &start, &Slip::none());
+        let Some(joint) = self.believed(&aligned, up, SEARCHED_NATS) else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
+        let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
         let belief = Belief { pose: aligned.pose, covariance, motion: None };
         Ok(Self::answer(&aligned, sightings, &belief, false))
     }
 
-    /// Covariance of a pose, if there is enough for it; `chosen_nats` is what the choice among many gains by chance.
-    fn believed(&self, aligned: &Aligned, chosen_nats: f64) -> Option<Matrix6<f64>> {
+    /// Covariance of a pose and its slip, if there is enough for it; `chosen_nats` is what the choice among many gains
+    /// by chance.
+    fn believed(&self, aligned: &Aligned, up: Option<[Vector3<f64>; 2]>, chosen_nats: f64) -> Option<Joint> {
         let paired: f64 = aligned.says.iter().map(|say| say.voice * say.weight).sum();
         let needed = FITTED_NATS + chosen_nats - self.config.false_alarm_rate.ln();
         let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
-        enough.then(|| covariance(aligned, &self.map, self.config.shared_m, self.config.reach_m)).flatten()
+        let sag = Sag::new(&self.config, up.map(|[_, of_map]| of_map));
+        enough.then(|| covariance(aligned, &self.map, &self.window.way(), &sag)).flatten()
     }
 
     fn answer(aligned: &Aligned, sightings: &[Sighting], belief: &Belief, tracked: bool) -> Localization {

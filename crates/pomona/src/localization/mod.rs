@@ -7,7 +7,8 @@
 //! 3. What neighbouring fruits share, sag and drift, does not average out: the covariance counts it (`shared`).
 //! 4. A frame with few fruits is joined by the frames before it (`window`); where there are none at all, the motion
 //!    alone carries the pose as long as it is sure (`belief`).
-//! 5. A pose that the fruits contradict is lost, and looked for from nothing ([`Localizer::update`]).
+//! 5. Motions that are told and fall short alike are noticed and put right (`told_motions`, `slip`).
+//! 6. A pose that the fruits contradict is lost, and looked for from nothing ([`Localizer::update`]).
 //!
 //! Equations, assumptions and limits: `docs/localization.md`.
 
@@ -19,6 +20,8 @@ mod known;
 mod localizer;
 mod shared;
 mod sightings;
+mod slip;
+mod told_motions;
 mod window;
 
 pub use answer::{Localization, MapPair};

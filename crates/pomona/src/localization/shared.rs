@@ -5,49 +5,87 @@
 //! `U = J^T W`, and `C_ik = a^2 + b^2 exp(-d^2 / 2 r^2)` of two sightings d apart; two sightings of one fruit also share
 //! where it hangs.
 //!
+//! What a frame saw before a motion lies off by what that motion errs by, with all frames before: Q of each motion is in C
+//! of all pairs that are older.
+//!
 //! a is what all in view share: branches that grow heavy sink together. The pose takes it up, so that no residual shows
-//! it, and somebody has to say it. b is what only neighbours share, and their residuals show it.
+//! it, and somebody has to say it; across the vertical, where that is known, it is less. b is what only neighbours share, and their residuals show it.
 
-use super::alignment::{Aligned, Say};
+use super::alignment::{Aligned, Joint, Say, UNKNOWNS};
+use super::belief::Sigmas;
+use super::config::LocalizationConfig;
 use super::known::KnownFruits;
-use nalgebra::{Matrix3, Matrix6, Matrix6x3};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 
 /// Pairs below which residuals say nothing about what neighbours share.
 const MIN_SHARED: f64 = 20.0;
 
-/// Covariance of the pose's step.
-pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, shared_m: f64, reach_m: f64) -> Option<Matrix6<f64>> {
+/// How far fruits hang from where the map has them together.
+pub(super) struct Sag {
+    /// Covariance of what all in view share, square metres.
+    all: Matrix3<f64>,
+    reach_m: f64,
+}
+
+impl Sag {
+    /// `up` is the vertical in the map: branches sink, and move little aside.
+    pub fn new(config: &LocalizationConfig, up: Option<Vector3<f64>>) -> Self {
+        let whole = config.shared_m * config.shared_m;
+        let aside = whole * config.sideways * config.sideways;
+        let upright = |up: Vector3<f64>| {
+            let up = up.normalize();
+            Matrix3::from_diagonal_element(aside) + up * up.transpose() * (whole - aside)
+        };
+        Self { all: up.map_or_else(|| Matrix3::from_diagonal_element(whole), upright), reach_m: config.reach_m }
+    }
+}
+
+/// Covariance of the pose's step and of the slip.
+pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Sigmas], sag: &Sag) -> Option<Joint> {
     let alone = aligned.information.cholesky()?.inverse();
-    let together = shared_m * shared_m;
-    let errors = Shared { together, near: shown(&aligned.says, reach_m).unwrap_or(together), reach_m };
-    let pulls: Vec<(&Say, Matrix6x3<f64>)> =
-        aligned.says.iter().map(|say| (say, say.by_pose.transpose() * say.information)).collect();
-    let mut middle = Matrix6::zeros();
+    let near = shown(&aligned.says, sag.reach_m).map_or(sag.all, Matrix3::from_diagonal_element);
+    let errors = Shared { together: sag.all, near, reach_m: sag.reach_m };
+    let pulls: Vec<Pull> = aligned.says.iter().map(|say| (say, say.slopes.transpose() * say.information)).collect();
+    let mut middle = Joint::zeros();
     for (i, (one, pull)) in pulls.iter().enumerate() {
-        let mut sum = pull.transpose() * (0.5 * (errors.together + errors.near));
+        let mut sum = (errors.together + errors.near) * 0.5 * pull.transpose();
         for (other, its) in &pulls[i + 1..] {
             sum += errors.common(one, other, map) * its.transpose();
         }
         let half = pull * sum;
         middle += half + half.transpose();
     }
+    for (before, sigmas) in way.iter().enumerate() {
+        middle += of_motion(&pulls, before, *sigmas);
+    }
     Some(alone * aligned.spread.max(1.0) + alone * middle * alone)
 }
 
-/// What sightings err by together, square metres per axis.
+/// What the frames before a motion err by together, `after` being the motions after it.
+fn of_motion(pulls: &[Pull], after: usize, (place, turn): Sigmas) -> Joint {
+    let older = pulls.iter().filter(|(say, _)| say.age > after);
+    let gain = older
+        .fold(SMatrix::<f64, UNKNOWNS, 6>::zeros(), |sum, (say, pull)| sum + pull * say.slopes.fixed_columns::<6>(0));
+    let sigmas = Vector6::new(place, place, place, turn, turn, turn);
+    gain * Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma)) * gain.transpose()
+}
+
+/// A sighting, and `U`.
+type Pull<'a> = (&'a Say, SMatrix<f64, UNKNOWNS, 3>);
+
+/// What sightings err by together, square metres.
 struct Shared {
     /// All in view.
-    together: f64,
+    together: Matrix3<f64>,
     /// Those that are within `reach_m`, besides.
-    near: f64,
+    near: Matrix3<f64>,
     reach_m: f64,
 }
 
 impl Shared {
     /// Covariance of the errors of two sightings with each other.
     fn common(&self, one: &Say, other: &Say, map: &KnownFruits) -> Matrix3<f64> {
-        let variance = self.together + self.near * kinship(one, other, self.reach_m);
-        let shared = Matrix3::from_diagonal_element(variance);
+        let shared = self.together + self.near * kinship(one, other, self.reach_m);
         match (one.best, other.best) {
             (Some(row), Some(same)) if row == same => shared + map.covariances[row],
             _ => shared,

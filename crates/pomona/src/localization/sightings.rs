@@ -14,6 +14,8 @@ pub(super) struct Sighting {
     pub covariance: Matrix3<f64>,
     /// Row in the newest frame; `None` of older ones.
     pub row: Option<usize>,
+    /// Motions since.
+    pub age: usize,
     /// Its part of what is known of its fruit: one over how often the fruit was seen. A stranger that hangs near a fruit
     /// of the map does so in every frame.
     pub voice: f64,
@@ -26,18 +28,20 @@ impl Sighting {
             place: seen.positions[row].coords,
             covariance: covariance_of(seen, row),
             row: Some(row),
+            age: 0,
             voice: 1.0,
         };
         (0..seen.len()).map(one).collect()
     }
 
     /// The same from where the camera is now; `spread_m` is how surely the way is known.
-    pub fn carried(&self, now_from_then: &Pose, spread_m: f64) -> Self {
+    pub fn carried(&self, now_from_then: &Pose, age: usize, spread_m: f64) -> Self {
         let covariance = now_from_then.covariance_to_session(&self.covariance);
         Self {
             place: now_from_then.to_session(&self.place),
             covariance: covariance + Matrix3::identity() * (spread_m * spread_m),
             row: None,
+            age,
             voice: self.voice,
         }
     }

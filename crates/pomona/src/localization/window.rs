@@ -1,6 +1,8 @@
 //! The last frames, seen from where the camera is now.
 
+use super::belief::Sigmas;
 use super::sightings::Sighting;
+use super::slip::Slip;
 use crate::pose::Pose;
 use std::collections::VecDeque;
 
@@ -13,15 +15,18 @@ const ENOUGH_TO_SEARCH: usize = 60;
 /// Distance within which two sightings are thought to be of one fruit, metres: about a fruit.
 const ONE_FRUIT_M: f64 = 0.05;
 
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct Window {
     /// Newest first, each from its own camera, with `now_from_then`.
     frames: VecDeque<(Pose, Vec<Sighting>)>,
+    /// How surely the motion after each but the newest is known.
+    motions: VecDeque<Sigmas>,
 }
 
 impl Window {
     /// The camera has moved: what was seen lies elsewhere from it.
-    pub fn step(&mut self, previous_from_camera: &Pose) {
+    pub fn step(&mut self, previous_from_camera: &Pose, sigmas: Sigmas) {
+        self.motions.push_front(sigmas);
         let now_from_previous = previous_from_camera.inverse();
         for (now_from_then, _) in &mut self.frames {
             *now_from_then = now_from_previous.after(now_from_then);
@@ -36,14 +41,28 @@ impl Window {
         }
     }
 
+    /// The told motions have slipped.
+    pub fn slip(&mut self, slip: &Slip) {
+        for (age, (now_from_then, _)) in self.frames.iter_mut().enumerate().skip(1) {
+            *now_from_then = slip.since(age).after(now_from_then);
+        }
+    }
+
     /// Takes a frame up, and forgets the oldest beyond `most`.
     pub fn push(&mut self, sightings: Vec<Sighting>, most: usize) {
         self.frames.push_front((Pose::IDENTITY, sightings));
         self.frames.truncate(most);
+        self.motions.truncate(most - 1);
     }
 
     pub fn forget(&mut self) {
         self.frames.clear();
+        self.motions.clear();
+    }
+
+    /// How surely each motion is known, the last one first.
+    pub fn way(&self) -> Vec<Sigmas> {
+        self.motions.iter().copied().collect()
     }
 
     /// Sightings of the newest frame.
@@ -59,7 +78,7 @@ impl Window {
                 all.extend_from_slice(seen);
             } else if all.len() < enough {
                 let spread_m = WAY_SIGMA_M * age as f64;
-                all.extend(seen.iter().map(|one| one.carried(now_from_then, spread_m)));
+                all.extend(seen.iter().map(|one| one.carried(now_from_then, age, spread_m)));
             }
         }
         with_voices(all)

@@ -29,6 +29,7 @@ class Row:
 
     @property
     def map(self) -> FruitCloud:
+        """The map, with covariances."""
         return FruitCloud(positions=self.on_map, covariances=np.tile(0.005**2 * np.eye(3), (len(self.on_map), 1, 1)))
 
 

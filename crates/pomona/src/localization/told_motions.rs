@@ -1,0 +1,118 @@
+//! How far told motions are believed.
+//!
+//! Odometry that lies steadily lays the frames before beside where they were, and with few fruits in view these outvote
+//! the newest. So wherever frames are joined it is asked whether the last motions fall short alike (`slip`), of which
+//! the window shows the last eight at the most: what explains the sightings much better than motions as they were told,
+//! or as they fell short before, is believed, and followed until it explains them no longer. After eight motions
+//! it is known for good and taken off what is told.
+
+use super::alignment::{Aligned, align};
+use super::belief::Belief;
+use super::known::KnownFruits;
+use super::sightings::Sighting;
+use super::slip::{Slip, evidence};
+use super::window::Window;
+use crate::bundle::steps::moved;
+use crate::pose::Pose;
+use nalgebra::Vector6;
+
+/// Motions that a slip is tried for: what began between two of them shows under both.
+const TRIED: [usize; 4] = [1, 2, 4, 8];
+
+/// Motions after which a slip is known for good.
+const SETTLED: usize = 8;
+
+/// Evidence that motions begin to fall short, or end to, before it is believed, nats: once in a thousand frames.
+const UNUSUAL_NATS: f64 = 6.9;
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ToldMotions {
+    /// By what every motion falls short.
+    drift: Vector6<f64>,
+    /// By what the last ones do besides.
+    slip: Option<Slip>,
+}
+
+/// A pose, and what it says of the motions.
+pub(super) struct Settled {
+    pub sightings: Vec<Sighting>,
+    pub aligned: Aligned,
+    pub motions: ToldMotions,
+    /// What was expected, unless it is contradicted.
+    pub predicted: Option<Belief>,
+    /// The frames before, laid anew.
+    pub window: Option<Window>,
+}
+
+impl ToldMotions {
+    /// The next motion, as far as its error is known for good.
+    pub fn next(&mut self, told: Option<&Pose>, window: &mut Window) -> Option<Pose> {
+        self.slip = match self.slip {
+            Some(slip) if told.is_some() && slip.motions() < SETTLED => Some(slip.later()),
+            Some(slip) => {
+                *self = self.taking(&slip, window);
+                None
+            }
+            None => None,
+        };
+        told.map(|told| moved(told, &self.drift))
+    }
+
+    /// Where the camera is expected that is at `told` by the motions told.
+    pub fn ahead(&self, told: &Belief) -> Belief {
+        self.slip.map_or(*told, |slip| slip.ahead(told))
+    }
+
+    /// The same with a slip as it was settled.
+    pub fn with(&self, settled: &Slip) -> Self {
+        Self { slip: self.slip.map(|_| *settled), ..*self }
+    }
+
+    /// Settles the pose: motions are as before or right, or where that explains the sightings much better, they have
+    /// begun to fall short.
+    pub fn settle(&self, window: &Window, enough: usize, map: &KnownFruits, told: &Belief) -> Settled {
+        let usual = self.as_before(window, enough, map, told);
+        let oldest = oldest(&usual.sightings);
+        if oldest == 0 {
+            return usual;
+        }
+        let mut window = window.clone();
+        let motions = self.slip.map_or(*self, |slip| self.taking(&slip, &mut window));
+        let (sightings, start) = (window.sightings(enough), self.ahead(told));
+        let tried = TRIED.iter().filter(|&&since| since <= oldest);
+        let all = tried.map(|&since| align(&sightings, map, &start, &Slip::of_last(since)));
+        match all.max_by(|one, other| evidence(one).total_cmp(&evidence(other))) {
+            Some(aligned) if evidence(&aligned) > evidence(&usual.aligned) + UNUSUAL_NATS => {
+                let motions = Self { slip: Some(aligned.slip), ..motions };
+                Settled { sightings, aligned, motions, predicted: None, window: Some(window) }
+            }
+            _ => usual,
+        }
+    }
+
+    /// Settles the pose by motions that are as before or right.
+    pub fn as_before(&self, window: &Window, enough: usize, map: &KnownFruits, told: &Belief) -> Settled {
+        let sightings = window.sightings(enough);
+        let right = align(&sightings, map, told, &Slip::none());
+        let shown = self.slip.filter(|_| oldest(&sightings) > 0);
+        let slipped = shown.map(|slip| align(&sightings, map, told, &slip));
+        let slipped = slipped.filter(|slipped| evidence(slipped) > evidence(&right));
+        let (motions, predicted) = match slipped {
+            Some(_) => (*self, self.ahead(told)),
+            None => (Self { slip: None, ..*self }, *told),
+        };
+        let aligned = slipped.unwrap_or(right);
+        Settled { sightings, aligned, motions, predicted: Some(predicted), window: None }
+    }
+
+    /// A slip is known for good: frames before are laid by it.
+    fn taking(&self, slip: &Slip, window: &mut Window) -> Self {
+        window.slip(slip);
+        Self { drift: self.drift + slip.of_a_motion(), slip: None }
+    }
+}
+
+/// Motions since the oldest sighting.
+fn oldest(sightings: &[Sighting]) -> usize {
+    sightings.iter().map(|one| one.age).max().unwrap_or(0)
+}
