@@ -1,7 +1,8 @@
 //! An answer that the threshold is too high for: a pose that stands out of all others that the search found.
 //!
 //! The threshold of [`super::acceptance`] is what chance reaches over clouds of this size anywhere. What it reaches in these
-//! very clouds the other optima of the search show, found and refined as the answer was.
+//! very clouds the other optima of the search show, found and refined as the answer was. Of rows laid along rows only these can
+//! tell: the threshold does not know what rows on rows meet.
 
 use super::acceptance::outlying;
 use super::case::{Finding, Log, Search};
@@ -32,7 +33,7 @@ impl<'a> Search<'a> {
         distinct[..COMPARED].iter().for_each(|&at| self.polish(&mut others[at]));
         let second = distinct[1..COMPARED].iter().map(|&at| evidence(others, at)).fold(f64::NEG_INFINITY, f64::max);
         log.best = log.best.max(evidence(others, distinct[0]));
-        log.threshold = log.threshold.min(outlying(rate, second).max(least));
+        log.threshold = outlying(rate, second).max(least);
         self.holds(&mut others[distinct[0]], KEPT, log).then(|| others.swap_remove(distinct[0]))
     }
 
