@@ -48,9 +48,6 @@ const FEW_SEEDS: u64 = 1500;
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
 
-/// Rows laid along rows that are held against each other over all of the query.
-const LAID: usize = 3;
-
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
 const LEAST_LAID: f64 = 16.0;
 
@@ -306,20 +303,25 @@ impl<'a> Search<'a> {
     }
 
     /// Asks the offsets of all fruits, where too few are in common for any seed.
+    ///
+    /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
+    /// much more the other poses of this search show: the answer must stand out of them.
     fn lay_along(&self, findings: &mut Findings<'a>, log: &mut Log) {
         let hypotheses = offsets::hypotheses(self.query, self.map, &self.model, &|pose| self.admits(pose));
         log.refined += hypotheses.len();
-        let few = Model { detection: offsets::FEW_AGAIN, ..self.model };
-        let grown = |seed: &Hypothesis| lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few });
-        for seed in hypotheses.iter().take(LAID).filter(|seed| seed.log_odds > LEAST_LAID) {
-            if !findings.accepted.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
-                log.grown += 1;
-                findings.accepted.push(Finding::new(grown(seed), *seed));
-            }
+        if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
+            return;
         }
-        self.sift(findings, log);
-        if !findings.accepted.is_empty() {
-            self.doubt(findings, &[], log);
+        let few = Model { detection: offsets::FEW_AGAIN, ..self.model };
+        let laid = |seed: &Hypothesis| {
+            Finding::new(lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few }), *seed)
+        };
+        let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
+        log.grown += laid.len() as u32;
+        laid.retain(|finding| self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding));
+        if let Some(answer) = self.single_out(&mut laid, f64::NEG_INFINITY, log) {
+            findings.accepted.push(answer);
+            findings.others.extend(laid);
         }
     }
 

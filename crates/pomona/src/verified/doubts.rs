@@ -158,7 +158,7 @@ impl<'a> Search<'a> {
     }
 
     /// Share of the fruits of the overlap that another optimum puts elsewhere.
-    fn elsewhere(&self, best: &Overlap, other: &Overlap) -> f64 {
+    pub(super) fn elsewhere(&self, best: &Overlap, other: &Overlap) -> f64 {
         let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
             at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)

@@ -105,6 +105,9 @@ pub(crate) struct Scratch {
     stamp: u32,
 }
 
+/// Steps of a refinement.
+pub(super) const STEPS: usize = 6;
+
 /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
 pub(crate) fn refine(
     query: &Landscape,
@@ -115,7 +118,19 @@ pub(crate) fn refine(
     model: &Model,
     scratch: &mut Scratch,
 ) -> Option<Hypothesis> {
-    const STEPS: usize = 6;
+    refine_in(STEPS, query, map, start, (place, reach), model, scratch)
+}
+
+/// The same in fewer steps of pairing, of which the last only weighs.
+pub(super) fn refine_in(
+    steps: usize,
+    query: &Landscape,
+    map: &Landscape,
+    start: &Placement,
+    (place, reach): (&Vector3<f64>, f64),
+    model: &Model,
+    scratch: &mut Scratch,
+) -> Option<Hypothesis> {
     scratch.owner.resize(map.len(), (0, 0));
     let region = &mut scratch.region;
     region.clear();
@@ -126,7 +141,7 @@ pub(crate) fn refine(
     // Before the first step the pose is known as well as a seed gives it: 6 cm at 1 m for 2 cm of noise.
     let (mut freedom, mut inertia, mut centroid) = (0.25, 0.1 * reach * reach, *place);
     let mut answer = None;
-    for step in 0..STEPS {
+    for step in 0..steps {
         let variance_at = |p: &Vector3<f64>| sigma * sigma * (1.0 + freedom + (p - centroid).norm_squared() / inertia);
         pair_up(query, map, &pose, variance_at, scratch);
         let mut moments = Moments::default();
@@ -148,11 +163,11 @@ pub(crate) fn refine(
             return answer;
         }
         let mut log_odds = evidence.log_odds();
-        if step + 1 == STEPS {
+        if step + 1 == steps {
             log_odds += other_side(query, map, &pose, place, reach, model, scratch);
         }
         answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
-        if step + 1 == STEPS {
+        if step + 1 == steps {
             break;
         }
         pose = model.step(&moments, &pose, sigma)?;

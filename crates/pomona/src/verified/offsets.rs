@@ -3,13 +3,13 @@
 //! Visits to opposite sides of a row have the fruits in the middle of the canopy in common, one in seven or fewer: of four
 //! neighbours hardly ever all, and no seed survives. But rows lie along rows. Their principal axes give the turn up to
 //! half-turns and some degrees, and under the right turn every fruit in common has the same offset from its partner. So the
-//! offsets between all fruits are counted ([`super::votes`]). What stands out is looked at, and the best is refined on all
-//! fruits at once, under the share that is seen again where ordinary shares have found nothing.
+//! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
+//! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::hypothesis::{Evidence, GATE, Hypothesis, Model, Scratch, refine};
+use super::hypothesis::{Hypothesis, Model, STEPS, Scratch, refine_in};
 use super::landscape::Landscape;
 use super::placement::Placement;
-use super::votes::{Peak, Rows};
+use super::votes::Rows;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,13 +17,25 @@ use rayon::prelude::*;
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
 
-/// Poses that are looked at, and how many of them are refined.
-const LOOKED_AT: usize = 64;
-const REFINED: usize = 12;
+/// Poses that are refined at the width of a cell, and how many of them at that of the noise: of 24 some 13 lie apart, which
+/// [`super::outlier`] asks for.
+const LOOKED_AT: usize = 256;
+const REFINED: usize = 24;
 
-/// Two peaks within so many spacings, and turned by less than so many radians, are one.
+/// Steps at the width of a cell: one fit, and one look at what it gives. Six find no more.
+const LOOKS: usize = 2;
+
+/// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: f64 = 0.5;
 const SAME_TURN_RAD: f64 = 0.06;
+
+/// Turns about each axis, radians, from which a pose is refined once more, and how often: the votes' turns are 2 and 4 degrees
+/// apart, and at the ends of a row half of that is as far as fruits hang from each other.
+const TILTS: [f64; 2] = [-0.04, 0.04];
+const TILTINGS: usize = 3;
+
+/// Of the best poses so many are tilted: the answer, and what it must stand out of.
+const TILTED: usize = 3;
 
 /// Noise of a peak, in that of a pair: its cell is wider than the noise.
 const WIDE: f64 = 2.5;
@@ -41,48 +53,48 @@ pub(super) fn hypotheses(
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
     let wide = Model { sigma: WIDE * model.sigma, ..model };
-    let mut looks: Vec<(f64, Placement)> = distinct(rows.peaks(admits), map.spacing)
-        .par_iter()
-        .map(|pose| (look(query, map, &wide, pose), *pose))
-        .collect();
-    looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    looks.truncate(REFINED);
-    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-    let refined = |scratch: &mut Scratch, (_, pose): &(f64, Placement)| {
-        refine(query, map, pose, &Vector3::zeros(), reach, &model, scratch)
+    let refined = |poses: &[Placement], model: &Model, steps: usize| -> Vec<Hypothesis> {
+        let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+        let from = |scratch: &mut Scratch, pose: &Placement| {
+            refine_in(steps, query, map, pose, (&Vector3::zeros(), reach), model, scratch)
+        };
+        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(Scratch::default, from).flatten_iter().collect();
+        found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+        found
     };
-    let mut found: Vec<Hypothesis> = looks.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
+    let mut peaks = rows.peaks(admits);
+    peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
+    let looks = refined(&distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing), &wide, LOOKS);
+    let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
+    let mut found = refined(&best, &model, STEPS);
+    for seed in found.iter_mut().take(TILTED) {
+        for _ in 0..TILTINGS {
+            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &TILTS).collect();
+            match refined(&tilted, &model, STEPS).first() {
+                Some(better) if better.log_odds > seed.log_odds => *seed = *better,
+                _ => break,
+            }
+        }
+    }
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }
 
-/// The best peaks, one of each pose.
-fn distinct(mut peaks: Vec<Peak>, spacing: f64) -> Vec<Placement> {
-    peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
+/// The first poses, one of those that are the same.
+fn distinct(poses: impl Iterator<Item = Placement>, most: usize, spacing: f64) -> Vec<Placement> {
     let mut kept: Vec<Placement> = Vec::new();
-    for Peak { pose, .. } in peaks {
+    for pose in poses {
         let same = |other: &Placement| {
             (other.translation - pose.translation).norm() < SAME * spacing && other.turn_to(&pose) < SAME_TURN_RAD
         };
-        if kept.len() < LOOKED_AT && !kept.iter().any(same) {
+        if !kept.iter().any(same) {
             kept.push(pose);
+        }
+        if kept.len() == most {
+            break;
         }
     }
     kept
-}
-
-/// What the fruits of the query meet under a pose, nats.
-fn look(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement) -> f64 {
-    let variance = model.sigma * model.sigma;
-    let mut evidence = Evidence::default();
-    for p in &query.points {
-        let place = pose.apply(p);
-        evidence.multiply(match map.nearest(&place, GATE * model.sigma) {
-            Some((partner, d2)) => model.met(d2, variance, map.density[partner as usize]),
-            None => model.missed(map.support(&place)),
-        });
-    }
-    evidence.log_odds()
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! An answer that the threshold is too high for: a pose that stands out of all others that the search found.
 //!
 //! The threshold of [`super::acceptance`] is what chance reaches over clouds of this size anywhere. What it reaches in these
-//! very clouds the other optima of the search show, found and refined as the answer was.
+//! very clouds the other optima of the search show, found and refined as the answer was. Of rows laid along rows only these can
+//! tell: the threshold does not know what rows on rows meet.
 
 use super::acceptance::outlying;
 use super::case::{Finding, Log, Search};
@@ -26,14 +27,22 @@ impl<'a> Search<'a> {
         }
         let rate = self.config.false_alarm_rate;
         // Half of the distance that is asked for: most poses that do not stand out need no closer look.
-        if evidence(others, distinct[0]) <= outlying(rate.sqrt(), evidence(others, distinct[1])) {
+        if evidence(others, distinct[0]) <= outlying(rate.sqrt(), self.second(others, &distinct)) {
             return None;
         }
         distinct[..COMPARED].iter().for_each(|&at| self.polish(&mut others[at]));
-        let second = distinct[1..COMPARED].iter().map(|&at| evidence(others, at)).fold(f64::NEG_INFINITY, f64::max);
+        let second = self.second(others, &distinct);
         log.best = log.best.max(evidence(others, distinct[0]));
-        log.threshold = log.threshold.min(outlying(rate, second).max(least));
+        log.threshold = outlying(rate, second).max(least);
         self.holds(&mut others[distinct[0]], KEPT, log).then(|| others.swap_remove(distinct[0]))
+    }
+
+    /// Most evidence of those after the best, each by the share that it puts elsewhere: a row turned a little, about its middle
+    /// or an end, has the rest from the best.
+    fn second(&self, findings: &[Finding], distinct: &[usize]) -> f64 {
+        let best = &findings[distinct[0]].overlap;
+        let of = |&at: &usize| self.elsewhere(best, &findings[at].overlap) * evidence(findings, at);
+        distinct[1..].iter().map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Those of `findings`, most evidence first, that lie apart from all before them.

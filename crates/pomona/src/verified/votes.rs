@@ -42,8 +42,9 @@ const PARTS_BITS: u32 = 10;
 /// Cells of a block; its mean and that of the blocks around say what crowns on crowns give.
 const BLOCK: [usize; 3] = [4, 4, 2];
 
-/// Standard deviations by which a cell exceeds its surroundings at the least.
-const OUTSTANDING: f64 = 4.0;
+/// Standard deviations by which a cell exceeds its surroundings at the least: of a row that is not there some hundred do, of one
+/// that is thousands.
+const OUTSTANDING: f64 = 5.7;
 
 /// Votes that a cell has at the least: a pair of clusters gives two.
 const LEAST_VOTES: u16 = 3;
