@@ -5,7 +5,7 @@
 //! residuals agree.
 
 use super::cut::{Cell, surroundings, total};
-use super::displacement::{displacement, told_by_neighbours};
+use super::displacement::{carried_on, told_by_neighbours};
 use super::growth::{Growth, Partner};
 use super::hypothesis::GATE;
 use super::nearest::SHARE_OF_ROWS;
@@ -102,7 +102,7 @@ impl Growth<'_> {
             let footing = footings[cell]?;
             let p = self.query.points[row];
             let place = self.cells[cell].pose.apply(&p);
-            let (shift, unexplained) = displacement(self.query, row, (self.shared, self.sigma * self.sigma), residual);
+            let (shift, unexplained) = carried_on(self.query, row, (self.shared, self.sigma * self.sigma), residual);
             let variance = sigma2 * (1.0 + footing.looseness(&p)) + footing.bent(&p, self.edge) + unexplained;
             Some((place, Landing { place: place + shift, variance }))
         };
