@@ -7,7 +7,7 @@ use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::Landing;
 use super::placement::{Moments, Placement};
-use super::search::{Contender, SAME_PLACE, Starts, refined};
+use super::search::{Contender, SAME_PLACE, refined};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -53,7 +53,7 @@ impl<'a> Search<'a> {
             .take(RIVAL_CANDIDATES)
             .copied()
             .collect();
-        self.grow_distinct(&refined(self.query, self.map, &others, &self.model, Starts::Straight), findings, log);
+        self.grow_distinct(&refined(self.query, self.map, &others, &self.model), findings, log);
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.

@@ -170,7 +170,7 @@ pub(crate) fn round(
     index: &SeedIndex,
     model: &Model,
     seeds: &[Seed],
-    (keep, starts): (usize, Starts),
+    keep: usize,
 ) -> (Vec<Hypothesis>, Vec<Contender>, Effort) {
     let parts: Vec<(Vec<Contender>, Effort)> = seeds
         .par_chunks(SHARE_OF_SEEDS)
@@ -187,7 +187,7 @@ pub(crate) fn round(
     let mut candidates: Vec<Contender> = parts.into_iter().flat_map(|part| part.0).collect();
     candidates.sort_unstable_by(by_evidence);
     let best = distinct(query, map.spacing, &mut candidates, keep);
-    (refined(query, map, &best, model, starts), candidates, effort)
+    (refined(query, map, &best, model), candidates, effort)
 }
 
 /// Seeds that are worth a thread of their own.
@@ -223,63 +223,24 @@ pub(super) fn distinct(
 pub(super) const SAME_PLACE: f64 = 0.4;
 const SAME_TURN_RAD: f64 = 0.15;
 
-/// Where the refinement of a candidate starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Starts {
-    /// From its pose alone.
-    Straight,
-    /// From its pose, and turned by [`TURNS`] on the fruits next to the seed.
-    Turned,
-}
-
-/// Turns about each axis that a refinement tries, radians.
-///
-/// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet
-/// their neighbours' partners, and the refinement can stay there.
-pub(super) const TURNS: [f64; 2] = [-0.2, 0.2];
-
-/// Share of the reach on which turned starts are compared.
-const NEAR: f64 = 0.75;
-
 /// Candidates refined around their places, most evidence first.
-pub(crate) fn refined(
-    query: &Landscape,
-    map: &Landscape,
-    candidates: &[Contender],
-    model: &Model,
-    starts: Starts,
-) -> Vec<Hypothesis> {
+pub(crate) fn refined(query: &Landscape, map: &Landscape, candidates: &[Contender], model: &Model) -> Vec<Hypothesis> {
+    let reach = REACH * query.spacing;
+    let refined = |scratch: &mut Scratch, Contender { pose, place, .. }: &Contender| {
+        refine(query, map, pose, place, reach, model, scratch)
+    };
     let mut hypotheses: Vec<Hypothesis> = candidates
-        .par_chunks(8)
-        .map_init(Scratch::default, |scratch, part| {
-            part.iter().filter_map(|one| refine_from(starts, query, map, one, model, scratch)).collect::<Vec<_>>()
-        })
+        .par_iter()
+        .with_min_len(SHARE_OF_CANDIDATES)
+        .map_init(Scratch::default, refined)
         .flatten_iter()
         .collect();
     hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     hypotheses
 }
 
-fn refine_from(
-    starts: Starts,
-    query: &Landscape,
-    map: &Landscape,
-    Contender { pose, place, .. }: &Contender,
-    model: &Model,
-    scratch: &mut Scratch,
-) -> Option<Hypothesis> {
-    let more = |a: &Hypothesis, b: &Hypothesis| a.log_odds.total_cmp(&b.log_odds);
-    let reach = REACH * query.spacing;
-    let mut from = |start: &Placement, reach: f64| refine(query, map, start, place, reach, model, scratch);
-    let straight = from(pose, reach);
-    if starts == Starts::Straight {
-        return straight;
-    }
-    let near = std::iter::once(*pose).chain(pose.turned_by_each(place, &TURNS));
-    let best = near.filter_map(|start| from(&start, NEAR * reach)).max_by(more);
-    let turned = best.and_then(|best| from(&best.pose, reach));
-    straight.into_iter().chain(turned).max_by(more)
-}
+/// Candidates that are worth a thread of their own.
+const SHARE_OF_CANDIDATES: usize = 8;
 
 /// Radius of the region that weighs a refined hypothesis, in spacings.
 pub(crate) const REACH: f64 = 3.5;
