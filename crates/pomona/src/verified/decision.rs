@@ -9,7 +9,7 @@ use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
 use super::placement::Placement;
-use super::search::{Contender, Effort, of_some_fruits, refined, round};
+use super::search::{Contender, Effort, of_some_fruits};
 use super::seeds::{self, Seed};
 use super::size::Diameters;
 use super::vertical::Vertical;
@@ -121,7 +121,7 @@ impl<'a> Search<'a> {
         let mut longest = Vec::new();
         for (index, keep) in ROUNDS.into_iter().enumerate() {
             let seeds = self.seeds_of(index, &mut longest);
-            let (hypotheses, rest) = self.round(&seeds, keep, &mut log);
+            let (hypotheses, rest) = self.ask(&seeds, keep, &mut log);
             self.grow_distinct(&hypotheses, &mut findings.accepted, &mut log);
             self.sift(&mut findings, &mut log);
             if !findings.accepted.is_empty() {
@@ -152,7 +152,7 @@ impl<'a> Search<'a> {
     pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> (Findings<'a>, Stages) {
         let mut log = Log { effort, ..Log::new(self.threshold(effort.stands.share_left())) };
         let mut findings = Findings::default();
-        let hypotheses = refined(self.query, self.map, contenders, &self.model);
+        let hypotheses = self.refined(contenders);
         log.refined = hypotheses.len();
         for some in hypotheses.chunks(GROWN) {
             self.grow_distinct(some, &mut findings.accepted, &mut log);
@@ -193,7 +193,7 @@ impl<'a> Search<'a> {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
-            let (more, _) = self.round(&more, RIVAL_CANDIDATES, log);
+            let (more, _) = self.ask(&more, RIVAL_CANDIDATES, log);
             self.grow_distinct(&more, &mut findings.accepted, log);
         }
         self.sift(findings, log);
@@ -203,8 +203,8 @@ impl<'a> Search<'a> {
     }
 
     /// Hypotheses of one round, and the candidates that were not refined.
-    fn round(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
-        let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, seeds, keep);
+    fn ask(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
+        let (hypotheses, rest, spent) = self.round(seeds, keep);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
         log.threshold = self.threshold(log.effort.stands.share_left());

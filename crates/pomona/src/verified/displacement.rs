@@ -11,11 +11,13 @@ const MIN_AGREEING: f64 = 20.0;
 /// Variance that neighbours share, in that of the noise, at the least.
 const LEAST_SHARED: f64 = 0.01;
 
-/// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not.
+/// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not. 0 where it is
+/// too little beside the noise, a standard deviation of `sigma`, to be told.
 ///
 /// `residual` gives a fruit's residual and its weight.
 pub(super) fn shared_by_neighbours(
     query: &Landscape,
+    sigma: f64,
     residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
 ) -> f64 {
     let rows: Vec<usize> = (0..query.len()).collect();
@@ -39,17 +41,8 @@ pub(super) fn shared_by_neighbours(
         })
         .collect();
     let [products, pairs, weights] = parts.iter().fold([0.0; 3], |sum, part| [0, 1, 2].map(|i| sum[i] + part[i]));
-    if weights > MIN_AGREEING && pairs > 0.0 { (products / pairs / 3.0).max(0.0) } else { 0.0 }
-}
-
-/// The same, or 0 where it is too little beside the noise, a standard deviation of `sigma`, to be told.
-pub(super) fn told_by_neighbours(
-    query: &Landscape,
-    sigma: f64,
-    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
-) -> f64 {
-    let shared = shared_by_neighbours(query, residual);
-    if shared < LEAST_SHARED * sigma * sigma { 0.0 } else { shared }
+    let shared = products / pairs / 3.0;
+    if weights > MIN_AGREEING && shared > LEAST_SHARED * sigma * sigma { shared } else { 0.0 }
 }
 
 /// Neighbours that tell where a fruit has moved, at the most.

@@ -7,8 +7,8 @@
 use super::cut::{Cell, Cut};
 use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
 use super::landscape::Landscape;
-use super::placement::Landing;
-use super::placement::{Moments, Placement};
+use super::placement::{Landing, Moments, Placement};
+use super::search::REACH;
 use super::sight::unseen;
 use nalgebra::Vector3;
 
@@ -21,11 +21,8 @@ const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
 /// The first rounds fit one rigid pose: patches would bend towards a seed that is turned by a few degrees.
 const RIGID_ROUNDS: usize = 6;
 
-/// Rounds of pairing and fitting when the pose is known for the whole query.
-const WHOLE_ROUNDS: usize = 4;
-
-/// The same once fruits or cells were left out of it.
-const LEFT_OUT_ROUNDS: usize = 2;
+/// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.
+const WHOLE_ROUNDS: usize = 2;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
@@ -106,7 +103,7 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
     }
     growth.predict();
     growth.pair_up();
-    growth.go_on(WHOLE_ROUNDS);
+    growth.go_on();
     growth
 }
 
@@ -120,7 +117,7 @@ pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothes
         growth.forget(row);
     }
     growth.pair_up();
-    growth.go_on(LEFT_OUT_ROUNDS);
+    growth.go_on();
     growth.whole = false;
     growth
 }
@@ -132,7 +129,7 @@ impl<'a> Growth<'a> {
         let far = |cell: &Cell| (cell.centre - seed.place).norm();
         for cell in &mut cells {
             cell.pose = seed.pose;
-            cell.reached = far(cell) < super::search::REACH * query.spacing;
+            cell.reached = far(cell) < REACH * query.spacing;
         }
         if let Some(nearest) = cells.iter_mut().min_by(|a, b| far(a).total_cmp(&far(b))) {
             nearest.reached = true;
@@ -179,9 +176,9 @@ impl<'a> Growth<'a> {
         !new.is_empty()
     }
 
-    /// Fits to the pairs and makes them anew, so many times.
-    fn go_on(&mut self, rounds: usize) {
-        for _ in 0..rounds {
+    /// Fits to the pairs and makes them anew.
+    fn go_on(&mut self) {
+        for _ in 0..WHOLE_ROUNDS {
             self.refit();
             self.predict();
             self.pair_up();
@@ -227,6 +224,6 @@ impl<'a> Growth<'a> {
             let rows = self.cells[i].rows.clone();
             rows.iter().for_each(|&row| self.forget(row as usize));
         }
-        self.go_on(LEFT_OUT_ROUNDS);
+        self.go_on();
     }
 }

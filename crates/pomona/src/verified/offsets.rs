@@ -6,7 +6,7 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is looked at, and the best is refined on all
 //! fruits at once, under the share that is seen again where ordinary shares have found nothing.
 
-use super::hypothesis::{Evidence, GATE, Hypothesis, Model, Scratch, refine};
+use super::hypothesis::{Evidence, GATE, Hypothesis, Model, Refiner};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::votes::{Peak, Rows};
@@ -48,10 +48,9 @@ pub(super) fn hypotheses(
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
     looks.truncate(REFINED);
     let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-    let refined = |scratch: &mut Scratch, (_, pose): &(f64, Placement)| {
-        refine(query, map, pose, &Vector3::zeros(), reach, &model, scratch)
-    };
-    let mut found: Vec<Hypothesis> = looks.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
+    let refined = |refiner: &mut Refiner, (_, pose): &(f64, Placement)| refiner.refine(pose, &Vector3::zeros(), reach);
+    let mut found: Vec<Hypothesis> =
+        looks.par_iter().map_init(|| Refiner::new(query, map, &model), refined).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }
