@@ -58,7 +58,7 @@ const FARTHEST: f64 = 8.0;
 
 /// What a Gaussian process makes of the neighbours' residuals at a fruit, the fruit itself left out; and the variance left.
 ///
-/// Correlations fall with the distance as `exp(-d^2 / 2 (REACH a)^2)`. A mean of the neighbours falls short where all of them
+/// Correlations fall with the distance as `exp(-d^2 / 2 (REACH a)^2)`. A mean of the neighbours would fall short where all of them
 /// are nearer the stem; this goes on as far as they say, and says how unsure it is where they are far. With K the correlations
 /// and the noise, r the residuals and k the correlations with the place, the two are `k K^-1 r` and `1 - k K^-1 k`.
 pub(super) fn carried_on(

@@ -26,7 +26,7 @@ const STEPS: usize = 4;
 pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
     let map = laid.map;
     let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
-    let met = laid.meetings(0.0, |meeting| Some(*meeting));
+    let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
     let mut evidence = 0.0;

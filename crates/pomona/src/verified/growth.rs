@@ -5,7 +5,7 @@
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
 use super::cut::{Cell, Cut};
-use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
+use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::placement::{Landing, Moments, Placement};
 use super::search::REACH;
@@ -26,10 +26,6 @@ const WHOLE_ROUNDS: usize = 2;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
-
-/// Degrees of freedom of the expected noise when pairs are made: few pairs fit themselves more closely than the fruits
-/// that are still to be paired.
-const PAIR_FREEDOMS: f64 = 12.0;
 
 /// The nearest fruit of the map, while growth goes on.
 #[derive(Debug, Clone, Copy)]
@@ -68,8 +64,6 @@ pub(crate) struct Growth<'a> {
     pub(super) widening: f64,
     /// Patches follow the common pose.
     pub(super) rigid: bool,
-    /// Degrees of freedom of the expected noise.
-    pub(super) freedoms: f64,
 }
 
 /// Grows a hypothesis as far as the evidence goes.
@@ -153,7 +147,6 @@ impl<'a> Growth<'a> {
             whole: false,
             widening: 1.0,
             rigid: false,
-            freedoms: PRIOR_FREEDOMS,
         }
     }
 
@@ -210,7 +203,6 @@ impl<'a> Growth<'a> {
     ///
     /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
     pub(crate) fn reach_all(&mut self) {
-        self.freedoms = PAIR_FREEDOMS;
         for cell in self.cells.iter_mut().filter(|cell| !cell.reached) {
             cell.reached = true;
             cell.pose = self.pose;

@@ -174,12 +174,13 @@ impl<'a> Refiner<'a> {
             let mut entry = found.map_or((NOBODY, 0.0, variance), |(partner, d2)| (partner, d2, variance));
             if let Some((partner, d2)) = found {
                 let owner = &mut self.owner[partner as usize];
-                let rival = (owner.0 == self.stamp).then(|| &mut self.partners[owner.1 as usize]);
-                match rival {
-                    Some(rival) if rival.1 <= d2 => entry.0 = NOBODY,
-                    rival => {
-                        *owner = (self.stamp, at as u32);
-                        rival.into_iter().for_each(|rival| rival.0 = NOBODY);
+                let rival = (owner.0 == self.stamp).then_some(owner.1 as usize);
+                if rival.is_some_and(|rival| self.partners[rival].1 <= d2) {
+                    entry.0 = NOBODY;
+                } else {
+                    *owner = (self.stamp, at as u32);
+                    if let Some(rival) = rival {
+                        self.partners[rival].0 = NOBODY;
                     }
                 }
             }

@@ -92,7 +92,7 @@ impl Marginals {
 fn edges_of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
     let Laid { query, map, pose, .. } = *laid;
     let (scale, volume_scale) = (pose.scale, pose.scale.powi(3));
-    laid.meetings(FAR, |meeting| {
+    laid.meetings(|meeting| {
         let Meeting { query: row, map: partner, distance, density, support } = *meeting;
         let seen = share * support;
         // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
@@ -126,23 +126,21 @@ pub(crate) struct Laid<'a> {
 }
 
 impl Laid<'_> {
-    /// What `kept` makes of every meeting within the gate of the noise and within `far` spacings, by rows of the query.
-    pub(super) fn meetings<T: Send>(&self, far: f64, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
+    /// What `kept` makes of every meeting within the gate, by rows of the query.
+    pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
         let rows: Vec<usize> = (0..self.predictions.len()).collect();
-        let in_part = |rows: &[usize]| {
-            let mut found = Vec::new();
-            rows.iter().for_each(|&row| found.extend(self.meetings_of(row, far).iter().filter_map(&kept)));
-            found
+        let of_part = |rows: &[usize]| -> Vec<T> {
+            rows.iter().flat_map(|&row| self.meetings_of(row)).filter_map(|meeting| kept(&meeting)).collect()
         };
-        rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(in_part).collect()
+        rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(of_part).collect()
     }
 
-    fn meetings_of(&self, row: usize, far: f64) -> Vec<Meeting> {
+    fn meetings_of(&self, row: usize) -> Vec<Meeting> {
         let (map, pose) = (self.map, self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support(&place);
         let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
-        let gate = GATE.max(FAR_GATE.min(far * map.spacing / variance.sqrt()));
+        let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
         let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
         let mut partners = Vec::new();
         map.near(&place, gate * (widest * variance).sqrt(), |partner| partners.push(partner));

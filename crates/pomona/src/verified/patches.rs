@@ -7,7 +7,7 @@
 use super::cut::{Cell, surroundings, total};
 use super::displacement::{carried_on, shared_by_neighbours};
 use super::growth::{Growth, Partner};
-use super::hypothesis::GATE;
+use super::hypothesis::{GATE, PRIOR_FREEDOMS};
 use super::nearest::SHARE_OF_ROWS;
 use super::placement::{FIXING, Landing, Moments, Placement};
 use super::seeds::STARS;
@@ -214,7 +214,7 @@ impl Growth<'_> {
         let mean = squares / (3.0 * weights - 6.0).max(weights);
         let prior = self.model.sigma * self.model.sigma;
         let noise =
-            (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.0)) / (self.freedoms + 3.0 * weights);
+            (PRIOR_FREEDOMS * prior + 3.0 * weights * (mean - self.shared).max(0.0)) / (PRIOR_FREEDOMS + 3.0 * weights);
         self.sigma = noise.sqrt();
     }
 }

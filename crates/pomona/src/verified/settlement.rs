@@ -5,7 +5,7 @@
 //! settled once more, in turns:
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
-//! 2. The noise and a first share seen again come from distances, nobody said to be who ([`super::scatter`]).
+//! 2. The noise comes from distances, nobody said to be who ([`super::scatter`]).
 //! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn.
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
@@ -96,13 +96,6 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diame
 
 impl<'a> Settlement<'a> {
     fn new(growth: &'a Growth, noise_m: Option<f64>) -> Self {
-        let mut cells = growth.cells.clone();
-        for (i, cell) in cells.iter_mut().enumerate() {
-            if !growth.convincing(i) {
-                cell.reached = false;
-                cell.moments = Moments::default();
-            }
-        }
         let target = |partner: &Partner| (growth.map.points[partner.row as usize], partner.weight);
         Self {
             query: growth.query,
@@ -113,7 +106,7 @@ impl<'a> Settlement<'a> {
                 None if growth.whole => KnownNoise { sigma: growth.sigma, width: GIVEN },
                 None => KnownNoise { sigma: growth.model.sigma, width: GUESSED },
             },
-            cells,
+            cells: growth.cells.clone(),
             cut: growth.cut,
             edge: growth.edge,
             pose: growth.pose,
