@@ -142,8 +142,14 @@ impl Laid<'_> {
         let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
         let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
         let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
+        let reach = gate * (widest * variance).sqrt();
+        // Cells of the grid have more than what is within reach, which no covariance brings within the gate.
         let mut partners = Vec::new();
-        map.near(&place, gate * (widest * variance).sqrt(), |partner| partners.push(partner));
+        map.near(&place, reach, |partner| {
+            if (map.points[partner as usize] - place).norm_squared() <= reach * reach {
+                partners.push(partner);
+            }
+        });
         // Two cells of the grid may share a bucket, which then is visited twice.
         partners.sort_unstable();
         partners.dedup();
