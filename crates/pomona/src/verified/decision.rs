@@ -9,7 +9,7 @@ use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
 use super::placement::Placement;
-use super::search::{Contender, Effort, Starts, of_some_fruits, refined, round};
+use super::search::{Contender, Effort, of_some_fruits};
 use super::seeds::{self, Seed};
 use super::size::Diameters;
 use super::vertical::Vertical;
@@ -28,9 +28,8 @@ pub(crate) const MAX_FRUITS: usize = 300_000;
 /// Outlines sharper than this many spacings of noise are refined cell by cell.
 const SHARP: f64 = 0.18;
 
-/// Rounds of the search (see [`Search::seeds_of`]): how many candidates are refined, and from where.
-const ROUNDS: [(usize, Starts); 4] =
-    [(32, Starts::Straight), (32, Starts::Straight), (48, Starts::Turned), (64, Starts::Turned)];
+/// Candidates that are refined in each round of the search (see [`Search::seeds_of`]).
+const ROUNDS: [usize; 4] = [32, 32, 48, 64];
 
 /// One in so many of the longest seeds is tried in the third round.
 const THIRD_ROUND: usize = 5;
@@ -117,9 +116,9 @@ impl<'a> Search<'a> {
         let mut log = Log::new(self.threshold(Vertical::share_of_turns()));
         let mut findings = Findings::default();
         let mut longest = Vec::new();
-        for (index, plan) in ROUNDS.into_iter().enumerate() {
+        for (index, keep) in ROUNDS.into_iter().enumerate() {
             let seeds = self.seeds_of(index, &mut longest);
-            let (hypotheses, rest) = self.round(&seeds, plan, &mut log);
+            let (hypotheses, rest) = self.ask(&seeds, keep, &mut log);
             self.grow_distinct(&hypotheses, &mut findings.accepted, &mut log);
             self.sift(&mut findings, &mut log);
             if !findings.accepted.is_empty() {
@@ -150,7 +149,7 @@ impl<'a> Search<'a> {
     pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> (Findings<'a>, Stages) {
         let mut log = Log { effort, ..Log::new(self.threshold(effort.stands.share_left())) };
         let mut findings = Findings::default();
-        let hypotheses = refined(self.query, self.map, contenders, &self.model, Starts::Straight);
+        let hypotheses = self.refined(contenders);
         log.refined = hypotheses.len();
         for some in hypotheses.chunks(GROWN) {
             self.grow_distinct(some, &mut findings.accepted, &mut log);
@@ -191,7 +190,7 @@ impl<'a> Search<'a> {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
-            let (more, _) = self.round(&more, (RIVAL_CANDIDATES, Starts::Straight), log);
+            let (more, _) = self.ask(&more, RIVAL_CANDIDATES, log);
             self.grow_distinct(&more, &mut findings.accepted, log);
         }
         self.sift(findings, log);
@@ -201,8 +200,8 @@ impl<'a> Search<'a> {
     }
 
     /// Hypotheses of one round, and the candidates that were not refined.
-    fn round(&self, seeds: &[Seed], plan: (usize, Starts), log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
-        let (hypotheses, rest, spent) = round(self.query, self.map, self.seeds, &self.model, seeds, plan);
+    fn ask(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
+        let (hypotheses, rest, spent) = self.round(seeds, keep);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
         log.threshold = self.threshold(log.effort.stands.share_left());

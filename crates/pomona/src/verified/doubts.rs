@@ -2,12 +2,11 @@
 
 use super::case::{Finding, Log, Search};
 use super::growth::grow;
-use super::hypothesis::{Hypothesis, Model, Scratch, refine};
+use super::hypothesis::{Hypothesis, Model, Refiner};
 use super::nearest::single;
 use super::overlap::Overlap;
-use super::placement::Landing;
-use super::placement::{Moments, Placement};
-use super::search::{Contender, SAME_PLACE, Starts, refined};
+use super::placement::{Landing, Moments, Placement};
+use super::search::{Contender, REACH, SAME_PLACE};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -35,11 +34,8 @@ const WHOLE: f64 = 0.7;
 /// Times that turned starts are tried.
 const POLISHES: usize = 3;
 
-/// Radius in spacings of the region that decides between turned starts.
-const POLISH_REACH: f64 = 5.0;
-
-/// Turns about each axis that a polish tries, radians: 5 and 10 degrees either way.
-const POLISH_TURNS: [f64; 4] = [-0.175, -0.087, 0.087, 0.175];
+/// Turns about each axis that a polish tries, radians: 7 degrees either way.
+const POLISH_TURNS: [f64; 2] = [-0.13, 0.13];
 
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
@@ -53,7 +49,7 @@ impl<'a> Search<'a> {
             .take(RIVAL_CANDIDATES)
             .copied()
             .collect();
-        self.grow_distinct(&refined(self.query, self.map, &others, &self.model, Starts::Straight), findings, log);
+        self.grow_distinct(&self.refined(&others), findings, log);
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
@@ -129,11 +125,10 @@ impl<'a> Search<'a> {
             let model = Model { sigma, ..self.model };
             let starts: Vec<Placement> =
                 std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS)).collect();
-            let reach = POLISH_REACH * self.query.spacing;
-            let refined = |scratch: &mut Scratch, start: &Placement| {
-                refine(self.query, self.map, start, &middle, reach, &model, scratch)
-            };
-            let refined: Vec<_> = starts.par_iter().map_init(Scratch::default, refined).flatten_iter().collect();
+            let reach = REACH * self.query.spacing;
+            let refiner = || Refiner::new(self.query, self.map, &model);
+            let refined = |refiner: &mut Refiner, start: &Placement| refiner.refine(start, &middle, reach);
+            let refined: Vec<_> = starts.par_iter().map_init(refiner, refined).flatten_iter().collect();
             let best = refined.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
             let Some(seed) = best else { return };
             let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);

@@ -13,37 +13,27 @@
 //! when it grew, below zero where nothing was selected.
 
 use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
-use super::hypothesis::DETECTION;
+use super::hypothesis::{DETECTION, SHARES};
 use super::landscape::Landscape;
-use super::pairing::{Meeting, meetings};
-use super::placement::Landing;
-use super::placement::Placement;
+use super::pairing::{Laid, Meeting};
 
 /// Steps of expectation and maximisation of the share that is seen again, from [`DETECTION`].
 const STEPS: usize = 4;
 
-/// Least and largest share of fruits seen again.
-const SHARES: (f64, f64) = (0.1, 0.95);
-
 /// Evidence of an overlap, nats.
 ///
 /// `there` has, for each fruit of the map, how surely the query would have shown it; 0 outside the overlap.
-pub(super) fn evidence(
-    query: &Landscape,
-    map: &Landscape,
-    predictions: &[Option<Landing>],
-    pose: &Placement,
-    there: &[f64],
-) -> f64 {
-    let here: Vec<f64> = predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
-    let met = meetings(query, map, predictions, pose, 0.0, |meeting| Some(*meeting));
+pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
+    let map = laid.map;
+    let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
+    let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..STEPS {
         let edge = |meeting: &Meeting| edge(map, meeting, share, there[meeting.map as usize]);
         let edges: Vec<Edge> = met.iter().filter_map(edge).collect();
-        let beliefs = Beliefs::new(&edges, query.len(), map.len());
+        let beliefs = Beliefs::new(&edges, laid.query.len(), map.len());
         let alone: f64 = here.iter().chain(there).map(|support| (1.0 - share * support).ln()).sum();
         evidence = beliefs.log_sum + alone + share * due[0];
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
@@ -72,6 +62,7 @@ fn edge(map: &Landscape, meeting: &Meeting, share: f64, back: f64) -> Option<Edg
 mod tests {
     use super::*;
     use crate::verified::fixture::visits;
+    use crate::verified::placement::{Landing, Placement};
     use nalgebra::Vector3;
 
     #[test]
@@ -93,7 +84,7 @@ mod tests {
             let land = |p: &Vector3<f64>| Some(Landing { place: pose.apply(p), variance: 0.02 * 0.02 });
             let predictions: Vec<_> = query.points.iter().map(land).collect();
             let there: Vec<f64> = map.points.iter().map(|p| query.support(&pose.apply_inverse(p))).collect();
-            evidence(&query, &map, &predictions, &pose, &there)
+            evidence(&Laid { query: &query, map: &map, predictions: &predictions, pose: &pose }, &there)
         };
         assert!(at(Vector3::zeros()) > 300.0);
         for step in [0.3, 0.5, 1.0] {

@@ -5,10 +5,10 @@
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
 use super::cut::{Cell, Cut};
-use super::hypothesis::{Hypothesis, Model, PRIOR_FREEDOMS};
+use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
-use super::placement::Landing;
-use super::placement::{Moments, Placement};
+use super::placement::{Landing, Moments, Placement};
+use super::search::REACH;
 use super::sight::unseen;
 use nalgebra::Vector3;
 
@@ -21,18 +21,11 @@ const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
 /// The first rounds fit one rigid pose: patches would bend towards a seed that is turned by a few degrees.
 const RIGID_ROUNDS: usize = 6;
 
-/// Rounds of pairing and fitting when the pose is known for the whole query.
-const WHOLE_ROUNDS: usize = 4;
-
-/// The same once fruits or cells were left out of it.
-const LEFT_OUT_ROUNDS: usize = 2;
+/// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.
+const WHOLE_ROUNDS: usize = 2;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
-
-/// Degrees of freedom of the expected noise when pairs are made: few pairs fit themselves more closely than the fruits
-/// that are still to be paired.
-const PAIR_FREEDOMS: f64 = 12.0;
 
 /// The nearest fruit of the map, while growth goes on.
 #[derive(Debug, Clone, Copy)]
@@ -71,8 +64,6 @@ pub(crate) struct Growth<'a> {
     pub(super) widening: f64,
     /// Patches follow the common pose.
     pub(super) rigid: bool,
-    /// Degrees of freedom of the expected noise.
-    pub(super) freedoms: f64,
 }
 
 /// Grows a hypothesis as far as the evidence goes.
@@ -106,7 +97,7 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
     }
     growth.predict();
     growth.pair_up();
-    growth.go_on(WHOLE_ROUNDS);
+    growth.go_on();
     growth
 }
 
@@ -120,7 +111,7 @@ pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothes
         growth.forget(row);
     }
     growth.pair_up();
-    growth.go_on(LEFT_OUT_ROUNDS);
+    growth.go_on();
     growth.whole = false;
     growth
 }
@@ -132,7 +123,7 @@ impl<'a> Growth<'a> {
         let far = |cell: &Cell| (cell.centre - seed.place).norm();
         for cell in &mut cells {
             cell.pose = seed.pose;
-            cell.reached = far(cell) < super::search::REACH * query.spacing;
+            cell.reached = far(cell) < REACH * query.spacing;
         }
         if let Some(nearest) = cells.iter_mut().min_by(|a, b| far(a).total_cmp(&far(b))) {
             nearest.reached = true;
@@ -156,7 +147,6 @@ impl<'a> Growth<'a> {
             whole: false,
             widening: 1.0,
             rigid: false,
-            freedoms: PRIOR_FREEDOMS,
         }
     }
 
@@ -179,9 +169,9 @@ impl<'a> Growth<'a> {
         !new.is_empty()
     }
 
-    /// Fits to the pairs and makes them anew, so many times.
-    fn go_on(&mut self, rounds: usize) {
-        for _ in 0..rounds {
+    /// Fits to the pairs and makes them anew.
+    fn go_on(&mut self) {
+        for _ in 0..WHOLE_ROUNDS {
             self.refit();
             self.predict();
             self.pair_up();
@@ -213,7 +203,6 @@ impl<'a> Growth<'a> {
     ///
     /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
     pub(crate) fn reach_all(&mut self) {
-        self.freedoms = PAIR_FREEDOMS;
         for cell in self.cells.iter_mut().filter(|cell| !cell.reached) {
             cell.reached = true;
             cell.pose = self.pose;
@@ -227,6 +216,6 @@ impl<'a> Growth<'a> {
             let rows = self.cells[i].rows.clone();
             rows.iter().for_each(|&row| self.forget(row as usize));
         }
-        self.go_on(LEFT_OUT_ROUNDS);
+        self.go_on();
     }
 }

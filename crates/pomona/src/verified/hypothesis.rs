@@ -1,6 +1,8 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
 use super::landscape::Landscape;
+use super::nearest::single;
+use super::patches::Footing;
 use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
 use crate::geometry::Scale;
@@ -8,6 +10,9 @@ use nalgebra::Vector3;
 
 /// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
 pub(super) const DETECTION: f64 = 0.55;
+
+/// Least and largest share of fruits seen again that is believed once pairs tell.
+pub(super) const SHARES: (f64, f64) = (0.05, 0.97);
 
 /// What is assumed of one pair of visits while poses are compared.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +34,12 @@ impl Model {
     #[inline]
     pub(crate) fn met(&self, d2: f64, variance: f64, density: f64) -> f64 {
         1.0 - self.detection + self.detection * gaussian(d2, variance) / density
+    }
+
+    /// Probability that a partner of this likelihood ratio is the fruit and no chance neighbour.
+    #[inline]
+    pub(crate) fn no_stranger(&self, met: f64) -> f64 {
+        1.0 - (1.0 - self.detection) / met
     }
 
     /// One least-squares step from `start`, of pairs whose noise is `sigma` and of a vertical that is known.
@@ -96,150 +107,134 @@ pub(crate) struct Hypothesis {
     pub(crate) sigma: f64,
 }
 
-/// Buffers of [`refine`], reused between hypotheses.
-#[derive(Debug, Default)]
-pub(crate) struct Scratch {
+/// Improves poses on the fruits around a place, its buffers reused from pose to pose.
+#[derive(Debug)]
+pub(crate) struct Refiner<'a> {
+    query: &'a Landscape,
+    map: &'a Landscape,
+    model: Model,
+    /// Fruits of the query around the place.
     region: Vec<u32>,
+    /// The partner of each, none where that is `NOBODY`, with the squared distance and the variance of the prediction.
     partners: Vec<(u32, f64, f64)>,
+    /// Of each fruit of the map: when it was claimed last, and by whom in the region.
     owner: Vec<(u32, u32)>,
     stamp: u32,
 }
 
+const NOBODY: u32 = u32::MAX;
+
 /// Steps of a refinement.
 pub(super) const STEPS: usize = 6;
 
-/// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
-pub(crate) fn refine(
-    query: &Landscape,
-    map: &Landscape,
-    start: &Placement,
-    place: &Vector3<f64>,
-    reach: f64,
-    model: &Model,
-    scratch: &mut Scratch,
-) -> Option<Hypothesis> {
-    refine_in(STEPS, query, map, start, (place, reach), model, scratch)
-}
+impl<'a> Refiner<'a> {
+    pub(crate) fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
+        let owner = vec![(0, 0); map.len()];
+        Self { query, map, model: *model, region: Vec::new(), partners: Vec::new(), owner, stamp: 0 }
+    }
 
-/// The same in fewer steps of pairing, of which the last only weighs.
-pub(super) fn refine_in(
-    steps: usize,
-    query: &Landscape,
-    map: &Landscape,
-    start: &Placement,
-    (place, reach): (&Vector3<f64>, f64),
-    model: &Model,
-    scratch: &mut Scratch,
-) -> Option<Hypothesis> {
-    scratch.owner.resize(map.len(), (0, 0));
-    let region = &mut scratch.region;
-    region.clear();
-    query.tree.within(&super::nearest::single(place), reach as f32, |row, _| region.push(row));
-    region.sort_unstable();
-    let mut pose = *start;
-    let mut sigma = model.sigma;
-    // Before the first step the pose is known as well as a seed gives it: 6 cm at 1 m for 2 cm of noise.
-    let (mut freedom, mut inertia, mut centroid) = (0.25, 0.1 * reach * reach, *place);
-    let mut answer = None;
-    for step in 0..steps {
-        let variance_at = |p: &Vector3<f64>| sigma * sigma * (1.0 + freedom + (p - centroid).norm_squared() / inertia);
-        pair_up(query, map, &pose, variance_at, scratch);
-        let mut moments = Moments::default();
-        let (mut evidence, mut residual) = (Evidence::default(), 0.0);
-        for (&row, &(partner, d2, variance)) in scratch.region.iter().zip(&scratch.partners) {
-            let p = query.points[row as usize];
-            if partner == u32::MAX {
-                evidence.multiply(model.missed(map.support(&pose.apply(&p))));
-                continue;
+    /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
+    pub(crate) fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
+        self.refine_in(STEPS, start, place, reach)
+    }
+
+    /// The same in fewer steps of pairing, of which the last only weighs.
+    pub(super) fn refine_in(
+        &mut self,
+        steps: usize,
+        start: &Placement,
+        place: &Vector3<f64>,
+        reach: f64,
+    ) -> Option<Hypothesis> {
+        self.region.clear();
+        self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
+        self.region.sort_unstable();
+        let model = self.model;
+        let (mut pose, mut sigma) = (*start, model.sigma);
+        let mut footing = Footing::of_seed(place, reach);
+        let mut answer = None;
+        for step in 1..=steps {
+            self.pair_up(&pose, |p| sigma * sigma * (1.0 + footing.looseness(p)));
+            let (moments, residual, mut log_odds) = self.weigh(&pose);
+            if moments.weight < FIXING {
+                return answer;
             }
-            let met = model.met(d2, variance, map.density[partner as usize]);
-            evidence.multiply(met);
-            // Posterior probability that the partner is the fruit and no chance neighbour.
-            let weight = 1.0 - (1.0 - model.detection) / met;
-            moments.add(&p, &map.points[partner as usize], weight);
-            residual += weight * d2;
+            if step == steps {
+                log_odds += self.other_side(&pose, place, reach);
+            }
+            answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
+            if step == steps {
+                break;
+            }
+            pose = model.step(&moments, &pose, sigma)?;
+            footing = Footing::new(&moments, 0.0, reach, *place);
+            if step > 2 {
+                let freedoms = (3.0 * moments.weight - 6.0).max(0.0);
+                sigma = ((PRIOR_FREEDOMS * model.sigma * model.sigma + residual) / (PRIOR_FREEDOMS + freedoms)).sqrt();
+            }
         }
-        if moments.weight < FIXING {
-            return answer;
-        }
-        let mut log_odds = evidence.log_odds();
-        if step + 1 == steps {
-            log_odds += other_side(query, map, &pose, place, reach, model, scratch);
-        }
-        answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
-        if step + 1 == steps {
-            break;
-        }
-        pose = model.step(&moments, &pose, sigma)?;
-        centroid = moments.centroid();
-        freedom = 1.0 / moments.weight;
-        inertia = moments.inertia();
-        if step >= 2 {
-            let freedoms = (3.0 * moments.weight - 6.0).max(0.0);
-            sigma = ((PRIOR_FREEDOMS * model.sigma * model.sigma + residual) / (PRIOR_FREEDOMS + freedoms)).sqrt();
+        answer
+    }
+
+    /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
+    fn pair_up(&mut self, pose: &Placement, variance_at: impl Fn(&Vector3<f64>) -> f64) {
+        self.stamp += 1;
+        self.partners.clear();
+        for (at, &row) in self.region.iter().enumerate() {
+            let p = self.query.points[row as usize];
+            let variance = variance_at(&p);
+            let found = self.map.nearest(&pose.apply(&p), GATE * variance.sqrt());
+            let mut entry = found.map_or((NOBODY, 0.0, variance), |(partner, d2)| (partner, d2, variance));
+            if let Some((partner, d2)) = found {
+                let owner = &mut self.owner[partner as usize];
+                let rival = (owner.0 == self.stamp).then_some(owner.1 as usize);
+                if rival.is_some_and(|rival| self.partners[rival].1 <= d2) {
+                    entry.0 = NOBODY;
+                } else {
+                    *owner = (self.stamp, at as u32);
+                    if let Some(rival) = rival {
+                        self.partners[rival].0 = NOBODY;
+                    }
+                }
+            }
+            self.partners.push(entry);
         }
     }
-    answer
-}
 
-/// The other half of the evidence: fruits of the map that the query should have seen, and how many pairs were due.
-///
-/// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
-/// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
-/// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
-fn other_side(
-    query: &Landscape,
-    map: &Landscape,
-    pose: &Placement,
-    place: &Vector3<f64>,
-    reach: f64,
-    model: &Model,
-    scratch: &Scratch,
-) -> f64 {
-    let due: f64 = scratch.region.iter().map(|&row| map.support(&pose.apply(&query.points[row as usize]))).sum::<f64>()
-        * model.detection;
-    let mut missing = Evidence::default();
-    map.tree.within(&super::nearest::single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
-        if scratch.owner[row as usize].0 != scratch.stamp {
-            missing.multiply(model.missed(query.support(&pose.apply_inverse(&map.points[row as usize]))));
-        }
-    });
-    due + missing.log_odds()
-}
-
-/// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
-fn pair_up(
-    query: &Landscape,
-    map: &Landscape,
-    pose: &Placement,
-    variance_at: impl Fn(&Vector3<f64>) -> f64,
-    scratch: &mut Scratch,
-) {
-    scratch.stamp += 1;
-    let stamp = scratch.stamp;
-    scratch.partners.clear();
-    for (at, &row) in scratch.region.iter().enumerate() {
-        let p = query.points[row as usize];
-        let variance = variance_at(&p);
-        let found = map.nearest(&pose.apply(&p), GATE * variance.sqrt());
-        let Some((partner, d2)) = found else {
-            scratch.partners.push((u32::MAX, 0.0, variance));
-            continue;
-        };
-        let mut entry = (partner, d2, variance);
-        let owner = &mut scratch.owner[partner as usize];
-        if owner.0 == stamp {
-            let rival = &mut scratch.partners[owner.1 as usize];
-            if rival.1 <= d2 {
-                entry.0 = u32::MAX;
-            } else {
-                rival.0 = u32::MAX;
-                owner.1 = at as u32;
+    /// Sums over the pairs, their weighted squared distances, and the evidence of the region's fruits.
+    fn weigh(&self, pose: &Placement) -> (Moments, f64, f64) {
+        let (mut moments, mut residual, mut evidence) = (Moments::default(), 0.0, Evidence::default());
+        for (&row, &(partner, d2, variance)) in self.region.iter().zip(&self.partners) {
+            let p = self.query.points[row as usize];
+            if partner == NOBODY {
+                evidence.multiply(self.model.missed(self.map.support(&pose.apply(&p))));
+                continue;
             }
-        } else {
-            *owner = (stamp, at as u32);
+            let met = self.model.met(d2, variance, self.map.density[partner as usize]);
+            evidence.multiply(met);
+            let weight = self.model.no_stranger(met);
+            moments.add(&p, &self.map.points[partner as usize], weight);
+            residual += weight * d2;
         }
-        scratch.partners.push(entry);
+        (moments, residual, evidence.log_odds())
+    }
+
+    /// The other half of the evidence: fruits of the map that the query should have seen, and how many pairs were due.
+    ///
+    /// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
+    /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
+    /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
+    fn other_side(&self, pose: &Placement, place: &Vector3<f64>, reach: f64) -> f64 {
+        let support = |&row: &u32| self.map.support(&pose.apply(&self.query.points[row as usize]));
+        let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
+        let mut missing = Evidence::default();
+        self.map.tree.within(&single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
+            if self.owner[row as usize].0 != self.stamp {
+                let seen = self.query.support(&pose.apply_inverse(&self.map.points[row as usize]));
+                missing.multiply(self.model.missed(seen));
+            }
+        });
+        due + missing.log_odds()
     }
 }
 

@@ -11,7 +11,7 @@
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`axes`, `extent`).
 //!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
 //!    what only one visit sees is left out (`sight`).
-//! 6. What is reported is settled: noise and share from distances alone (`scatter`), one-to-one pairs with
+//! 6. What is reported is settled: the noise from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
 //!
 //! Where it is known about where the query lies, seeds are looked up there in place of steps 1 and 5 (`expected`).

@@ -6,7 +6,7 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::hypothesis::{Hypothesis, Model, STEPS, Scratch, refine_in};
+use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::votes::Rows;
@@ -55,10 +55,9 @@ pub(super) fn hypotheses(
     let wide = Model { sigma: WIDE * model.sigma, ..model };
     let refined = |poses: &[Placement], model: &Model, steps: usize| -> Vec<Hypothesis> {
         let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-        let from = |scratch: &mut Scratch, pose: &Placement| {
-            refine_in(steps, query, map, pose, (&Vector3::zeros(), reach), model, scratch)
-        };
-        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(Scratch::default, from).flatten_iter().collect();
+        let refiner = || Refiner::new(query, map, model);
+        let from = |refiner: &mut Refiner, pose: &Placement| refiner.refine_in(steps, pose, &Vector3::zeros(), reach);
+        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(refiner, from).flatten_iter().collect();
         found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
         found
     };

@@ -39,7 +39,7 @@ impl Growth<'_> {
         Overlap { middle, pose: self.pose, log_odds: self.log_odds(), sigma: self.sigma, predictions }
     }
 
-    /// Evidence of the cells that growth reached, both sides counted (see `hypothesis::other_side`), under the share of
+    /// Evidence of the cells that growth reached, both sides counted (see `Refiner::other_side`), under the share of
     /// fruits seen again that suits it best.
     fn log_odds(&self) -> f64 {
         let here: Vec<(f64, f64)> = self

@@ -3,8 +3,7 @@
 use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
-use super::placement::Landing;
-use super::placement::Placement;
+use super::placement::{Landing, Placement};
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -54,16 +53,9 @@ impl Marginals {
     /// the query is new with the density of new fruits at its place. Every pair thus weighs
     /// `p / (1 - p) N(d) / new density` against leaving both alone. Marginals by belief propagation (Williams and Lau
     /// 2014).
-    pub(crate) fn new(
-        query: &Landscape,
-        map: &Landscape,
-        predictions: &[Option<Landing>],
-        pose: &Placement,
-        share: f64,
-        size: &(impl Fn(u32, u32) -> f64 + Sync),
-    ) -> Self {
-        let edges = edges_of(query, map, predictions, pose, share, size);
-        let Beliefs { probabilities, .. } = Beliefs::new(&edges, query.len(), map.len());
+    pub(crate) fn new(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
+        let edges = edges_of(laid, share, size);
+        let Beliefs { probabilities, .. } = Beliefs::new(&edges, laid.query.len(), laid.map.len());
         Self { edges, probabilities }
     }
 
@@ -97,19 +89,12 @@ impl Marginals {
     }
 }
 
-fn edges_of(
-    query: &Landscape,
-    map: &Landscape,
-    predictions: &[Option<Landing>],
-    pose: &Placement,
-    share: f64,
-    size: &(impl Fn(u32, u32) -> f64 + Sync),
-) -> Vec<Edge> {
-    let scale = pose.scale;
-    let volume_scale = scale.powi(3);
-    meetings(query, map, predictions, pose, FAR, |meeting| {
+fn edges_of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
+    let Laid { query, map, pose, .. } = *laid;
+    let (scale, volume_scale) = (pose.scale, pose.scale.powi(3));
+    laid.meetings(|meeting| {
         let Meeting { query: row, map: partner, distance, density, support } = *meeting;
-        let seen = (share * support).max(LEAST_SEEN);
+        let seen = share * support;
         // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
         let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
         let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
@@ -131,50 +116,58 @@ pub(super) struct Meeting {
     pub(super) support: f64,
 }
 
-/// What `kept` makes of every meeting within the gate of the noise and within `far` spacings, by rows of the query.
-pub(super) fn meetings<T: Send>(
-    query: &Landscape,
-    map: &Landscape,
-    predictions: &[Option<Landing>],
-    pose: &Placement,
-    far: f64,
-    kept: impl Fn(&Meeting) -> Option<T> + Sync,
-) -> Vec<T> {
-    let of = |row: usize, found: &mut Vec<T>| {
-        let Some(Landing { place, variance }) = predictions[row] else { return };
+/// The query laid on the map, each of its fruits where it is expected.
+#[derive(Clone, Copy)]
+pub(crate) struct Laid<'a> {
+    pub(super) query: &'a Landscape,
+    pub(super) map: &'a Landscape,
+    pub(super) predictions: &'a [Option<Landing>],
+    pub(super) pose: &'a Placement,
+}
+
+impl Laid<'_> {
+    /// What `kept` makes of every meeting within the gate, by rows of the query.
+    pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
+        let rows: Vec<usize> = (0..self.predictions.len()).collect();
+        let of_part = |rows: &[usize]| -> Vec<T> {
+            rows.iter().flat_map(|&row| self.meetings_of(row)).filter_map(|meeting| kept(&meeting)).collect()
+        };
+        rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(of_part).collect()
+    }
+
+    fn meetings_of(&self, row: usize) -> Vec<Meeting> {
+        let (map, pose) = (self.map, self.pose);
+        let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support(&place);
-        let own = query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
-        let gate = GATE.max(FAR_GATE.min(far * map.spacing / variance.sqrt()));
+        let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
+        let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
         let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
         let reach = gate * (widest * variance).sqrt();
         // Cells of the grid have more than what is within reach, which no covariance brings within the gate.
-        let farthest2 = reach * reach * NO_ROUNDING;
         let mut partners = Vec::new();
         map.near(&place, reach, |partner| {
-            if (map.points[partner as usize] - place).norm_squared() <= farthest2 {
+            if (map.points[partner as usize] - place).norm_squared() <= reach * reach {
                 partners.push(partner);
             }
         });
         // Two cells of the grid may share a bucket, which then is visited twice.
         partners.sort_unstable();
         partners.dedup();
-        found.extend(partners.into_iter().filter_map(|partner| {
+        let meeting = |partner: u32| {
             let offset = map.points[partner as usize] - place;
             let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
             let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
-            let meeting = Meeting { query: row as u32, map: partner, distance: offset.norm(), density, support };
-            (mahalanobis2 <= gate * gate).then(|| kept(&meeting)).flatten()
-        }));
-    };
-    let rows: Vec<usize> = (0..predictions.len()).collect();
-    let in_part = |rows: &[usize]| {
-        let mut found = Vec::new();
-        for &row in rows {
-            of(row, &mut found);
-        }
-        found
-    };
-    rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(in_part).collect()
+            let distance = offset.norm();
+            (mahalanobis2 <= gate * gate).then_some(Meeting {
+                query: row as u32,
+                map: partner,
+                distance,
+                density,
+                support,
+            })
+        };
+        partners.into_iter().filter_map(meeting).collect()
+    }
 }
 
 /// Squared Mahalanobis distance of a residual, and its density per cubic metre.
@@ -204,11 +197,5 @@ fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f6
     (mahalanobis2, tailed(mahalanobis2) / factor.l().diagonal().product())
 }
 
-/// Probability at the least that a fruit is seen again, wherever it is.
-const LEAST_SEEN: f64 = 0.02;
-
 /// Variance along the longest axis over the mean variance, at the most: less, as a tenth of it stays isotropic.
 const WIDEST: f64 = 3.0;
-
-/// More than rounding takes from a squared distance.
-const NO_ROUNDING: f64 = 1.0 + 1e-9;

@@ -5,12 +5,12 @@
 //! residuals agree.
 
 use super::cut::{Cell, surroundings, total};
-use super::displacement::{displacement, told_by_neighbours};
+use super::displacement::{carried_on, shared_by_neighbours};
 use super::growth::{Growth, Partner};
-use super::hypothesis::GATE;
+use super::hypothesis::{GATE, PRIOR_FREEDOMS};
 use super::nearest::SHARE_OF_ROWS;
-use super::placement::Landing;
-use super::placement::{FIXING, Moments, Placement};
+use super::placement::{FIXING, Landing, Moments, Placement};
+use super::seeds::STARS;
 use super::sight::is_among;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
@@ -20,9 +20,6 @@ use std::mem::take;
 /// A patch may differ from its surroundings as if this many pairs held it to them.
 pub(super) const HOLD: f64 = 2.0;
 
-/// Share of the distance by which a crown may have bent between visits; recordings show 1 to 3 %.
-const DRIFT: f64 = 0.02;
-
 /// Cells of a patch's own fit, by their weight (see [`super::cut`]): those next to it.
 const NEXT: f64 = 0.3;
 
@@ -31,13 +28,18 @@ pub(super) const SHARE_OF_CELLS: usize = 32;
 
 /// How firmly pairs hold a pose: at `p` its variance is that of one pair times [`Footing::looseness`].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Footing {
+pub(crate) struct Footing {
     middle: Vector3<f64>,
     weight: f64,
     inertia: f64,
 }
 
 impl Footing {
+    /// As well as a seed gives a pose at `place` for a region of this `reach`: 6 cm at 1 m for 2 cm of noise.
+    pub(super) fn of_seed(place: &Vector3<f64>, reach: f64) -> Self {
+        Self { middle: *place, weight: STARS as f64, inertia: 0.1 * reach * reach }
+    }
+
     /// Of a fit to `moments`, held by as many pairs as `hold` about `centre`, an `edge` away.
     pub(super) fn new(moments: &Moments, hold: f64, edge: f64, centre: Vector3<f64>) -> Self {
         let (middle, inertia) =
@@ -47,26 +49,13 @@ impl Footing {
 
     #[inline]
     pub(super) fn looseness(&self, p: &Vector3<f64>) -> f64 {
-        1.0 / self.weight + self.away2(p) / self.inertia
+        1.0 / self.weight + (p - self.middle).norm_squared() / self.inertia
     }
 
     /// How much a pose that is held by `hold` pairs follows what holds it.
     #[inline]
     pub(super) fn share_held(&self, hold: f64) -> f64 {
         hold / self.weight
-    }
-
-    /// Squared distance from the middle of the pairs.
-    #[inline]
-    fn away2(&self, p: &Vector3<f64>) -> f64 {
-        (p - self.middle).norm_squared()
-    }
-
-    /// Variance at `p` by what the crown may have bent, where that is farther than an `edge` away.
-    #[inline]
-    pub(super) fn bent(&self, p: &Vector3<f64>, edge: f64) -> f64 {
-        let away2 = self.away2(p);
-        if away2 > edge * edge { DRIFT * DRIFT * away2 } else { 0.0 }
     }
 }
 
@@ -102,8 +91,8 @@ impl Growth<'_> {
             let footing = footings[cell]?;
             let p = self.query.points[row];
             let place = self.cells[cell].pose.apply(&p);
-            let (shift, unexplained) = displacement(self.query, row, (self.shared, self.sigma * self.sigma), residual);
-            let variance = sigma2 * (1.0 + footing.looseness(&p)) + footing.bent(&p, self.edge) + unexplained;
+            let (shift, unexplained) = carried_on(self.query, row, (self.shared, self.sigma * self.sigma), residual);
+            let variance = sigma2 * (1.0 + footing.looseness(&p)) + unexplained;
             Some((place, Landing { place: place + shift, variance }))
         };
         let (mut predictions, mut places) = (take(&mut self.predictions), take(&mut self.patch_places));
@@ -152,7 +141,7 @@ impl Growth<'_> {
             return Met { partner: None, gain: self.model.missed(self.map.support(place)).ln() };
         };
         let ratio = self.model.met(d2, *variance, self.map.density[row as usize]);
-        let weight = (1.0 - (1.0 - self.model.detection) / ratio).max(0.0);
+        let weight = self.model.no_stranger(ratio).max(0.0);
         Met { partner: Some((row, weight)), gain: ratio.ln() }
     }
 
@@ -203,10 +192,7 @@ impl Growth<'_> {
     /// The pose of one patch from the pairs next to it, held by that of its surroundings.
     fn patch(&self, cell: &Cell, wide: &Moments) -> Placement {
         let prior = HOLD * self.edge * self.edge;
-        let mut parent = cell.pose;
-        if wide.weight > 6.0 {
-            parent = wide.step(&parent, self.model.scale, prior).unwrap_or(parent);
-        }
+        let parent = wide.step(&cell.pose, self.model.scale, prior).unwrap_or(cell.pose);
         let mut near = next_to(&self.cells, cell);
         near.add(&cell.centre, &parent.apply(&cell.centre), HOLD);
         near.step(&parent, Scale::Metric, prior).unwrap_or(parent)
@@ -223,12 +209,12 @@ impl Growth<'_> {
             return;
         }
         let residual = |row: usize| self.partners[row].map(|partner| (partner.residual, partner.weight));
-        self.shared = told_by_neighbours(self.query, self.sigma, residual);
+        self.shared = shared_by_neighbours(self.query, self.sigma, residual);
         // Residuals about the patches hold noise and shared displacement; the gate cuts 3 % off.
         let mean = squares / (3.0 * weights - 6.0).max(weights);
         let prior = self.model.sigma * self.model.sigma;
-        let noise = (self.freedoms * prior + 3.0 * weights * (mean - self.shared).max(0.04 * mean))
-            / (self.freedoms + 3.0 * weights);
+        let noise =
+            (PRIOR_FREEDOMS * prior + 3.0 * weights * (mean - self.shared).max(0.0)) / (PRIOR_FREEDOMS + 3.0 * weights);
         self.sigma = noise.sqrt();
     }
 }

@@ -1,4 +1,4 @@
-//! The noise and the share of fruits seen again, from distances alone.
+//! The noise, from distances alone.
 //!
 //! Lay one visit on the other and count, for every fruit, the fruits of the other visit by their distance. Two things
 //! are counted: the fruit itself, where it was seen again, at the distance that the noise gives; and its companions,
@@ -6,33 +6,29 @@
 //!
 //! `H(d) = u (p f(d; sigma) + b g(d))`, f Maxwell's distribution, g the companions of a fruit, u the fruits that the
 //! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
-//! true one where fruits crowd, so that the noise comes out small and the share large.
+//! true one where fruits crowd, so that the noise comes out small.
 
+use super::hypothesis::SHARES;
 use super::landscape::Landscape;
 use super::nearest::{SHARE_OF_ROWS, single};
+use super::pairing::Laid;
 use super::placement::Landing;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What is known of the noise beforehand, metres of the map.
+/// What is known of the noise beforehand.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum KnownNoise {
-    /// By the spacing, within a factor of two.
-    Guess(f64),
-    /// By the outline, within a third.
-    Outlined(f64),
-    /// By the caller, within a tenth; sag that is not followed adds to it.
-    Given(f64),
+pub(super) struct KnownNoise {
+    /// Metres of the map.
+    pub(super) sigma: f64,
+    /// Standard deviation of its logarithm.
+    pub(super) width: f64,
 }
 
-/// Noise and share of one overlap.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Scatter {
-    /// Standard deviation per axis of the distance to the partner, metres of the map.
-    pub(crate) sigma: f64,
-    /// Probability that a fruit which the map could have shown is there.
-    pub(crate) share: f64,
-}
+/// Width of a noise that is guessed by the spacing, within a factor of two; and of one that the caller or the outline gives,
+/// within a tenth, for sag that is not followed adds to it.
+pub(super) const GUESSED: f64 = 0.7;
+pub(super) const GIVEN: f64 = 0.1;
 
 /// Counts by distance: across the visits, and what companions alone would give.
 struct Counts {
@@ -47,11 +43,6 @@ const BINS: usize = 30;
 /// Width of a bin in spacings: 1.1 cm in an orchard; counted up to 1.25 spacings.
 const BIN: f64 = 1.0 / 24.0;
 
-/// Standard deviations of the logarithm of the noise before the counts speak.
-const GUESSED: f64 = 0.7;
-const OUTLINED: f64 = 0.15;
-const GIVEN: f64 = 0.1;
-
 /// Companions are as dense across the visits as within, as if this many had been counted so.
 const STEADY: f64 = 200.0;
 
@@ -63,37 +54,24 @@ const STEP: f64 = 1.085;
 /// Rounds of expectation and maximisation of the share.
 const ROUNDS: usize = 20;
 
-/// Noise and share under the predictions.
-pub(crate) fn scatter(
-    query: &Landscape,
-    map: &Landscape,
-    predictions: &[Option<Landing>],
-    scale: f64,
-    expected: KnownNoise,
-) -> Scatter {
-    let counts = Counts::new(query, map, predictions, scale);
-    let (expected, width) = match expected {
-        KnownNoise::Guess(sigma) => (sigma, GUESSED),
-        KnownNoise::Outlined(sigma) => (sigma, OUTLINED),
-        KnownNoise::Given(sigma) => (sigma, GIVEN),
-    };
-    let finest = FINEST * map.spacing;
-    let tried: Vec<(f64, f64, f64)> = (0..STEPS)
+/// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
+pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
+    let counts = Counts::new(laid);
+    let finest = FINEST * laid.map.spacing;
+    let tried: Vec<(f64, f64)> = (0..STEPS)
         .map(|step| {
             let sigma = finest * STEP.powi(step as i32);
-            let (likelihood, share) = counts.fitted(sigma);
-            (likelihood - 0.5 * ((sigma / expected).ln() / width).powi(2), sigma, share)
+            (counts.likelihood(sigma) - 0.5 * ((sigma / expected.sigma).ln() / expected.width).powi(2), sigma)
         })
         .collect();
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, tried| best.max(tried.0));
-    let (mut total, mut logarithm, mut share) = (0.0, 0.0, 0.0);
-    for (likelihood, sigma, fitted) in tried {
+    let (mut total, mut logarithm) = (0.0, 0.0);
+    for (likelihood, sigma) in tried {
         let weight = (likelihood - best).exp();
         total += weight;
         logarithm += weight * sigma.ln();
-        share += weight * fitted;
     }
-    Scatter { sigma: (logarithm / total).exp(), share: share / total }
+    (logarithm / total).exp()
 }
 
 /// What some of the fruits count.
@@ -123,7 +101,7 @@ impl Part {
 }
 
 impl Counts {
-    fn new(query: &Landscape, map: &Landscape, predictions: &[Option<Landing>], scale: f64) -> Self {
+    fn new(&Laid { query, map, predictions, pose }: &Laid) -> Self {
         let bin = BIN * map.spacing;
         let met: Vec<AtomicBool> = (0..map.len()).map(|_| AtomicBool::new(false)).collect();
         let here = in_parts(query.len(), |row, part| {
@@ -134,7 +112,7 @@ impl Counts {
                 met[partner as usize].store(true, Ordering::Relaxed);
                 add(&mut part.across, f64::from(d2).sqrt() / bin);
             });
-            count_companions(query, row, scale / bin, &mut part.own);
+            count_companions(query, row, pose.scale / bin, &mut part.own);
         });
         let there = in_parts(map.len(), |row, part| {
             if met[row].load(Ordering::Relaxed) {
@@ -149,8 +127,8 @@ impl Counts {
         Self { bin, across: here.across, companions, due: here.due }
     }
 
-    /// Log-likelihood of the counts under the noise, and the share that suits it.
-    fn fitted(&self, sigma: f64) -> (f64, f64) {
+    /// Log-likelihood of the counts under the noise, with the share that suits it.
+    fn likelihood(&self, sigma: f64) -> f64 {
         let cumulative: Vec<f64> = (0..=BINS).map(|i| maxwell(i as f64 * self.bin / sigma)).collect();
         let found: Vec<f64> = cumulative.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let companions: f64 = self.companions.iter().sum();
@@ -165,7 +143,7 @@ impl Counts {
             share = (own + 1.0) / (self.due + 2.0);
             density = (other + STEADY) / (companions + STEADY);
         }
-        let share = share.clamp(0.05, 0.97);
+        let share = share.clamp(SHARES.0, SHARES.1);
         let likelihood: f64 = self
             .across
             .iter()
@@ -177,7 +155,7 @@ impl Counts {
             })
             .sum();
         let prior = share.ln() + (1.0 - share).ln() + STEADY * (density.ln() - density);
-        (likelihood + prior, share)
+        likelihood + prior
     }
 }
 
@@ -224,18 +202,19 @@ fn erf(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::verified::fixture::visits;
+    use crate::verified::placement::Placement;
     use nalgebra::Vector3;
 
     #[test]
-    fn noise_and_share_are_told_where_the_nearest_is_often_a_stranger() {
+    fn noise_is_told_where_the_nearest_is_often_a_stranger() {
         for sigma in [0.01, 0.02, 0.04] {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
             let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
             let predictions: Vec<_> = query.points.iter().map(place).collect();
-            let found = scatter(&query, &map, &predictions, 1.0, KnownNoise::Guess(0.02));
-            assert!((found.sigma / sigma - 1.0).abs() < 0.12, "{} for {sigma}", found.sigma);
-            assert!((found.share - 0.6).abs() < 0.08, "{} at {sigma}", found.share);
+            let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Placement::identity() };
+            let found = scatter(&laid, KnownNoise { sigma: 0.02, width: GUESSED });
+            assert!((found / sigma - 1.0).abs() < 0.12, "{found} for {sigma}");
         }
     }
 

@@ -1,14 +1,16 @@
 //! From seeds to hypotheses: rounds of query seeds, their candidates in the map, the best of them refined.
 
-use super::hypothesis::{Hypothesis, Model, Scratch, refine};
+use super::case::Search;
+use super::hypothesis::{Hypothesis, Refiner};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::proposal::Proposer;
-use super::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, SeedIndex, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, canonical, near_ties, shuffled, without_scale};
 use super::vertical::Stands;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::ops::Add;
 
 /// A seed of the query laid on a seed of the map.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +43,7 @@ pub(crate) struct Effort {
     pub(crate) stands: Stands,
 }
 
-impl std::ops::Add for Effort {
+impl Add for Effort {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self {
@@ -64,79 +66,88 @@ fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
     let key = shuffled(u64::from(row));
     // A stride that shares no factor with the count walks through all of them.
     let stride = [37, 31, 29, 23, 19, 17, 13, 11, 7, 1].into_iter().find(|s| !count.is_multiple_of(*s)).unwrap_or(1);
-    let [a, b, c] = unrank((key % count + turn * stride) % count);
-    let pick = |i: u64| near[i as usize];
-    canonical(&query.points, [row, pick(a), pick(b), pick(c)])
+    let mut triples = (0..n).flat_map(|c| (0..c).flat_map(move |b| (0..b).map(move |a| [a, b, c])));
+    let [a, b, c] = triples.nth(((key % count + turn * stride) % count) as usize)?.map(|i| near[i as usize]);
+    canonical(&query.points, [row, a, b, c])
 }
 
-/// The `rank`-th triple a < b < c in colexicographic order.
-fn unrank(rank: u64) -> [u64; 3] {
-    let mut c = 2;
-    while (c + 1) * c * (c - 1) / 6 <= rank {
-        c += 1;
-    }
-    let rest = rank - c * (c - 1) * (c - 2) / 6;
-    let mut b = 1;
-    while (b + 1) * b / 2 <= rest {
-        b += 1;
-    }
-    [rest - b * (b - 1) / 2, b, c]
-}
-
-/// Candidates of one seed of the query that survive the fit and the first look.
-fn candidates_of(
-    query: &Landscape,
-    map: &Landscape,
-    index: &SeedIndex,
-    model: &Model,
-    seed: Seed,
-    found: &mut Vec<Contender>,
-) -> Effort {
-    let mut effort = Effort::default();
-    let length = f64::from(seed.1[0]);
-    // Noise in the metres of the query: with the scale unknown, the same share of the spacing.
-    let sigma = match model.scale {
-        Scale::Metric => model.sigma,
-        Scale::Free => model.sigma / map.spacing * query.spacing,
-    };
-    if length < SHORTEST * sigma {
-        return effort;
-    }
-    // Standard deviations that the two seeds may differ by.
-    let apart = match model.scale {
-        Scale::Metric => RADIUS * (length / (LONG * sigma)).clamp(1.0, WIDEST),
-        Scale::Free => RADIUS,
-    };
-    let (mut runs, mut hits) = (Vec::new(), Vec::new());
-    near_ties(&query.points, seed.0, NEAR_TIE * sigma, &mut |quad, code| {
-        effort.codes += 1;
-        let (code, radius) = match model.scale {
-            Scale::Metric => (code, apart * sigma),
-            Scale::Free => (without_scale(&code), apart * sigma / length),
+impl Search<'_> {
+    /// One round: candidates of all `seeds`, the best `keep` of them refined, and the other candidates in order.
+    pub(super) fn round(&self, seeds: &[Seed], keep: usize) -> (Vec<Hypothesis>, Vec<Contender>, Effort) {
+        let in_part = |seeds: &[Seed]| {
+            let mut found = Vec::new();
+            let efforts = seeds.iter().map(|&seed| self.candidates_of(seed, &mut found));
+            let effort = efforts.fold(Effort::default(), Effort::add);
+            (found, effort)
         };
-        hits.clear();
-        index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
-        effort.candidates += hits.len() as u64;
-        if hits.len() > COMMON {
-            return; // a shape that every cluster shows says nothing about the place
+        let parts: Vec<(Vec<Contender>, Effort)> = seeds.par_chunks(SHARE_OF_SEEDS).map(in_part).collect();
+        let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
+        let mut candidates: Vec<Contender> = parts.into_iter().flat_map(|part| part.0).collect();
+        candidates.sort_unstable_by(by_evidence);
+        let best = distinct(self.query, self.map.spacing, &mut candidates, keep);
+        (self.refined(&best), candidates, effort)
+    }
+
+    /// Candidates of one seed of the query that survive the fit and the first look.
+    fn candidates_of(&self, seed: Seed, found: &mut Vec<Contender>) -> Effort {
+        let Self { query, map, seeds: index, model, .. } = *self;
+        let mut effort = Effort::default();
+        let length = f64::from(seed.1[0]);
+        // Noise in the metres of the query: with the scale unknown, the same share of the spacing.
+        let sigma = match model.scale {
+            Scale::Metric => model.sigma,
+            Scale::Free => model.sigma / map.spacing * query.spacing,
+        };
+        if length < SHORTEST * sigma {
+            return effort;
         }
-        let Some(proposer) = Proposer::new(query, map, model, quad) else { return };
-        for &hit in &hits {
-            let target = &index.quads[hit as usize];
-            let Some((pose, residual)) = proposer.fit(target) else { continue };
-            if residual > 2.0 * (apart * model.sigma).powi(2) {
-                continue;
+        // Standard deviations that the two seeds may differ by.
+        let apart = match model.scale {
+            Scale::Metric => RADIUS * (length / (LONG * sigma)).clamp(1.0, WIDEST),
+            Scale::Free => RADIUS,
+        };
+        let (mut runs, mut hits) = (Vec::new(), Vec::new());
+        near_ties(&query.points, seed.0, NEAR_TIE * sigma, &mut |quad, code| {
+            effort.codes += 1;
+            let (code, radius) = match model.scale {
+                Scale::Metric => (code, apart * sigma),
+                Scale::Free => (without_scale(&code), apart * sigma / length),
+            };
+            hits.clear();
+            index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
+            effort.candidates += hits.len() as u64;
+            if hits.len() > COMMON {
+                return; // a shape that every cluster shows says nothing about the place
             }
-            effort.stands = effort.stands + proposer.stand(&pose);
-            let Some(pose) = proposer.upright(pose) else { continue };
-            effort.fitted += 1;
-            let log_odds = proposer.first_look(&pose);
-            if log_odds > 0.0 {
-                found.push(Contender { pose, log_odds, place: proposer.centroid, key: (quad, *target) });
+            let Some(proposer) = Proposer::new(query, map, &model, quad) else { return };
+            for &hit in &hits {
+                let target = &index.quads[hit as usize];
+                let Some((pose, residual)) = proposer.fit(target) else { continue };
+                if residual > 2.0 * (apart * model.sigma).powi(2) {
+                    continue;
+                }
+                effort.stands = effort.stands + proposer.stand(&pose);
+                let Some(pose) = proposer.upright(pose) else { continue };
+                effort.fitted += 1;
+                let log_odds = proposer.first_look(&pose);
+                if log_odds > 0.0 {
+                    found.push(Contender { pose, log_odds, place: proposer.centroid, key: (quad, *target) });
+                }
             }
-        }
-    });
-    effort
+        });
+        effort
+    }
+
+    /// Candidates refined around their places, most evidence first.
+    pub(super) fn refined(&self, candidates: &[Contender]) -> Vec<Hypothesis> {
+        let reach = REACH * self.query.spacing;
+        let refiner = || Refiner::new(self.query, self.map, &self.model);
+        let refined = |refiner: &mut Refiner, one: &Contender| refiner.refine(&one.pose, &one.place, reach);
+        let candidates = candidates.par_iter().with_min_len(SHARE_OF_CANDIDATES);
+        let mut hypotheses: Vec<Hypothesis> = candidates.map_init(refiner, refined).flatten_iter().collect();
+        hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+        hypotheses
+    }
 }
 
 /// Reach of the code search in standard deviations of one axis.
@@ -161,33 +172,6 @@ pub(crate) fn of_some_fruits(query: &Landscape, stride: u64, turns: std::ops::Ra
         .filter(|&row| shuffled(u64::from(row)).is_multiple_of(stride))
         .flat_map(|row| turns.clone().filter_map(move |turn| seed_of(query, row, turn)))
         .collect()
-}
-
-/// One round: candidates of all `seeds`, the best `keep` of them refined, and the other candidates in order.
-pub(crate) fn round(
-    query: &Landscape,
-    map: &Landscape,
-    index: &SeedIndex,
-    model: &Model,
-    seeds: &[Seed],
-    (keep, starts): (usize, Starts),
-) -> (Vec<Hypothesis>, Vec<Contender>, Effort) {
-    let parts: Vec<(Vec<Contender>, Effort)> = seeds
-        .par_chunks(SHARE_OF_SEEDS)
-        .map(|seeds| {
-            let mut found = Vec::new();
-            let mut effort = Effort::default();
-            for &seed in seeds {
-                effort = effort + candidates_of(query, map, index, model, seed, &mut found);
-            }
-            (found, effort)
-        })
-        .collect();
-    let effort = parts.iter().fold(Effort::default(), |sum, part| sum + part.1);
-    let mut candidates: Vec<Contender> = parts.into_iter().flat_map(|part| part.0).collect();
-    candidates.sort_unstable_by(by_evidence);
-    let best = distinct(query, map.spacing, &mut candidates, keep);
-    (refined(query, map, &best, model, starts), candidates, effort)
 }
 
 /// Seeds that are worth a thread of their own.
@@ -223,104 +207,8 @@ pub(super) fn distinct(
 pub(super) const SAME_PLACE: f64 = 0.4;
 const SAME_TURN_RAD: f64 = 0.15;
 
-/// Where the refinement of a candidate starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Starts {
-    /// From its pose alone.
-    Straight,
-    /// From its pose, and turned by [`TURNS`] on the fruits next to the seed.
-    Turned,
-}
-
-/// Turns about each axis that a refinement tries, radians.
-///
-/// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet
-/// their neighbours' partners, and the refinement can stay there.
-pub(super) const TURNS: [f64; 2] = [-0.2, 0.2];
-
-/// Share of the reach on which turned starts are compared.
-const NEAR: f64 = 0.75;
-
-/// Candidates refined around their places, most evidence first.
-pub(crate) fn refined(
-    query: &Landscape,
-    map: &Landscape,
-    candidates: &[Contender],
-    model: &Model,
-    starts: Starts,
-) -> Vec<Hypothesis> {
-    let mut hypotheses: Vec<Hypothesis> = candidates
-        .par_chunks(8)
-        .map_init(Scratch::default, |scratch, part| {
-            part.iter().filter_map(|one| refine_from(starts, query, map, one, model, scratch)).collect::<Vec<_>>()
-        })
-        .flatten_iter()
-        .collect();
-    hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-    hypotheses
-}
-
-fn refine_from(
-    starts: Starts,
-    query: &Landscape,
-    map: &Landscape,
-    Contender { pose, place, .. }: &Contender,
-    model: &Model,
-    scratch: &mut Scratch,
-) -> Option<Hypothesis> {
-    let more = |a: &Hypothesis, b: &Hypothesis| a.log_odds.total_cmp(&b.log_odds);
-    let reach = REACH * query.spacing;
-    let mut from = |start: &Placement, reach: f64| refine(query, map, start, place, reach, model, scratch);
-    let straight = from(pose, reach);
-    if starts == Starts::Straight {
-        return straight;
-    }
-    let near = std::iter::once(*pose).chain(pose.turned_by_each(place, &TURNS));
-    let best = near.filter_map(|start| from(&start, NEAR * reach)).max_by(more);
-    let turned = best.and_then(|best| from(&best.pose, reach));
-    straight.into_iter().chain(turned).max_by(more)
-}
+/// Candidates that are worth a thread of their own.
+const SHARE_OF_CANDIDATES: usize = 8;
 
 /// Radius of the region that weighs a refined hypothesis, in spacings.
 pub(crate) const REACH: f64 = 3.5;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::verified::fixture::{Dice, visits};
-    use nalgebra::Rotation3;
-
-    #[test]
-    fn ranks_walk_through_all_triples_once() {
-        let mut triples: Vec<[u64; 3]> = (0..120).map(unrank).collect();
-        assert!(triples.iter().all(|t| t[0] < t[1] && t[1] < t[2] && t[2] < 10));
-        triples.sort_unstable();
-        triples.dedup();
-        assert_eq!(triples.len(), 120);
-    }
-
-    #[test]
-    fn turned_starts_reach_the_true_pose_from_fifteen_degrees() {
-        let (query, map) = visits(0.02);
-        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: 0.6, scale: Scale::Metric, vertical: None };
-        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
-        let mut dice = Dice(11);
-        let (mut straight_reached, mut turned_reached) = (0, 0);
-        for i in 0..20 {
-            let place = query.points[i * query.len() / 20];
-            let pose = truth.turned(&place, &Rotation3::new(dice.normal().normalize() * 0.26));
-            let candidate = Contender { pose, log_odds: 0.0, place, key: ([0; 4], [0; 4]) };
-            let [straight, turned] = [Starts::Straight, Starts::Turned]
-                .map(|starts| refined(&query, &map, &[candidate], &model, starts).pop());
-            let reached =
-                |one: &Option<Hypothesis>| one.is_some_and(|one| one.pose.turn_to(&truth) < 5f64.to_radians());
-            straight_reached += u32::from(reached(&straight));
-            turned_reached += u32::from(reached(&turned));
-            let evidence = |one: Option<Hypothesis>| one.map_or(f64::NEG_INFINITY, |one| one.log_odds);
-            assert!(evidence(turned) >= evidence(straight));
-        }
-        assert!(turned_reached >= 17, "{turned_reached} of 20");
-        assert!(turned_reached > straight_reached, "{straight_reached} without turning");
-    }
-}

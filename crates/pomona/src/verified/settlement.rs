@@ -5,50 +5,39 @@
 //! settled once more, in turns:
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
-//! 2. The noise and a first share seen again come from distances, nobody said to be who ([`super::scatter`]).
+//! 2. The noise comes from distances, nobody said to be who ([`super::scatter`]).
 //! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn.
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
 use super::cut::{Cell, Cut, key_of, surroundings, total};
-use super::displacement::{carried_on, shared_by_neighbours, told_by_neighbours};
+use super::displacement::{carried_on, shared_by_neighbours};
 use super::evidence::evidence;
 use super::growth::{Growth, Partner};
-use super::hypothesis::Model;
+use super::hypothesis::{DETECTION, Model, SHARES};
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
 use super::overlap::Overlap;
-use super::pairing::Marginals;
+use super::pairing::{Laid, Marginals};
 use super::patches::{Footing, HOLD, SHARE_OF_CELLS, next_to};
-use super::placement::Landing;
-use super::placement::{Moments, Placement};
-use super::scatter::{KnownNoise, scatter};
+use super::placement::{Landing, Moments, Placement};
+use super::scatter::{GIVEN, GUESSED, KnownNoise, scatter};
 use super::sight::is_among;
 use super::size::{Cue, Diameters};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Turns: the noise stands after the first, the patches after the second.
-const TURNS: usize = 3;
+/// Turns: the noise stands after the first, the patches after the second; then what a branch shows near its stem leads on to
+/// its tip, a few fruits a turn.
+const TURNS: usize = 4;
 
-/// The same where neighbours move together: what a branch shows near its stem leads on to its tip, a few fruits a turn.
-const MOST_TURNS: usize = 8;
-
-/// Pairs that hold a patch to its surroundings where neighbours do not differ from them together, and at the least.
-const HOLDS: (f64, f64) = (0.5, 50.0);
-
-/// The same for the surroundings and the common pose.
-const WIDE_HOLDS: (f64, f64) = (0.5, 1000.0);
+/// Pairs that hold a patch to its surroundings, and these to the common pose, at the least; and where neighbours do not
+/// differ from them together.
+const HOLDS: (f64, f64) = (0.5, 1000.0);
 
 /// A prediction loses at most this share of its fit when its own partner is left out.
 const MAX_LEVERAGE: f64 = 0.8;
-
-/// Fruits with less probability of any partner say nothing to the fit.
-const LEAST_WEIGHT: f64 = 1e-3;
-
-/// Least and largest share of fruits seen again that is believed.
-const SHARES: (f64, f64) = (0.05, 0.97);
 
 /// The overlap as it stands in the end.
 pub(crate) struct Settled {
@@ -73,9 +62,8 @@ struct Settlement<'a> {
     pose: Placement,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     sigma: f64,
-    /// Probability that a fruit which the map could have shown is there: by the distances, then by the pairs.
+    /// Probability that a fruit which the map could have shown is there, as the pairs show it.
     share: f64,
-    counted: bool,
     /// Pairs that hold the patches, and their surroundings.
     holds: [f64; 2],
     /// Variance that neighbours' residuals about the patches share, square metres.
@@ -89,21 +77,13 @@ struct Settlement<'a> {
 /// Settles what `growth` found; `noise_m` is the relative noise where it is known.
 pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diameters>) -> Settled {
     let mut settlement = Settlement::new(growth, noise_m);
-    let mut cue = None;
-    for turn in 0..MOST_TURNS {
-        if turn >= TURNS && settlement.shared <= 0.0 {
-            break;
-        }
-        settlement.predict();
-        settlement.measure();
-        let marginals = settlement.marginals(cue.as_ref());
-        cue = sizes.and_then(|sizes| sizes.cue(marginals.links()));
+    let mut marginals = settlement.paired(None);
+    for _ in 0..TURNS {
+        let cue = sizes.and_then(|sizes| sizes.cue(marginals.links()));
         settlement.recount(&marginals);
         settlement.refit(&marginals);
+        marginals = settlement.paired(cue.as_ref());
     }
-    settlement.predict();
-    settlement.measure();
-    let marginals = settlement.marginals(cue.as_ref());
     let evidence = settlement.evidence();
     let overlap = Overlap {
         pose: settlement.pose,
@@ -116,36 +96,32 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diame
 
 impl<'a> Settlement<'a> {
     fn new(growth: &'a Growth, noise_m: Option<f64>) -> Self {
-        let mut cells = growth.cells.clone();
-        for (i, cell) in cells.iter_mut().enumerate() {
-            if !growth.convincing(i) {
-                cell.reached = false;
-                cell.moments = Moments::default();
-            }
-        }
         let target = |partner: &Partner| (growth.map.points[partner.row as usize], partner.weight);
         Self {
             query: growth.query,
             map: growth.map,
             model: growth.model,
             expected: match noise_m {
-                Some(noise_m) => KnownNoise::Given(noise_m),
-                None if growth.whole => KnownNoise::Outlined(growth.sigma),
-                None => KnownNoise::Guess(growth.model.sigma),
+                Some(sigma) => KnownNoise { sigma, width: GIVEN },
+                None if growth.whole => KnownNoise { sigma: growth.sigma, width: GIVEN },
+                None => KnownNoise { sigma: growth.model.sigma, width: GUESSED },
             },
-            cells,
+            cells: growth.cells.clone(),
             cut: growth.cut,
             edge: growth.edge,
             pose: growth.pose,
             sigma: growth.sigma,
-            share: 0.5,
-            counted: false,
+            share: DETECTION,
             holds: [HOLD; 2],
             shared: growth.shared,
             targets: growth.partners.iter().map(|partner| partner.as_ref().map(target)).collect(),
             predictions: vec![None; growth.query.len()],
             unseen: growth.unseen.each_ref().map(Vec::as_slice),
         }
+    }
+
+    fn laid(&self) -> Laid<'_> {
+        Laid { query: self.query, map: self.map, predictions: &self.predictions, pose: &self.pose }
     }
 
     /// From the mean partner to where the patch puts the fruit.
@@ -188,27 +164,24 @@ impl<'a> Settlement<'a> {
             let leverage = (weight * looseness).min(MAX_LEVERAGE);
             place -= residual * (leverage / (1.0 - leverage));
         }
-        Landing { place, variance: noise * (1.0 + looseness) + wide.bent(&p, self.edge) + unexplained }
+        Landing { place, variance: noise * (1.0 + looseness) + unexplained }
     }
 
-    /// Noise and share from the distances; the predictions' variances follow.
+    /// Noise from the distances; the predictions' variances follow.
     fn measure(&mut self) {
-        let found = scatter(self.query, self.map, &self.predictions, self.pose.scale, self.expected);
-        if !self.counted {
-            self.share = found.share;
-        }
+        let found = scatter(&self.laid(), self.expected);
         let both = self.predictions.iter().zip(&self.targets);
         let (sum, weights) = both
             .filter_map(|(prediction, target)| Some((prediction.as_ref()?.variance, (*target)?.1)))
             .fold((0.0, 0.0), |sum, (variance, weight)| (sum.0 + weight * variance, sum.1 + weight));
         if weights > 0.0 {
-            let stretch = found.sigma * found.sigma * weights / sum;
+            let stretch = found * found * weights / sum;
             self.sigma *= stretch.sqrt();
             self.predictions.iter_mut().flatten().for_each(|prediction| prediction.variance *= stretch);
         }
     }
 
-    /// The share as the pairs show it: a step of expectation and maximisation a turn, from what the distances say.
+    /// The share as the pairs show it: a step of expectation and maximisation a turn.
     ///
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
@@ -216,12 +189,14 @@ impl<'a> Settlement<'a> {
         let due: f64 = self.predictions.iter().flatten().map(|at| self.map.support(&at.place)).sum();
         let found: f64 = marginals.links().map(|link| link.probability).sum();
         self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
-        self.counted = true;
     }
 
-    fn marginals(&self, cue: Option<&Cue>) -> Marginals {
+    /// Predictions, noise and pairs under the poses as they are fitted now.
+    fn paired(&mut self, cue: Option<&Cue>) -> Marginals {
+        self.predict();
+        self.measure();
         let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
-        Marginals::new(self.query, self.map, &self.predictions, &self.pose, self.share, &size)
+        Marginals::new(&self.laid(), self.share, &size)
     }
 
     /// What the overlap says for the pose, nats.
@@ -235,7 +210,7 @@ impl<'a> Settlement<'a> {
             if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support(&place) } else { 0.0 }
         };
         let there: Vec<f64> = self.map.points.iter().enumerate().map(support).collect();
-        evidence(self.query, self.map, &self.predictions, &self.pose, &there)
+        evidence(&self.laid(), &there)
     }
 
     /// Common pose, surroundings and patches from the mean partners.
@@ -244,11 +219,11 @@ impl<'a> Settlement<'a> {
         let all = total(self.cells.iter().map(|cell| (&cell.moments, 1.0)));
         self.pose = self.model.step(&all, &self.pose, self.sigma).unwrap_or(self.pose);
         self.cells.iter_mut().for_each(|cell| cell.pose = self.pose);
-        self.holds[1] = self.hold(WIDE_HOLDS);
+        self.holds[1] = self.hold();
         self.fit(surroundings, self.holds[1]);
-        self.holds[0] = self.hold(HOLDS);
+        self.holds[0] = self.hold();
         self.fit(next_to, self.holds[0]);
-        self.shared = told_by_neighbours(self.query, self.sigma, |row| self.residual(row));
+        self.shared = self.shared();
     }
 
     /// Mean partners by the probabilities, and their sums in every cell.
@@ -259,7 +234,7 @@ impl<'a> Settlement<'a> {
             sum.0 += self.map.points[link.map as usize] * link.probability;
             sum.1 += link.probability;
         }
-        let mean = |(sum, weight): (Vector3<f64>, f64)| (weight > LEAST_WEIGHT).then(|| (sum / weight, weight));
+        let mean = |(sum, weight): (Vector3<f64>, f64)| (weight > 0.0).then(|| (sum / weight, weight));
         self.targets = sums.into_iter().map(mean).collect();
         let (query, targets) = (self.query, &self.targets);
         for cell in self.cells.iter_mut().filter(|cell| cell.reached) {
@@ -274,9 +249,13 @@ impl<'a> Settlement<'a> {
 
     /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that
     /// together.
-    fn hold(&self, (least, most): (f64, f64)) -> f64 {
-        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
-        (self.sigma * self.sigma / shared.max(f64::MIN_POSITIVE)).clamp(least, most)
+    fn hold(&self) -> f64 {
+        (self.sigma * self.sigma / self.shared().max(f64::MIN_POSITIVE)).clamp(HOLDS.0, HOLDS.1)
+    }
+
+    /// Variance that neighbours' residuals about the cells' poses share, square metres.
+    fn shared(&self) -> f64 {
+        shared_by_neighbours(self.query, self.sigma, |row| self.residual(row))
     }
 
     /// Fits every cell's pose to the pairs around it, held to the pose that it has.
