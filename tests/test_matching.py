@@ -102,6 +102,16 @@ def test_a_branch_that_sank_is_followed_to_its_tip() -> None:
     assert np.mean([score.recall for score in scores]) > 0.842
 
 
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_a_noise_that_is_told_wrongly_costs_hardly_anything(factor: float) -> None:
+    pair = scene_pair("part45", 0)
+    told = [pomona.match(pair.query, pair.map, noise_m=noise_m) for noise_m in (None, factor * pair.noise_m)]
+    alone, wrong = (score_pairs(one.pairs.tolist(), pair.query.ids or (), pair.map.ids or ()) for one in told)
+    assert wrong.recall > alone.recall - 0.03
+    assert wrong.precision > alone.precision - 0.03
+    assert told[1].noise_m == pytest.approx(told[0].noise_m, rel=0.15)
+
+
 def test_a_dozen_fruits_are_found_as_often_as_they_can_be_told() -> None:
     """Few fruits lie flat by chance; so do the best wrong poses, which share fruits with the right one."""
     answered = 0
