@@ -251,14 +251,82 @@ def test_odometry_ties_a_frame_that_saw_nothing() -> None:
     for row, cloud in enumerate(clouds):
         if row == 5:  # of which odometry tells where the blind frame was: the two parts are one
             assert slam.parts.tolist() == [0, 0, 0, 0, 1]
-            slam.add(cloud, np.linalg.inv(true[4]) @ true[5], sure)
+            assert slam.add(cloud, np.linalg.inv(true[4]) @ true[5], sure).closed
             assert slam.parts.tolist() == [0] * 6
         else:
             slam.add(cloud)
     blind = np.linalg.inv(slam.way().session_from_camera[4]) @ np.linalg.inv(true[0]) @ true[4]
     assert np.linalg.norm(blind[:3, 3]) < 0.03
-    with pytest.raises(PomonaError, match=r"found shapes \(4, 4\) and none, expected \(4, 4\) and \(6, 6\)"):
-        slam.add(clouds[0], np.eye(4))
+
+
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_wheels_that_slipped_are_outvoted_if_they_are_doubtful(doubtful: bool) -> None:
+    rng = np.random.default_rng(3)
+    fruits = drawn_row(rng, 2.5)
+    true = wobbling(rng, [facing(0.2 * step) for step in range(10)])
+    slam, sure = FruitSlam(threads=1), np.diag([1e5] * 3 + [2.5e5] * 3)  # 3 mm, 2 mrad
+    slam.add(seen(rng, fruits, true[0]))
+    for row in range(1, 10):
+        moved = np.linalg.inv(true[row - 1]) @ true[row]
+        moved[0, 3] += 0.5 if row == 5 else 0.0
+        slam.add(seen(rng, fruits, true[row]), moved, sure, doubtful=doubtful)
+    off_m = np.linalg.norm((slam.way().session_from_camera - np.linalg.inv(true[0]) @ true)[:, :3, 3], axis=1)
+    assert (off_m.max() < 0.03) == doubtful
+
+
+NAN, MIRROR = np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("moved", "information", "complaint"),
+    [
+        (np.eye(4), None, "found one of them, expected both or none"),
+        (NAN, np.eye(6), "moved: found a matrix that does not turn and move"),
+        (MIRROR, np.eye(6), "moved: found a matrix that does not turn and move"),
+        (np.eye(4) + 1j, np.eye(6), "moved: expected an array of float64"),
+        (np.eye(3), np.eye(6), r"moved: found shape \(3, 3\), expected \(4, 4\)"),
+        (np.eye(4), np.zeros((6, 6)), "information: found a matrix that is not symmetric positive definite"),
+        (np.eye(4), -np.eye(6), "information: found a matrix that is not symmetric positive definite"),
+        (np.eye(4), np.triu(np.ones((6, 6))) + np.eye(6), "information: found a matrix that is not symmetric"),
+        (np.eye(4), np.full((6, 6), np.inf), "information: found a matrix that is not symmetric positive definite"),
+    ],
+)
+def test_a_motion_that_is_none_leaves_a_way_as_it_was(
+    moved: np.ndarray, information: np.ndarray | None, complaint: str
+) -> None:
+    rng = np.random.default_rng(9)
+    fruits = drawn_row(rng, 2.5)
+    clouds = [seen(rng, fruits, facing(0.2 * step)) for step in range(3)]
+    slam = FruitSlam(threads=1)
+    for row, cloud in enumerate(clouds):
+        with pytest.raises(PomonaError, match=complaint):
+            slam.add(cloud, moved, information)
+        assert len(slam) == row
+        slam.add(cloud)
+    at_once = way_by_fruits((cloud for cloud in clouds), threads=1)
+    assert np.array_equal(slam.way().session_from_camera, at_once.session_from_camera)
+
+
+def test_wrong_frames_of_motions_and_anchors_are_told() -> None:
+    rng = np.random.default_rng(9)
+    fruits = drawn_row(rng, 2.5)
+    clouds = [seen(rng, fruits, facing(0.2 * step)) for step in range(3)]
+    for first, second in ((0, 3), (-1, 1), (1, 1)):
+        motion = Motions(np.array([first]), np.array([second]), np.eye(4)[None], np.eye(6)[None])
+        with pytest.raises(PomonaError, match=rf"row 0: found frames {first} and {second}, expected two of 0 to 2"):
+            way_by_fruits(clouds, motion)
+    with pytest.raises(PomonaError, match=r"motions.information: found shape \(2, 6, 6\), expected \(1, 6, 6\)"):
+        way_by_fruits(clouds, Motions(np.array([0]), np.array([1]), np.eye(4)[None], np.tile(np.eye(6), (2, 1, 1))))
+    for row in (3, -1):
+        anchors = Anchors.of_places(np.array([row]), np.zeros((1, 3)), np.eye(3)[None])
+        with pytest.raises(PomonaError, match=f"anchors: found frame {row}, expected one of 0 to 2"):
+            way_by_fruits(clouds, anchors=anchors)
+    with pytest.raises(PomonaError, match=r"anchors.covariances: row 0: found a matrix that is not symmetric positive"):
+        Anchors.of_places(np.array([0]), np.zeros((1, 3)), -np.eye(3)[None])
+    with pytest.raises(PomonaError, match="clouds: found ndarray, expected a FruitCloud of each frame"):
+        way_by_fruits([np.eye(3)])
+    with pytest.raises(PomonaError, match="clouds: found NoneType, expected a FruitCloud of each frame"):
+        FruitSlam().add(None)
 
 
 def log_all(poses: np.ndarray) -> np.ndarray:
@@ -327,8 +395,10 @@ def test_verticals_alone_level_a_way() -> None:
 
 
 def test_anchors_of_a_wrong_shape_are_told() -> None:
-    with pytest.raises(PomonaError, match="anchors: found shapes"):
-        Anchors.of_places(np.arange(2), np.zeros((3, 3)), np.zeros((2, 3, 3)))
+    with pytest.raises(PomonaError, match="anchors: found 3 positions and 0 verticals, expected 2 and 0"):
+        Anchors.of_places(np.arange(2), np.zeros((3, 3)), np.tile(np.eye(3), (2, 1, 1)))
+    with pytest.raises(PomonaError, match=r"anchors.covariances: found shape \(1, 3, 3\), expected \(2, 3, 3\)"):
+        Anchors.of_places(np.arange(2), np.zeros((2, 3)), np.eye(3)[None])
     with pytest.raises(PomonaError, match="anchors: found a vertical without a direction"):
         Anchors.of_verticals(np.arange(1), np.zeros((1, 3)))
 

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["checked_array"]
+__all__ = ["checked_array", "definite_matrices", "rigid_matrices"]
+
+RIGID = 1e-3
+"""How far a rotation may be from one: its numbers may come from text, or from sums of many motions."""
+
+SYMMETRIC = 1e-6
+"""The same of a symmetric matrix, relative to its largest number."""
 
 
 def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
@@ -28,3 +34,49 @@ def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, .
         found = ", ".join(map(str, array.shape))
         raise PomonaError(f"{name}: found shape ({found}), expected ({wanted})")
     return array
+
+
+def rigid_matrices(name: str, values: Any, shape: tuple[int | None, ...] = (4, 4)) -> NDArray[np.float64]:
+    """Return rigid transforms, (4, 4) or (N, 4, 4).
+
+    Raises
+    ------
+    PomonaError
+        One of them does more than turn and move, or is not finite.
+    """
+    poses: NDArray[np.float64] = checked_array(name, values, np.float64, shape)
+    turns = poses[..., :3, :3]
+    is_rigid = np.isfinite(poses).all(axis=(-2, -1))
+    with np.errstate(all="ignore"):
+        is_rigid &= np.abs(turns @ np.swapaxes(turns, -1, -2) - np.eye(3)).max(axis=(-2, -1)) < RIGID
+        is_rigid &= np.linalg.det(turns) > 0
+        is_rigid &= np.abs(poses[..., 3, :] - (0, 0, 0, 1)).max(axis=-1) < RIGID
+    if not is_rigid.all():
+        raise PomonaError(f"{name}: {_which(is_rigid)}found a matrix that does not turn and move, expected a rigid one")
+    return poses
+
+
+def definite_matrices(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Return symmetric positive definite matrices, (M, M) or (N, M, M).
+
+    Raises
+    ------
+    PomonaError
+        One of them is none, or not finite.
+    """
+    matrices: NDArray[np.float64] = checked_array(name, values, np.float64, shape)
+    is_finite = np.isfinite(matrices).all(axis=(-2, -1))
+    known = np.where(np.isfinite(matrices).all(axis=(-2, -1), keepdims=True), matrices, np.eye(matrices.shape[-1]))
+    largest = np.abs(known).max(axis=(-2, -1), initial=0.0)
+    is_one = is_finite & (
+        np.abs(known - np.swapaxes(known, -1, -2)).max(axis=(-2, -1), initial=0.0) <= SYMMETRIC * largest
+    )
+    is_one &= np.linalg.eigvalsh(known).min(axis=-1, initial=np.inf) > 0
+    if not is_one.all():
+        raise PomonaError(f"{name}: {_which(is_one)}found a matrix that is not symmetric positive definite")
+    return matrices
+
+
+def _which(is_right: Any) -> str:
+    """Name the row of the first that is wrong; of one alone there is none."""
+    return f"row {int(np.argmin(is_right))}: " if np.ndim(is_right) else ""

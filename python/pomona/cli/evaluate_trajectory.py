@@ -83,7 +83,7 @@ def evaluate_trajectory(
     else:
         say(*_as_lines(score))
     n_known = min(score.n_estimate, score.n_truth)
-    if 2 * len(score.true) < n_known:
+    if 2 * len(score.true) <= n_known:
         common = f"only {len(score.true)} of {n_known} times are in both files"
         tell(f"pomona: {common}; --in-order pairs poses line by line")
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
-from pomona.arrays import checked_array
+from pomona.arrays import rigid_matrices
 from pomona.cards import as_card
 from pomona.cloud import Cloud, as_cloud
 from pomona.core_settings import core_settings
@@ -22,9 +22,6 @@ from pomona.matching import Index, Up, Verdict, core_arrays, core_vertical
 from pomona.threads import capped_threads
 
 __all__ = ["Localization", "Localizer"]
-
-RIGID = 1e-3
-"""By how much a rotation that was written with few digits may stretch."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,7 +175,7 @@ class Localizer:
             As in `locate`.
         """
         arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
-        step = None if moved is None else _rigid(moved)
+        step = None if moved is None else rigid_matrices("moved", moved)
         try:
             return self._answer(self._core.update(arrays, previous_from_camera=step, up=vertical))
         except (ValueError, TypeError, OverflowError) as error:
@@ -199,12 +196,3 @@ class Localizer:
             log_odds=found.log_odds,
             tracked=found.tracked,
         )
-
-
-def _rigid(moved: ArrayLike) -> NDArray[np.float64]:
-    step = checked_array("moved", moved, np.float64, (4, 4))
-    is_rigid = np.isfinite(step).all() and np.linalg.det(step[:3, :3]) > 0
-    is_rigid = is_rigid and np.abs(step[:3, :3] @ step[:3, :3].T - np.eye(3)).max() < RIGID
-    if not (is_rigid and np.abs(step[3] - (0, 0, 0, 1)).max() < RIGID):
-        raise PomonaError("moved: found a matrix that does not turn and move, expected a rigid one")
-    return step

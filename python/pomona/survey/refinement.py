@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import _core
+from pomona.arrays import checked_array, definite_matrices, rigid_matrices
 from pomona.errors import PomonaError
 
 __all__ = ["Motions", "Refined", "SeenFruits", "refine"]
@@ -105,6 +106,34 @@ class Motions:
             self.first_from_second[kept],
             self.information[kept],
             self.which_are_doubtful()[kept],
+        )
+
+    def checked(self, n_frames: int) -> Motions:
+        """Give the same as arrays of the right kind, between frames that there are.
+
+        Raises
+        ------
+        PomonaError
+            A row is none of a frame, or that of the same frame twice; a pose is not rigid; an information is not
+            positive definite; or they are not as many.
+        """
+        first, second = (
+            checked_array(f"motions.{name}", getattr(self, name), np.int64, (None,)) for name in ("first", "second")
+        )
+        n = len(first)
+        if len(second) != n:
+            raise PomonaError(f"motions: found {n} first and {len(second)} second frames, expected as many")
+        wrong = (np.minimum(first, second) < 0) | (np.maximum(first, second) >= n_frames) | (first == second)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            found = f"found frames {first[row]} and {second[row]}"
+            raise PomonaError(f"motions: row {row}: {found}, expected two of 0 to {n_frames - 1}")
+        return Motions(
+            first,
+            second,
+            rigid_matrices("motions.first_from_second", self.first_from_second, (n, 4, 4)),
+            definite_matrices("motions.information", self.information, (n, 6, 6)),
+            checked_array("motions.doubtful", self.which_are_doubtful(), np.bool_, (n,)),
         )
 
     def which_are_doubtful(self) -> NDArray[np.bool_]:

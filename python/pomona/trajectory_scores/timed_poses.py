@@ -108,9 +108,11 @@ def _range(times_s: NDArray[np.float64]) -> str:
 
 
 def _by_line(estimate: TimedPoses, truth: TimedPoses) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    if len(estimate) != len(truth) or len(truth) < 2:
-        expected = f"expected as many as the {len(truth)} of {truth.path}, line by line, and 2 or more"
-        raise PomonaError(f"{estimate.path}: found {len(estimate)} poses, {expected}")
+    if len(truth) < 2:
+        raise PomonaError(f"{truth.path}: found {amount(len(truth), 'pose')}, expected 2 or more")
+    if len(estimate) != len(truth):
+        expected = f"expected as many as the {len(truth)} of {truth.path}, line by line"
+        raise PomonaError(f"{estimate.path}: found {amount(len(estimate), 'pose')}, {expected}")
     rows = np.arange(len(truth))
     return rows, rows
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.arrays import checked_array, definite_matrices
 from pomona.errors import PomonaError
 from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
 
@@ -54,10 +55,16 @@ class Anchors:
     up_sigma_rad: float = 0.02
 
     def __post_init__(self) -> None:
+        for name in ("frames", "upright_frames"):
+            object.__setattr__(self, name, checked_array(f"anchors.{name}", getattr(self, name), np.int64, (None,)))
+        for name in ("positions", "ups_in_camera"):
+            object.__setattr__(self, name, checked_array(f"anchors.{name}", getattr(self, name), np.float64, (None, 3)))
         n, n_ups = len(self.frames), len(self.upright_frames)
-        shapes = (self.positions.shape, self.covariances.shape, self.ups_in_camera.shape)
-        if shapes != ((n, 3), (n, 3, 3), (n_ups, 3)):
-            raise PomonaError(f"anchors: found shapes {shapes}, expected {(n, 3)}, {(n, 3, 3)} and {(n_ups, 3)}")
+        covariances = definite_matrices("anchors.covariances", self.covariances, (n, 3, 3))
+        object.__setattr__(self, "covariances", covariances)
+        if (len(self.positions), len(self.ups_in_camera)) != (n, n_ups):
+            found = f"{len(self.positions)} positions and {len(self.ups_in_camera)} verticals"
+            raise PomonaError(f"anchors: found {found}, expected {n} and {n_ups}")
         if not (self.up_sigma_rad > 0 and (np.linalg.norm(self.ups_in_camera, axis=1) > 0).all()):
             raise PomonaError("anchors: found a vertical without a direction or a sigma of nothing, expected both")
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.arrays import definite_matrices, rigid_matrices
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.survey.refinement import Motions
@@ -21,7 +22,7 @@ from pomona.survey.slam.anchors import Anchors
 from pomona.survey.slam.consistency import explained, explains
 from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, linked, motions_of, once
 from pomona.survey.slam.fruit_graph import sightings_of
-from pomona.survey.slam.fruit_way import FruitWay, Known, adjusted_way, require_covariances
+from pomona.survey.slam.fruit_way import FruitWay, Known, adjusted_way, require_anchors, require_clouds
 from pomona.survey.slam.identities_of_links import joined_fruits, pairs_of
 from pomona.survey.slam.loops import TOGETHER, Loop, SeenMap, loop_at, recognised
 
@@ -92,7 +93,14 @@ class FruitSlam:
         """Poses of all frames so far, (F, 4, 4), each in the frame of reference of its part."""
         return self._poses.copy()
 
-    def add(self, cloud: FruitCloud, moved: Array | None = None, information: Array | None = None) -> PlacedFrame:
+    def add(
+        self,
+        cloud: FruitCloud,
+        moved: Array | None = None,
+        information: Array | None = None,
+        *,
+        doubtful: bool = False,
+    ) -> PlacedFrame:
         """Place the next frame.
 
         Parameters
@@ -103,47 +111,52 @@ class FruitSlam:
             Its pose in the frame of the camera before, as odometry measured it.
         information : (6, 6) float64
             Inverse covariance of `moved`, of a step (translation, rotation) in the frame of this camera.
+        doubtful : bool
+            Whether `moved` may be wrong altogether, of wheels that slip: `way` lets it go where links contradict it.
 
         Raises
         ------
         PomonaError
-            The cloud has no covariances, or `moved` and `information` are not both what they should be, or none.
+            The cloud has no covariances, `moved` is not rigid or `information` not positive definite, or only one of
+            them is given. The frame is not counted then.
         """
-        require_covariances([cloud])
-        if moved is not None or information is not None:
-            _require_shapes(moved, information)
+        require_clouds([cloud])
+        motion = _checked_motion(len(self), moved, information, doubtful=doubtful)
         row = len(self)
         self._constellations.add(cloud)
         links = list(linked(self._constellations, row))
         self._links += links
         ties = motions_of(links)
-        if moved is not None and information is not None and row:
-            motion = Motions(np.array([row - 1]), np.array([row]), np.array([moved]), np.array([information]))
+        if row:
             self._motions, ties = self._motions.and_those(motion), motion.and_those(ties)
-        self._place(ties)
+        united = self._place(ties)
         self._begins = np.append(self._begins, self._begins[-1] + len(cloud))
         self._fruits = np.append(self._fruits, self._fruits.max(initial=-1) + 1 + np.arange(len(cloud)))
         closed = len(self) - self._settled == TOGETHER and self._settle()
-        return PlacedFrame(int(self._parts[-1]), self._poses[-1].copy(), closed)
+        return PlacedFrame(int(self._parts[-1]), self._poses[-1].copy(), united or closed)
 
     def way(self, anchors: Anchors | None = None) -> FruitWay:
         """Adjust all frames so far to each other, and to what is known from outside."""
+        require_anchors(anchors, len(self))
         return adjusted_way(self._known(anchors))
 
     def _known(self, anchors: Anchors | None = None) -> Known:
         return Known(self._constellations, self._motions, anchors, self._links, [])
 
-    def _place(self, ties: Motions) -> None:
-        """Put the frame where the surest tie has it; parts that it ties together are one from now on."""
+    def _place(self, ties: Motions) -> bool:
+        """Put the frame where the surest tie has it; parts that it ties together are one from now on: say whether."""
         poses = self._poses[ties.first] @ ties.first_from_second
         parts = self._parts[ties.first]
         surest = np.argsort(np.trace(np.linalg.inv(ties.information), axis1=1, axis2=2), kind="stable")
         begun = self._parts.max(initial=-1) + 1
         part, pose = (parts[surest[0]], poses[surest[0]]) if len(surest) else (begun, np.eye(4))
         self._parts, self._poses = np.append(self._parts, part), np.concatenate([self._poses, pose[None]])
+        united = False
         for tie in surest:
             if self._parts[ties.first[tie]] != self._parts[-1]:
-                self._unite(int(parts[tie]), poses[tie], len(self) - 1)
+                self._unite(int(self._parts[ties.first[tie]]), poses[tie], len(self) - 1)
+                united = True
+        return united
 
     def _unite(self, part: int, in_part: Array, row: int) -> None:
         """Say that a frame of another part has a pose in this one; the later part goes on in the earlier."""
@@ -240,7 +253,16 @@ class FruitSlam:
         return SeenMap(poses, seen.frames, fruits, (covariances @ summed[1, ..., :1])[..., 0], covariances)
 
 
-def _require_shapes(moved: Array | None, information: Array | None) -> None:
-    found = tuple("none" if one is None else str(np.shape(one)) for one in (moved, information))
-    if found != ("(4, 4)", "(6, 6)"):
-        raise PomonaError(f"moved, information: found shapes {' and '.join(found)}, expected (4, 4) and (6, 6)")
+def _checked_motion(row: int, moved: Array | None, information: Array | None, *, doubtful: bool) -> Motions:
+    """Give the motion to a frame from the one before, or none."""
+    if moved is None and information is None:
+        return Motions.none()
+    if moved is None or information is None:
+        raise PomonaError("moved, information: found one of them, expected both or none")
+    return Motions(
+        np.array([row - 1]),
+        np.array([row]),
+        rigid_matrices("moved", moved)[None],
+        definite_matrices("information", information, (6, 6))[None],
+        np.array([doubtful]),
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
@@ -19,7 +19,7 @@ from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.loops import TOGETHER, Loop, SeenMap, joined, loops, recognised
 from pomona.survey.slam.spanning import spanned_poses
 
-__all__ = ["FruitWay", "Known", "adjusted_way", "require_covariances", "way_by_fruits"]
+__all__ = ["FruitWay", "Known", "adjusted_way", "require_anchors", "require_clouds", "way_by_fruits"]
 
 Rows = NDArray[np.int64]
 
@@ -63,7 +63,7 @@ class FruitWay:
 
 
 def way_by_fruits(
-    clouds: Sequence[FruitCloud],
+    clouds: Iterable[FruitCloud],
     motions: Motions | None = None,
     *,
     anchors: Anchors | None = None,
@@ -74,7 +74,7 @@ def way_by_fruits(
 
     Parameters
     ----------
-    clouds : sequence of FruitCloud
+    clouds : iterable of FruitCloud
         What each frame saw, in the frame of its camera, metres, with covariances; in order of time.
     motions : Motions, optional
         What was measured between the frames otherwise, by odometry.
@@ -88,13 +88,15 @@ def way_by_fruits(
     Raises
     ------
     PomonaError
-        A cloud has no covariances, or a setting is wrong. Frames that hang together with no other are parts of one
-        frame.
+        A cloud is none or has no covariances, a motion or an anchor is of no frame, or a setting is wrong. Frames that
+        hang together with no other are parts of one frame.
     """
-    require_covariances(clouds)
+    clouds = list(clouds)
+    require_clouds(clouds)
+    motions = Motions.none() if motions is None else motions.checked(len(clouds))
+    require_anchors(anchors, len(clouds))
     constellations = Constellations(clouds, config=config, threads=threads)
-    known = Known(constellations, Motions.none() if motions is None else motions, anchors, chained(constellations), [])
-    return adjusted_way(known)
+    return adjusted_way(Known(constellations, motions, anchors, chained(constellations), []))
 
 
 def adjusted_way(known: Known) -> FruitWay:
@@ -184,8 +186,17 @@ def _row_of(rows: Rows, n_frames: int) -> Rows:
     return row_of
 
 
-def require_covariances(clouds: Sequence[FruitCloud]) -> None:
-    """Refuse fruits of which it is not known how well they are placed."""
-    bare = next((row for row, cloud in enumerate(clouds) if len(cloud) and cloud.covariances is None), None)
-    if bare is not None:
-        raise PomonaError(f"clouds: frame {bare} has no covariances, expected those of every fruit")
+def require_clouds(clouds: Sequence[FruitCloud]) -> None:
+    """Refuse what are no fruits, and fruits of which it is not known how well they are placed."""
+    for row, cloud in enumerate(clouds):
+        if not isinstance(cloud, FruitCloud):
+            raise PomonaError(f"clouds: found {type(cloud).__name__}, expected a FruitCloud of each frame")
+        if len(cloud) and cloud.covariances is None:
+            raise PomonaError(f"clouds: frame {row} has no covariances, expected those of every fruit")
+
+
+def require_anchors(anchors: Anchors | None, n_frames: int) -> None:
+    """Refuse anchors of frames that there are not."""
+    rows = np.zeros(0, np.int64) if anchors is None else np.concatenate([anchors.frames, anchors.upright_frames])
+    if len(wrong := rows[(rows < 0) | (rows >= n_frames)]):
+        raise PomonaError(f"anchors: found frame {wrong[0]}, expected one of 0 to {n_frames - 1}")

@@ -28,7 +28,8 @@ def hanging_fruits(
     crop: Crop, spur_tips_m: NDArray[np.float64], wood: WoodPoints, days: float, *, labelled: bool
 ) -> FruitSolids:
     """Fruits under the tips of the spurs, (S, 3), beside the wood; without labels all ids are 0."""
-    on = np.flatnonzero(crop.lives.states(days) == ALIVE)
+    # Before bloom there are none: their curves begin with nothing, not with a day.
+    on = np.flatnonzero((crop.lives.states(days) == ALIVE) & (days > 0.0))
     diameters = crop.curves.diameters_m(days)[on]
     centres = pushed_apart(crop.centres_m(spur_tips_m, days)[on], diameters / 2.0, wood)
     ids = on + 1 if labelled else np.zeros(len(on), np.int64)
