@@ -216,9 +216,9 @@ mod tests {
             let predictions: Vec<_> = query.points.iter().map(place).collect();
             let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Placement::identity() };
             // A guess, and what a caller says and is wrong by a factor of two.
-            for (told, width) in [(0.02, GUESSED), (0.5 * sigma, GIVEN), (2.0 * sigma, GIVEN)] {
+            for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
                 let found = scatter(&laid, KnownNoise { sigma: told, width });
-                assert!((found / sigma - 1.0).abs() < 0.12, "{found} for {sigma}, told {told}");
+                assert!((found / sigma - 1.0).abs() < off, "{found} for {sigma}, told {told}");
             }
         }
     }
