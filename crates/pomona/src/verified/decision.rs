@@ -318,7 +318,8 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len() as u32;
         laid.retain(|finding| self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding));
-        if let Some(answer) = self.single_out(&mut laid, f64::NEG_INFINITY, log) {
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, log);
+        if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             findings.accepted.push(answer);
             findings.others.extend(laid);
         }

@@ -99,9 +99,12 @@ impl<'a> Search<'a> {
     /// Where a crown is flat, a mirrored row matches by a half-turn; the rest of the row tells.
     pub(super) fn fits_better_mirrored(&self, finding: &Finding) -> bool {
         let explained = finding.overlap.predictions.iter().flatten().count();
-        if explained as f64 > WHOLE * self.query.len() as f64 {
-            return false;
-        }
+        explained as f64 <= WHOLE * self.query.len() as f64 && self.mirror_explains_more(finding)
+    }
+
+    /// The same of a pose that lays all of the query on few of its fruits, as rows laid along rows do: those next to the middle of
+    /// a mirrored row lie on themselves.
+    pub(super) fn mirror_explains_more(&self, finding: &Finding) -> bool {
         let moments = self.overlap_moments(finding);
         let eigen = moments.spread().symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();

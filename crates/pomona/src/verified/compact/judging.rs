@@ -21,8 +21,17 @@ use nalgebra::Vector3;
 
 /// Rounds of the search: what the looks of each may cost, in candidates, and contenders that are looked at more closely after
 /// it. Each costs as much as all before it, so that what is found costs twice of what it had to at the most.
-const ROUNDS: [(f32, usize); 8] =
-    [(8e3, 32), (8e3, 32), (1.6e4, 32), (3.2e4, 48), (6.4e4, 64), (1.28e5, 96), (2.56e5, 128), (5.12e5, 256)];
+const ROUNDS: [(f32, usize); 9] = [
+    (8e3, 32),
+    (8e3, 32),
+    (1.6e4, 32),
+    (3.2e4, 48),
+    (6.4e4, 64),
+    (1.28e5, 96),
+    (2.56e5, 128),
+    (5.12e5, 256),
+    (1.024e6, 256),
+];
 
 /// Candidates of a round, the best at a glance, that get a first look, for each that gets a closer one.
 const LOOKED_AT: usize = 96;
