@@ -1,9 +1,10 @@
 """From pixels to fruits with nothing given: the shipped recordings, scanned with the shipped detector, dates matched.
 
 A box that was found is that of the true fruit whose box it overlaps by half; a reported fruit is the one that most of
-its boxes show. Counted against the fruits that five frames and more show by over 30 %, at least 7 px wide. Places are
-told after the best rigid motion onto the truth. MOTA is over the same fruits, without the boxes of other ones. Each
-date is matched with the ones before: recall over the fruits that count on both. Writes shipped.md.
+its boxes show. Counted against the fruits that five frames and more show by over 30 %, at least 7 px wide; fruits that
+are reported although fewer frames show them so are hidden ones. Places are told after the best rigid motion onto the
+truth. MOTA is over the same fruits, without the boxes of other ones. Each date is matched with the ones before: recall
+over the fruits that count on both. Writes shipped.md.
 """
 
 from __future__ import annotations
@@ -96,8 +97,8 @@ def main(arguments: list[str]) -> None:
     options = parser.parse_args(arguments)
     scans = [scanned(visit, options.model) for visit in sorted(options.row.iterdir()) if visit.is_dir()]
     first = markdown(
-        ("date", "true", "reported", "count error", "missed", "split", "false", "MOTA", "median mm", "95 % mm",
-         "diameter bias mm", "CPU ms a frame"),
+        ("date", "true", "reported", "count error", "missed", "split", "hidden", "false", "MOTA", "median mm",
+         "95 % mm", "diameter bias mm", "CPU ms a frame"),
         [fruit_row(found) for found in scans],
     )  # fmt: skip
     second = markdown(
@@ -142,6 +143,7 @@ def fruit_row(found: Scanned) -> tuple[str, ...]:
     off_mm = 1000 * rigid_residuals(cloud.positions[judged], found.fruits.positions[true])
     copies = Counter(ids[row] for row in judged)
     split = sum(n - 1 for n in copies.values())
+    hidden = len(copies.keys() - countable)
     return (
         found.date if found.n_parts == 1 else f"{found.date}, {found.n_parts} parts",
         str(len(countable)),
@@ -149,6 +151,7 @@ def fruit_row(found: Scanned) -> tuple[str, ...]:
         f"{len(cloud) / len(countable) - 1:+.1%}",
         _of(len(countable - copies.keys()), countable),
         _of(split, countable),
+        _of(hidden, countable),
         _of(len(cloud) - len(judged), countable),
         f"{mota(found):.2f}",
         *(f"{value:.1f}" for value in (np.median(off_mm), np.percentile(off_mm, 95))),
