@@ -150,6 +150,13 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The same search for poses that are upside down, where the vertical is known.
+    pub(super) fn upside_down(&self) -> Option<Self> {
+        let vertical = Some(self.model.vertical?.inverted());
+        // No size speaks for a pose that is not settled.
+        Some(Self { model: Model { vertical, ..self.model }, sizes: None, ..*self })
+    }
+
     /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
     pub(super) fn threshold(&self, share: f64) -> f64 {
         self.config.threshold(self.offered(), self.model.vertical.map_or(1.0, |_| share))

@@ -137,12 +137,27 @@ impl<'a> Search<'a> {
             self.lay_along(&mut findings, &mut log);
         }
         if findings.accepted.is_empty() {
+            findings.others.extend(self.upside_down_poses());
             findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         findings.pattern = self.pattern(log.effort.stands.share_left());
         let stages = self.stages(&log, findings.accepted.len());
         (findings, stages)
+    }
+
+    /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.
+    fn upside_down_poses(&self) -> Vec<Finding<'a>> {
+        let Some(inverted) = self.upside_down() else { return Vec::new() };
+        let mut log = Log::new(f64::INFINITY);
+        let (mut found, mut longest) = (Vec::new(), Vec::new());
+        for (index, keep) in ROUNDS.into_iter().enumerate() {
+            let seeds = inverted.seeds_of(index, &mut longest);
+            let (hypotheses, _) = inverted.ask(&seeds, keep, &mut log);
+            inverted.grow_distinct(&hypotheses, &mut found, &mut log);
+        }
+        found.retain(|finding| inverted.admits(&finding.overlap.pose) && inverted.turns_are_fixed(finding));
+        found
     }
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
@@ -156,7 +171,6 @@ impl<'a> Search<'a> {
         }
         self.sift(&mut findings, &mut log);
         if findings.accepted.is_empty() {
-            log.grown += self.grow_poor(&hypotheses, &mut findings.others);
             findings.accepted.extend(self.single_out(&mut findings.others, self.least(), &mut log));
         } else {
             self.doubt(&mut findings, &[], &mut log);
@@ -288,17 +302,6 @@ impl<'a> Search<'a> {
             }
         }
         (some, &[])
-    }
-
-    /// Grows what little speaks for, or nothing: where few poses are proposed, these show what chance reaches. Returns how many.
-    fn grow_poor(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>) -> u32 {
-        let before = findings.len();
-        for seed in hypotheses {
-            if !findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
-                findings.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
-            }
-        }
-        (findings.len() - before) as u32
     }
 
     /// Asks the offsets of all fruits, where too few are in common for any seed.

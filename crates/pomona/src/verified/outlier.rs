@@ -7,8 +7,9 @@
 use super::acceptance::outlying;
 use super::case::{Finding, Log, Search};
 
-/// Other poses that say what chance reaches, at the least: of fewer the best two are not yet in the tail.
-const ENOUGH: usize = 6;
+/// Evidence, in nats, that chance is taken to reach in any search: the best wrong poses of small frames have 15 in the median,
+/// and below this they are not yet in the tail.
+const REACHED: f64 = 12.0;
 
 /// Poses that are polished before they are compared: the best and what may come to be second.
 const COMPARED: usize = 3;
@@ -22,15 +23,13 @@ impl<'a> Search<'a> {
     pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, least: f64, log: &mut Log) -> Option<Finding<'a>> {
         others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let distinct = self.distinct(others);
-        if distinct.len() <= ENOUGH {
-            return None;
-        }
+        distinct.first().filter(|&&best| self.admits(&others[best].overlap.pose))?;
         let rate = self.config.false_alarm_rate;
         // Half of the distance that is asked for: most poses that do not stand out need no closer look.
         if evidence(others, distinct[0]) <= outlying(rate.sqrt(), self.second(others, &distinct)) {
             return None;
         }
-        distinct[..COMPARED].iter().for_each(|&at| self.polish(&mut others[at]));
+        distinct.iter().take(COMPARED).for_each(|&at| self.polish(&mut others[at]));
         let second = self.second(others, &distinct);
         log.best = log.best.max(evidence(others, distinct[0]));
         log.threshold = outlying(rate, second).max(least);
@@ -42,7 +41,7 @@ impl<'a> Search<'a> {
     fn second(&self, findings: &[Finding], distinct: &[usize]) -> f64 {
         let best = &findings[distinct[0]].overlap;
         let of = |&at: &usize| self.elsewhere(best, &findings[at].overlap) * evidence(findings, at);
-        distinct[1..].iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+        distinct[1..].iter().map(of).fold(REACHED, f64::max)
     }
 
     /// Those of `findings`, most evidence first, that lie apart from all before them.

@@ -143,12 +143,13 @@ pub(crate) fn without_scale(code: &Code) -> Code {
     [0.0, code[1] * inverse, code[2] * inverse, code[3] * inverse, code[4] * inverse, code[5] * inverse]
 }
 
-/// Every seed of a cloud, each set once, in a fixed order; `shortest` is the least |AB| in metres.
-pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
+/// Every seed of a cloud among so many `companions` of each fruit, each set once, in a fixed order; `shortest` is the least |AB| in
+/// metres.
+pub(crate) fn enumerate(landscape: &Landscape, companions: usize, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
         .with_min_len(SHARE_OF_FRUITS)
-        .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), row as u32))
+        .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), companions, row as u32))
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
         .collect()
@@ -158,7 +159,7 @@ pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
 ///
 /// Long seeds fix their pose best and have the fewest lookalikes.
 pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
-    let mut seeds = enumerate(landscape, 0.0);
+    let mut seeds = enumerate(landscape, COMPANIONS, 0.0);
     if count < seeds.len() {
         seeds.select_nth_unstable_by(count, |a, b| b.1[0].total_cmp(&a.1[0]).then(a.0.cmp(&b.0)));
         seeds.truncate(count);
@@ -169,11 +170,11 @@ pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
 
 /// The sets of a fruit and three companions that no fruit before it forms too, each in ascending order.
 ///
-/// `neighbours` gives the nearest others of a fruit, nearest first.
-pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], row: u32) -> Vec<[u32; STARS]> {
+/// `neighbours` gives the nearest others of a fruit, nearest first; `most` of them are its companions.
+pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], most: usize, row: u32) -> Vec<[u32; STARS]> {
     let companions = |row: u32| {
         let near = neighbours(row as usize);
-        &near[..near.len().min(COMPANIONS)]
+        &near[..near.len().min(most)]
     };
     let near = companions(row);
     // For a companion before this fruit, which others it has for companions: bit i for `near[i]`.
@@ -219,7 +220,7 @@ pub(crate) struct SeedIndex {
 
 impl SeedIndex {
     pub(crate) fn new(landscape: &Landscape, scale: Scale, shortest: f64) -> Self {
-        let seeds = enumerate(landscape, shortest);
+        let seeds = enumerate(landscape, COMPANIONS, shortest);
         let code = |(_, code): &(Quad, Code)| match scale {
             Scale::Metric => *code,
             Scale::Free => without_scale(code),
@@ -298,7 +299,8 @@ mod tests {
         }
         expected.sort_unstable();
         expected.dedup();
-        let mut found: Vec<_> = (0..60).flat_map(|row| sets_of(&|row| landscape.neighbours(row), row)).collect();
+        let mut found: Vec<_> =
+            (0..60).flat_map(|row| sets_of(&|row| landscape.neighbours(row), COMPANIONS, row)).collect();
         found.sort_unstable();
         assert_eq!(found, expected);
     }
@@ -319,7 +321,7 @@ mod tests {
             lengths.sort_unstable_by(|a, b| b.total_cmp(a));
             lengths
         };
-        let all = lengths(enumerate(&landscape, 0.0));
+        let all = lengths(enumerate(&landscape, COMPANIONS, 0.0));
         for count in [0, 1, 1000, all.len()] {
             assert_eq!(lengths(longest(&landscape, count)), all[..count]);
         }

@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 
 /// Rounds of the search: what the looks of each may cost, in candidates, and contenders that are looked at more closely after
 /// it. Each costs as much as all before it, so that what is found costs twice of what it had to at the most.
-const ROUNDS: [(f32, usize); 9] = [
+const ROUNDS: [(f32, usize); 10] = [
     (8e3, 32),
     (8e3, 32),
     (1.6e4, 32),
@@ -30,7 +30,8 @@ const ROUNDS: [(f32, usize); 9] = [
     (1.28e5, 96),
     (2.56e5, 128),
     (5.12e5, 256),
-    (1.024e6, 256),
+    (1.024e6, 512),
+    (2.048e6, 1024),
 ];
 
 /// Candidates of a round, the best at a glance, that get a first look, for each that gets a closer one.

@@ -107,7 +107,7 @@ impl Seeds<'_> {
 
     /// The labelled sets of a fruit with their codes in steps.
     fn of(&self, row: u32, mut visit: impl FnMut([u32; 4], Code)) {
-        for set in sets_of(&|row| self.near(row), row) {
+        for set in sets_of(&|row| self.near(row), COMPANIONS, row) {
             let Some((quad, code)) = canonical(self.points, set) else { continue };
             if f64::from(code[0]) >= SHORTEST * SEED_SIGMA * self.spacing {
                 visit(quad, in_steps(&code, self.step));

@@ -17,6 +17,10 @@ use rayon::prelude::*;
 /// the true seeds that the other holds, and a tenth of the false ones.
 const RADIUS: f64 = 1.7;
 
+/// Nearest neighbours of a fruit of the query among which its seeds are: three more than the map has. Between two fruits that both
+/// visits show hang others that only one does.
+const ASKED: usize = 13;
+
 /// Seeds of a query that are considered, at the most.
 const CONSIDERED: usize = 40_000;
 
@@ -30,9 +34,9 @@ const UNSEEN: f32 = 0.05;
 /// met half as many, because at their rim they show other neighbours than the map.
 const MET: f32 = 2e-7;
 
-/// True seeds that a query would have met where the search gives up. Were all of it in the map and they independent, none
-/// would be met with a probability of exp(-24); of a query that shares a fifth with the map exp(-5), less than 1 %.
-const ENOUGH: f32 = 24.0;
+/// True seeds that a query would have met where the search gives up: of a frame half as many. Were all of it in the map and they
+/// independent, none would be met with a probability of exp(-24); of one that shares a fifth with the map exp(-5), less than 1 %.
+const ENOUGH: f32 = 48.0;
 
 /// Looks that are worth a thread of their own.
 const SHARE_OF_LOOKS: usize = 16;
@@ -63,7 +67,7 @@ impl Look {
 
 /// The looks that are worth it, of the least price first.
 pub(super) fn looks(query: &Landscape, shapes: &Shapes, model: &Model, step: f64) -> Vec<Look> {
-    let seeds = enumerate(query, SHORTEST * model.sigma);
+    let seeds = enumerate(query, ASKED, SHORTEST * model.sigma);
     let stride = seeds.len().div_ceil(CONSIDERED).max(1) as u64;
     let considered: Vec<Seed> =
         (0..).zip(seeds).filter(|&(at, _)| shuffled(at).is_multiple_of(stride)).map(|(_, seed)| seed).collect();
