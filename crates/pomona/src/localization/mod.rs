@@ -26,6 +26,6 @@ mod slip;
 mod told_motions;
 mod window;
 
-pub use answer::{Localization, MapPair};
+pub use answer::{Localization, MapPair, ToldMotion};
 pub use config::LocalizationConfig;
 pub use localizer::Localizer;

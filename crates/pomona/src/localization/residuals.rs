@@ -12,13 +12,14 @@
 //! as fruits are few.
 
 use super::alignment::{Aligned, Joint, Say, UNKNOWNS};
-use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix};
+use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, SymmetricEigen};
 
 /// Standard deviations that are tried for what neighbours share, metres: nothing to speak of, to a sagging branch.
 const TRIED_M: [f64; 6] = [0.0005, 0.001, 0.002, 0.004, 0.008, 0.016];
 
-/// Residuals that the covariances are believed like: their errors are guessed with some 30 %.
-const BELIEVED: f64 = 20.0;
+/// Residuals that the covariances are believed like: standard deviations are guessed within some 30 %, variances within
+/// 60, and of n squared errors the variance is known within the part sqrt(2 / n).
+const BELIEVED: f64 = 6.0;
 
 /// Least part of the told variances: below, it is the map's own fruits that are seen again.
 const LEAST_SCALE: f64 = 0.1;
@@ -31,6 +32,9 @@ const LEFT_OUT: f64 = 0.2;
 
 /// Weight below which a sighting shows a stranger.
 const LEAST_WEIGHT: f64 = 0.05;
+
+/// Turns in which eigenvalues are found, or the matrix is none of numbers.
+const EIGEN_TURNS: usize = 1000;
 
 /// Eigenvalues, over the largest, that are none.
 const NO_EIGENVALUE: f64 = 1e-6;
@@ -87,7 +91,9 @@ impl Modes {
             }
         }
         let taken_up = by_pose.transpose() * covariance * by_pose;
-        let parts = (matrix - taken_up).symmetric_eigen();
+        let Some(parts) = SymmetricEigen::try_new(matrix - taken_up, f64::EPSILON, EIGEN_TURNS) else {
+            return Self { eigenvalues: Vec::new(), squares: Vec::new() };
+        };
         let least = NO_EIGENVALUE * parts.eigenvalues.iter().fold(0.0, |most: f64, &one| most.max(one));
         let along = parts.eigenvectors.tr_mul(&pulled);
         let kept = || parts.eigenvalues.iter().zip(along.iter()).filter(|(value, _)| **value > least);

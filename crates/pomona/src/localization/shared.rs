@@ -13,11 +13,10 @@
 //! residuals show it, and phi, by how much sightings err more or less than their covariances say (`residuals`).
 
 use super::alignment::{Aligned, Joint, Say, UNKNOWNS};
-use super::belief::Sigmas;
 use super::config::LocalizationConfig;
 use super::known::KnownFruits;
 use super::residuals::{Shown, kinship, shown};
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 /// How far fruits hang from where the map has them together.
 pub(super) struct Sag {
@@ -40,7 +39,7 @@ impl Sag {
 }
 
 /// Covariance of the pose's step and of the slip.
-pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Sigmas], sag: &Sag) -> Option<Joint> {
+pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Matrix6<f64>], sag: &Sag) -> Option<Joint> {
     let alone = aligned.information.cholesky()?.inverse();
     let Shown { scale, near } = shown(aligned, &alone, sag.reach_m);
     let errors = Shared { together: sag.all, near: Matrix3::from_diagonal_element(near), reach_m: sag.reach_m };
@@ -54,19 +53,18 @@ pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Sigmas], s
         let half = pull * sum;
         middle += half + half.transpose();
     }
-    for (before, sigmas) in way.iter().enumerate() {
-        middle += of_motion(&pulls, before, *sigmas);
+    for (before, motion) in way.iter().enumerate() {
+        middle += of_motion(&pulls, before, motion);
     }
     Some(alone * scale + alone * middle * alone)
 }
 
 /// What the frames before a motion err by together, `after` being the motions after it.
-fn of_motion(pulls: &[Pull], after: usize, (place, turn): Sigmas) -> Joint {
+fn of_motion(pulls: &[Pull], after: usize, covariance: &Matrix6<f64>) -> Joint {
     let older = pulls.iter().filter(|(say, _)| say.age > after);
     let gain = older
         .fold(SMatrix::<f64, UNKNOWNS, 6>::zeros(), |sum, (say, pull)| sum + pull * say.slopes.fixed_columns::<6>(0));
-    let sigmas = Vector6::new(place, place, place, turn, turn, turn);
-    gain * Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma)) * gain.transpose()
+    gain * covariance * gain.transpose()
 }
 
 /// A sighting, and `U`.
