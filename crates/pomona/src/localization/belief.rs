@@ -24,9 +24,9 @@ const UNKNOWN: (f64, f64, f64) = (0.15, 0.0, 0.1);
 
 impl Motion {
     /// `covariance` is what was told of it.
-    pub fn measured(previous_from_camera: Pose, covariance: Option<Matrix6<f64>>) -> Self {
+    pub fn measured(previous_from_camera: Pose, covariance: Option<&Matrix6<f64>>) -> Self {
         let usual = Self::new(previous_from_camera, MEASURED);
-        Self { covariance: covariance.unwrap_or(usual.covariance), ..usual }
+        Self { covariance: covariance.copied().unwrap_or(usual.covariance), ..usual }
     }
 
     /// A motion that fruits correct at once.

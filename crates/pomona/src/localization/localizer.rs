@@ -116,7 +116,7 @@ impl Localizer {
         seen.validate()?;
         told.map_or(Ok(()), ToldMotion::validate)?;
         let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
-        let moved = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance)));
+        let moved = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
         let predicted = self.predicted(moved.as_ref());
         match (moved, self.belief.and_then(|belief| belief.motion)) {
             (Some(motion), _) => self.window.step(&motion),

@@ -9,7 +9,7 @@
 //!
 //! b is one number for all axes, for only across the line of sight are sightings exact enough to show it; every order of
 //! magnitude of it is as likely before anyone looks, and its mean square is taken, not its best value: it is as uncertain
-//! as fruits are few.
+//! as fruits are few. A fruit that several frames saw counts once: it hangs off by the same in all of them.
 
 use super::alignment::{Aligned, Joint, Say, UNKNOWNS};
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, SymmetricEigen};
@@ -50,8 +50,8 @@ pub(super) struct Shown {
 /// Reads both out of the residuals, `covariance` being the inverse of the information.
 pub(super) fn shown(aligned: &Aligned, covariance: &Joint, reach_m: f64) -> Shown {
     let says: Vec<&Say> = aligned.says.iter().filter(|say| say.weight > LEAST_WEIGHT).collect();
-    let free = (3.0 * says.iter().map(|say| say.weight).sum::<f64>() - 6.0).max(0.0);
-    let squared = says.iter().map(|say| say.squared).sum::<f64>();
+    let free = (3.0 * says.iter().map(|say| say.voice * say.weight).sum::<f64>() - 6.0).max(0.0);
+    let squared = says.iter().map(|say| say.voice * say.squared).sum::<f64>();
     let modes = Modes::of(&says, covariance, reach_m);
     let whole: f64 = modes.eigenvalues.iter().sum();
     let scaled = |near: f64| ((squared - near * whole + BELIEVED) / (free + BELIEVED)).max(LEAST_SCALE);
@@ -78,15 +78,16 @@ impl Modes {
         let mut pulled = DVector::zeros(3 * count);
         let mut by_pose = OMatrix::<f64, Const<UNKNOWNS>, Dyn>::zeros(3 * count);
         for (row, say) in says.iter().enumerate() {
-            let turned = say.slopes.transpose() * say.information;
+            let (information, pull) = (say.information * say.voice, say.pull * say.voice);
+            let turned = say.slopes.transpose() * information;
             for (one, column) in columns.iter().enumerate() {
                 for axis in 0..3 {
-                    pulled[3 * one + axis] += column[row] * say.pull[axis];
+                    pulled[3 * one + axis] += column[row] * pull[axis];
                     by_pose.column_mut(3 * one + axis).axpy(column[row], &turned.column(axis), 1.0);
                 }
                 for (other, its) in columns.iter().enumerate() {
                     let mut block = matrix.fixed_view_mut::<3, 3>(3 * one, 3 * other);
-                    block += say.information * (column[row] * its[row]);
+                    block += information * (column[row] * its[row]);
                 }
             }
         }
