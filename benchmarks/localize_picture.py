@@ -25,6 +25,7 @@ def write_picture(name: str, shown: Outcome, nees: Mapping[str, NDArray[np.float
     _draw_way(above, shown)
     for axes, (mode, values) in zip(below, nees.items(), strict=True):
         _draw_nees(axes, mode, values)
+    figure.supxlabel("squared error under the own covariance", fontsize="medium")
     figure.savefig(FOLDER / name, dpi=120, metadata={"Software": None})
 
 
@@ -52,5 +53,5 @@ def _draw_nees(axes: Any, mode: str, values: NDArray[np.float64]) -> None:
         label=f"{len(values)} poses",
     )
     axes.plot(middle, chi2.pdf(middle, 6), color="black", label=r"$\chi^2$, 6 degrees")
-    axes.set(xlabel="squared error under the own covariance", title=f"{mode}: mean {values.mean():.1f}")
+    axes.set_title(f"{mode}: mean {values.mean():.1f}", fontsize="medium")
     axes.legend(fontsize="small")
