@@ -26,6 +26,7 @@ from benchmarks.results import markdown, shared_data, write_rows, write_text
 from pomona import FruitCloud, Localization, Localizer
 from pomona.detect.opening import FoundBoxes, open_detector
 from pomona.localize.following import Moving, cloud_of
+from pomona.matching import Up
 from pomona.recording import Recording, open_recording
 from pomona.recording.poses import read_tum, write_tum
 from pomona.survey import scan
@@ -39,6 +40,12 @@ FALSE_M, FALSE_DEG = 0.3, 5.0
 
 SHOWN = ("2024-08-09", "2024-08-28")
 """Map and drive of the picture."""
+
+UP = np.array([0.0, 0.0, 1.0])
+"""Of the true poses, and so of the maps."""
+
+VERTICAL = "tracked, vertical known"
+"""The mode that is told where up is, as an IMU does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +112,9 @@ def record(outcomes: list[Outcome], text: str) -> None:
     write_rows("localize.csv", [as_row(outcome) for outcome in outcomes])
     write_text("localize.md", text)
     shown = [one for one in outcomes if (one.map.date, one.query.date) == SHOWN and one.query.boxes == "shipped"]
-    write_picture("localize.png", shown[-2], {mode: nees_of(outcomes, mode) for mode in ("single", "tracked")})
+    modes = ("single", "tracked", VERTICAL)
+    tracked = next(one for one in reversed(shown) if one.mode == "tracked")
+    write_picture("localize.png", tracked, {mode: nees_of(outcomes, mode) for mode in modes})
 
 
 def _rows() -> Iterator[Path]:
@@ -156,19 +165,22 @@ def _detector(visit: Path, boxes: str, recording: Recording) -> FoundBoxes:
 def outcomes_of(map: Drive, query: Drive) -> Iterator[Outcome]:
     """Find every frame from nothing, then one after the other."""
     localizer = Localizer(map.map, threads=1)
-    yield _outcome(map, query, "single", lambda cloud, _moved: localizer.locate(cloud))
-    yield _outcome(map, query, "tracked", lambda cloud, moved: localizer.update(cloud, moved))
+    yield _outcome(map, query, "single", lambda cloud, _moved, _up: localizer.locate(cloud))
+    yield _outcome(map, query, "tracked", lambda cloud, moved, _up: localizer.update(cloud, moved))
     localizer.reset()
-    yield _outcome(map, query, "tracked, motion unknown", lambda cloud, _moved: localizer.update(cloud))
+    yield _outcome(map, query, "tracked, motion unknown", lambda cloud, _moved, _up: localizer.update(cloud))
+    localizer.reset()
+    yield _outcome(map, query, VERTICAL, lambda cloud, moved, up: localizer.update(cloud, moved, up=up))
 
 
 def _outcome(
-    map: Drive, query: Drive, mode: str, find: Callable[[FruitCloud, NDArray[np.float64] | None], Localization]
+    map: Drive, query: Drive, mode: str, find: Callable[[FruitCloud, NDArray[np.float64] | None, Up], Localization]
 ) -> Outcome:
     found, seconds = [], []
-    for cloud, moved in zip(query.frames, query.moved, strict=True):
+    for cloud, moved, true in zip(query.frames, query.moved, query.map_from_camera, strict=True):
+        up = (true[:3, :3].T @ UP).tolist(), UP.tolist()
         begun_s = time.perf_counter()
-        found.append(find(cloud, moved))
+        found.append(find(cloud, moved, up))
         seconds.append(time.perf_counter() - begun_s)
     return Outcome(map, query, mode, tuple(found), np.array(seconds))
 

@@ -21,10 +21,11 @@ def write_picture(name: str, shown: Outcome, nees: Mapping[str, NDArray[np.float
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    above, *below = figure.subplot_mosaic([["way", "way"], list(nees)]).values()
+    above, *below = figure.subplot_mosaic([["way"] * len(nees), list(nees)]).values()
     _draw_way(above, shown)
     for axes, (mode, values) in zip(below, nees.items(), strict=True):
         _draw_nees(axes, mode, values)
+    figure.supxlabel("squared error under the own covariance", fontsize="medium")
     figure.savefig(FOLDER / name, dpi=120, metadata={"Software": None})
 
 
@@ -36,7 +37,8 @@ def _draw_way(axes: Any, shown: Outcome) -> None:
     axes.plot(true[:, 0], true[:, 1], color="0.6", label="true way")
     axes.plot(found[:, 0], found[:, 1], ".", color="tab:red", label=f"found, {shown.query.date}, {shown.mode}")
     axes.set(xlabel="along the row, m", ylabel="across, m", aspect="equal")
-    axes.legend(loc="center", fontsize="small")
+    # Beside the row, not on it: fruits are everywhere in it.
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small", frameon=False)
 
 
 def _draw_nees(axes: Any, mode: str, values: NDArray[np.float64]) -> None:
@@ -48,8 +50,8 @@ def _draw_nees(axes: Any, mode: str, values: NDArray[np.float64]) -> None:
         density=True,
         color="tab:blue",
         alpha=0.6,
-        label=f"{mode}, {len(values)} poses",
+        label=f"{len(values)} poses",
     )
     axes.plot(middle, chi2.pdf(middle, 6), color="black", label=r"$\chi^2$, 6 degrees")
-    axes.set(xlabel="squared error under the own covariance")
+    axes.set_title(f"{mode}: mean {values.mean():.1f}", fontsize="medium")
     axes.legend(fontsize="small")

@@ -2,12 +2,14 @@
 
 import gc
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.localize_lies import Case, drive
 from benchmarks.row_drive import Row, drawn_row, pose_at, seen_from, step_to
+from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud, Index, Localizer, PomonaError, PomonaWarning, Verdict
 
@@ -68,7 +70,7 @@ def test_covariances_are_those_of_the_errors(all_m, near_m):
     squared = []
     for seed in range(12):
         row = drawn_row(seed, shared_m=near_m, all_m=all_m)
-        localizer = Localizer(row.map, threads=1)
+        localizer = Localizer(row.map, config={"localization": {"shared_m": max(all_m, 0.001)}}, threads=1)
         for number, x_m in enumerate((1.5, 4.0, 6.5)):
             true = pose_at(x_m, turn_deg=3.0)
             found = localizer.locate(seen_from(row, true, 100 * seed + number))
@@ -78,6 +80,20 @@ def test_covariances_are_those_of_the_errors(all_m, near_m):
     # The mean of 36 has a standard deviation of sqrt(12 / 36) = 0.58.
     assert 4.0 < np.mean(squared) < 8.0
     assert np.mean(np.array(squared) > 12.6) < 0.2
+
+
+@pytest.mark.parametrize("told", [0.25, 9.0])
+def test_how_far_sightings_err_is_seen_in_their_residuals(row, told):
+    """Variances of sightings that are told several times too small or too large give much the same covariance."""
+    config = {"localization": {"shared_m": 0.001, "own_m": 0.001}}
+    sigmas_m = []
+    for part in (1.0, told):
+        localizer = Localizer(replace(row.map, covariances=part * row.map.covariances), config=config, threads=1)
+        seen = seen_from(row, pose_at(4.0), 3)
+        # What the map's day and the fruits' own ways add is in the told variances here: 1 cm each.
+        spread = part * (seen.covariances + 0.01**2 * np.eye(3))
+        sigmas_m.append(localizer.locate(replace(seen, covariances=spread)).sigma_m)
+    assert sigmas_m[1] == pytest.approx(sigmas_m[0], rel=0.25)
 
 
 def test_shared_errors_do_not_average_out(row):
@@ -102,6 +118,40 @@ def test_where_the_vertical_is_known_fruits_are_thought_to_sink(row):
         in_map.append(turn @ found.covariance[:3, :3] @ turn.T)
     aside, more = 0.25, 0.02**2 - 0.002**2
     assert in_map[1] - in_map[0] == pytest.approx(more * np.diag([aside, aside, 1.0]), abs=0.05 * more)
+
+
+def test_a_told_covariance_is_that_of_the_motion(row, fresh):
+    """A frame without fruits is as uncertain as the one before and the motion together."""
+    motion, covariances = np.linalg.solve(pose_at(4.0), pose_at(4.1)), []
+    for sigma_m in (0.001, 0.03):
+        fresh.reset()
+        fresh.update(seen_from(row, pose_at(4.0), 1))
+        spread = np.diag([sigma_m**2] * 3 + [1e-5] * 3)
+        covariances.append(fresh.update(EMPTY, motion, covariance=spread).covariance)
+    more = np.diag([0.03**2 - 0.001**2] * 3 + [0.0] * 3)
+    assert covariances[1] - covariances[0] == pytest.approx(more, abs=1e-9)
+
+
+def test_poses_by_poor_odometry_are_as_uncertain_as_it_is_told_to_be():
+    """Motions that err by three times what is usual, with six fruits in view: told so, covariances still hold."""
+    told, untold, sigmas = [], [], 3.0 * np.repeat([0.007, 0.005], 3)
+    for seed in range(40, 44):
+        row, rng, before = drawn_row(seed), np.random.default_rng(seed), None
+        localizers = [Localizer(row.map, threads=1) for _ in range(2)]
+        for number, x_m in enumerate(np.arange(1.5, 5.0, 0.1)):
+            true, spread, moved = pose_at(x_m), None, None
+            if before is not None:
+                noise, spread = rng.normal(size=6) * sigmas, np.diag(sigmas**2)
+                error = np.eye(4)
+                error[:3, :3], error[:3, 3] = Rotation.from_rotvec(noise[3:]).as_matrix(), noise[:3]
+                moved = np.linalg.solve(before, true) @ error
+            seen, before = seen_from(row, true, 500 + number, most=60 if number < 4 else 6), true
+            for localizer, covariance, squared in zip(localizers, (spread, None), (told, untold), strict=True):
+                found = localizer.update(seen, moved, covariance=covariance)
+                if found and number >= 4:
+                    step = step_to(found.map_from_camera, true)
+                    squared.append(step @ np.linalg.solve(found.covariance, step))
+    assert np.mean(told) < 8 < np.mean(untold)
 
 
 @pytest.mark.parametrize("moved_is_known", [True, False])
@@ -242,6 +292,11 @@ def test_one_tree_is_a_map(row):
         *[
             (lambda here, other=other: here.update(EMPTY, other), "moved")
             for other in ("abc", [[1], [1, 2]], {}, 1j * np.eye(4), [[10**400] * 4] * 4, [[object()] * 4] * 4)
+        ],
+        (lambda here: here.update(EMPTY, covariance=np.eye(6)), "covariance: found one without moved"),
+        *[
+            (lambda here, other=other: here.update(EMPTY, np.eye(4), covariance=other), "covariance")
+            for other in (np.eye(5), -np.eye(6), np.triu(np.ones((6, 6))), np.full((6, 6), np.nan), "abc", [1j])
         ],
         (lambda here: here.locate(EMPTY, up="up"), "up"),
         (lambda here: here.locate(EMPTY, up=[[1.0], [1.0, 2.0]]), "up"),

@@ -1,5 +1,6 @@
 """Ways by fruits alone: drawn graphs and rows whose truth is known, and a scan of a shipped recording."""
 
+import gc
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -259,8 +260,8 @@ def test_odometry_ties_a_frame_that_saw_nothing() -> None:
     assert np.linalg.norm(blind[:3, 3]) < 0.03
 
 
-@pytest.mark.parametrize("doubtful", [True, False])
-def test_wheels_that_slipped_are_outvoted_if_they_are_doubtful(doubtful: bool) -> None:
+@pytest.mark.parametrize("trusted", [{}, {"doubtful": False}])
+def test_wheels_that_slipped_are_outvoted_unless_they_are_trusted(trusted: dict[str, bool]) -> None:
     rng = np.random.default_rng(3)
     fruits = drawn_row(rng, 2.5)
     true = wobbling(rng, [facing(0.2 * step) for step in range(10)])
@@ -269,9 +270,36 @@ def test_wheels_that_slipped_are_outvoted_if_they_are_doubtful(doubtful: bool) -
     for row in range(1, 10):
         moved = np.linalg.inv(true[row - 1]) @ true[row]
         moved[0, 3] += 0.5 if row == 5 else 0.0
-        slam.add(seen(rng, fruits, true[row]), moved, sure, doubtful=doubtful)
+        slam.add(seen(rng, fruits, true[row]), moved, sure, **trusted)
     off_m = np.linalg.norm((slam.way().session_from_camera - np.linalg.inv(true[0]) @ true)[:, :3, 3], axis=1)
-    assert (off_m.max() < 0.03) == doubtful
+    assert (off_m.max() < 0.03) == (not trusted)
+
+
+def test_frames_share_threads() -> None:
+    """Each frame that was looked in with threads of its own left .3 MB behind, the allocator's for them."""
+    tasks = Path("/proc/self/task")
+    if not tasks.is_dir():
+        pytest.skip("needs Linux's /proc")
+    rng = np.random.default_rng(3)
+    fruits, slam = drawn_row(rng, 2.5), FruitSlam(threads=1)
+    before = len(list(tasks.iterdir()))
+    for step in range(6):
+        slam.add(seen(rng, fruits, facing(0.2 * step)))
+    assert len(list(tasks.iterdir())) <= before + 1
+
+
+def test_a_frame_is_kept_in_some_kilobytes() -> None:
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("needs Linux's /proc")
+    rng = np.random.default_rng(3)
+    fruits, slam = drawn_row(rng, 2.5), FruitSlam(threads=1)
+    bytes_used = []
+    for step in range(48):
+        slam.add(seen(rng, fruits, facing(0.9 + 0.3 * np.sin(0.3 * step))))
+        gc.collect()
+        bytes_used.append(int(Path("/proc/self/statm").read_text().split()[1]) * 4096)
+    kept = (bytes_used[-1] - bytes_used[23]) / 24
+    assert kept < 100 * 1024, f"{kept / 1024:.0f} kB a frame"
 
 
 NAN, MIRROR = np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])

@@ -15,6 +15,7 @@ __all__ = [
     "Odometry",
     "ReadyCloud",
     "RowScene",
+    "Threads",
     "Tracker",
     "Tracks",
     "__version__",
@@ -143,16 +144,25 @@ class Localization:
     def tracked(self) -> bool: ...
 
 @final
+class Threads:
+    def __new__(cls, count: int) -> Threads: ...
+    @property
+    def count(self) -> int: ...
+
+@final
 class Localizer:
-    def __new__(cls, map: _Arrays, *, config: str, threads: int | None = None) -> Localizer: ...
+    def __new__(cls, map: _Arrays, *, config: str, threads: Threads | None = None) -> Localizer: ...
     @staticmethod
-    def opened(path: str | PathLike[str], map: _Arrays, *, config: str, threads: int | None = None) -> Localizer: ...
+    def opened(
+        path: str | PathLike[str], map: _Arrays, *, config: str, threads: Threads | None = None
+    ) -> Localizer: ...
     def locate(self, seen: _Arrays, *, up: tuple[list[float], list[float]] | None = None) -> Localization: ...
     def update(
         self,
         seen: _Arrays,
         *,
         previous_from_camera: NDArray[np.float64] | None = None,
+        motion_covariance: list[list[float]] | None = None,
         up: tuple[list[float], list[float]] | None = None,
     ) -> Localization: ...
     def reset(self) -> None: ...

@@ -13,6 +13,7 @@ mod odometry;
 mod pose;
 mod render;
 mod stereo;
+mod threads;
 mod tracking;
 
 use pomona::stereo::alignment::CORRECTED;
@@ -26,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<matching::PyReadyCloud>()?;
     module.add_class::<localization::PyLocalization>()?;
     module.add_class::<localization::PyLocalizer>()?;
+    module.add_class::<threads::PyThreads>()?;
     module.add_class::<odometry::PyLooking>()?;
     module.add_class::<odometry::PyOdometry>()?;
     module.add_class::<render::PyRowScene>()?;

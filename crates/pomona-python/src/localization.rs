@@ -2,12 +2,13 @@
 
 use crate::bundle::{array, wrong};
 use crate::cloud::Arrays;
-use crate::matching::{mapped, pool_of, status};
+use crate::matching::{mapped, status};
 use crate::pose::{pose, pose_array};
+use crate::threads::PyThreads;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
-use pomona::nalgebra::Vector3;
+use pomona::nalgebra::{Matrix6, Vector3};
 use pomona::verified::compact::Bytes;
-use pomona::{Config, FruitCloud, Localization, Localizer, Pose};
+use pomona::{Config, FruitCloud, Localization, Localizer, Pose, ToldMotion};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -65,7 +66,7 @@ fn vertical(up: Up) -> Option<[Vector3<f64>; 2]> {
 #[pyclass(name = "Localizer", module = "pomona._core")]
 pub struct PyLocalizer {
     localizer: Localizer,
-    pool: Option<rayon::ThreadPool>,
+    pool: Option<Arc<rayon::ThreadPool>>,
 }
 
 #[pymethods]
@@ -73,14 +74,20 @@ pub struct PyLocalizer {
 impl PyLocalizer {
     #[new]
     #[pyo3(signature = (map, *, config, threads=None))]
-    fn new(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+    fn new(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<&PyThreads>) -> PyResult<Self> {
         Self::made(py, &map, config, threads, Localizer::new)
     }
 
     /// A map whose index is in a file, which is mapped into memory.
     #[staticmethod]
     #[pyo3(signature = (path, map, *, config, threads=None))]
-    fn opened(py: Python<'_>, path: PathBuf, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
+    fn opened(
+        py: Python<'_>,
+        path: PathBuf,
+        map: Arrays<'_>,
+        config: &str,
+        threads: Option<&PyThreads>,
+    ) -> PyResult<Self> {
         let bytes: Bytes = Arc::new(mapped(&path)?);
         Self::made(py, &map, config, threads, |cloud, config| Localizer::opened(&bytes, cloud, config))
     }
@@ -96,15 +103,18 @@ impl PyLocalizer {
         found.map(PyLocalization).map_err(wrong)
     }
 
-    #[pyo3(signature = (seen, *, previous_from_camera=None, up=None))]
+    #[pyo3(signature = (seen, *, previous_from_camera=None, motion_covariance=None, up=None))]
     fn update(
         &mut self,
         py: Python<'_>,
         seen: Arrays<'_>,
         previous_from_camera: Option<PyReadonlyArray2<'_, f64>>,
+        motion_covariance: Option<[[f64; 6]; 6]>,
         up: Up,
     ) -> PyResult<PyLocalization> {
         let moved = previous_from_camera.map(|moved| pose("moved", &moved, Pose::from_matrix)).transpose()?;
+        let covariance = motion_covariance.map(|rows| Matrix6::from_fn(|row, column| rows[row][column]));
+        let moved = moved.map(|previous_from_camera| ToldMotion { previous_from_camera, covariance });
         let (cloud, up) = (seen.to_cloud()?, vertical(up));
         let Self { localizer, pool } = self;
         let mut update = || localizer.update(&cloud, moved.as_ref(), up);
@@ -125,11 +135,11 @@ impl PyLocalizer {
         py: Python<'_>,
         map: &Arrays<'_>,
         config: &str,
-        threads: Option<usize>,
+        threads: Option<&PyThreads>,
         make: impl FnOnce(&FruitCloud, Config) -> pomona::Result<Localizer> + Send,
     ) -> PyResult<Self> {
         let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-        let pool = threads.map(pool_of).transpose()?;
+        let pool = threads.map(PyThreads::pool);
         let cloud = map.to_cloud()?;
         let make = || make(&cloud, config);
         let localizer = py.detach(|| match &pool {

@@ -94,7 +94,7 @@ pub use cloud::{FruitCloud, Views};
 pub use config::Config;
 pub use error::{Error, Result};
 pub use geometry::{Scale, Similarity};
-pub use localization::{Localization, Localizer};
+pub use localization::{Localization, Localizer, ToldMotion};
 pub use matching::{MapIndex, Method, ReadyCloud, Request, match_clouds, match_expected};
 pub use pose::Pose;
 pub use verified::VerifiedConfig;

@@ -3,7 +3,7 @@
 mod support;
 
 use pomona::nalgebra::{Matrix3, Matrix6, Point3, Rotation3, Vector3};
-use pomona::{Config, FruitCloud, Localizer, Pose, Verdict};
+use pomona::{Config, FruitCloud, Localizer, Pose, ToldMotion, Verdict};
 use support::{Random, row};
 
 /// Standard deviation of a sighting per axis, metres.
@@ -45,7 +45,7 @@ fn a_frame_is_found_from_nothing_and_the_next_ones_follow() {
     for step in 0..8 {
         let pose = camera_at(1.0 + 0.3 * f64::from(step));
         let frame = seen(&fruits, &pose, random);
-        let moved = (step > 0).then(|| pose.seen_from(&camera_at(0.7 + 0.3 * f64::from(step))));
+        let moved = (step > 0).then(|| ToldMotion::from(pose.seen_from(&camera_at(0.7 + 0.3 * f64::from(step)))));
         let found = localizer.update(&frame, moved.as_ref(), None).expect("a frame");
         assert_eq!((found.verdict, found.tracked), (Verdict::Found, step > 0));
         assert!(error_m(found.pose, &pose) < 0.02);
@@ -100,7 +100,7 @@ fn errors_of_a_drive(lie_m: f64, random: &mut Random) -> Vec<f64> {
             frame = with_covariances(frame.positions[..frame.len().min(3)].to_vec());
             moved.translation.x += lie_m;
         }
-        let found = localizer.update(&frame, (step > 0).then_some(&moved), None).expect("a frame");
+        let found = localizer.update(&frame, (step > 0).then_some(&moved.into()), None).expect("a frame");
         errors_m.extend(found.pose.map(|pose| error_m(Some(pose), &camera_at(way_m(step)))));
     }
     errors_m

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
-from pomona.arrays import rigid_matrices
+from pomona.arrays import definite_matrices, rigid_matrices
 from pomona.cards import as_card
 from pomona.cloud import Cloud, as_cloud
 from pomona.core_settings import core_settings
+from pomona.core_threads import Threads, core_threads
 from pomona.errors import PomonaError
 from pomona.kept_index import out_of_index
 from pomona.localize.map_fruits import hanging_rows
 from pomona.matching import Index, Up, Verdict, core_arrays, core_vertical
-from pomona.threads import capped_threads
 
 __all__ = ["Localization", "Localizer"]
 
@@ -86,8 +86,9 @@ class Localizer:
         The fruits, metres; of an orchard map each where it was last seen, without those that are gone.
     config : mapping, optional
         Values of the core's tables that differ from `pomona.default_config()`; `localization` and `verified` are used.
-    threads : int, optional
-        Threads of the search from nothing, at most one a core. The answer does not depend on it.
+    threads : int or Threads, optional
+        Threads of the search from nothing, at most one a core; what `pomona.core_threads.core_threads` gives, several
+        maps share. The answer does not depend on it.
     index : str or Path, optional
         File for the index of a large map, which then opens at once: made where there is none, and made anew, with a
         `PomonaWarning`, where it is of another map or version, or damaged.
@@ -103,16 +104,16 @@ class Localizer:
         map: Cloud,
         *,
         config: Mapping[str, Any] | None = None,
-        threads: int | None = None,
+        threads: int | Threads | None = None,
         index: str | Path | None = None,
     ) -> None:
         cloud = as_cloud(map)
         self._rows = hanging_rows(cloud)
-        hanging, settings, most = cloud.select(self._rows), core_settings(config), capped_threads(threads)
+        hanging, settings, most = cloud.select(self._rows), core_settings(config), core_threads(threads)
         arrays = core_arrays(hanging)
 
         def make(path: Path) -> None:
-            Index(hanging, config=config, threads=threads, compact=True).save(path)
+            Index(hanging, config=config, threads=None if most is None else most.count, compact=True).save(path)
 
         def read(path: Path) -> _core.Localizer:
             return _core.Localizer.opened(path, arrays, config=settings, threads=most)
@@ -156,7 +157,14 @@ class Localizer:
         except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"frame: {error}") from None
 
-    def update(self, cloud: Cloud, moved: ArrayLike | None = None, *, up: Up | None = None) -> Localization:
+    def update(
+        self,
+        cloud: Cloud,
+        moved: ArrayLike | None = None,
+        *,
+        covariance: ArrayLike | None = None,
+        up: Up | None = None,
+    ) -> Localization:
         """Find the camera with what is known from the frames before.
 
         Parameters
@@ -166,6 +174,9 @@ class Localizer:
         moved : (4, 4) array_like, optional
             The camera's pose now in the frame of the camera at the last call, where odometry tells it; else it is
             thought to move on as it did.
+        covariance : (6, 6) array_like, optional
+            Of `moved`, as `Localization.covariance`: of a step of the camera in its own frame now, metres and radians.
+            Else what is usual: half a centimetre and 2 % of the way in each axis, 0.3 degrees.
         up : optional
             As in `locate`; to find the camera it is used from nothing only.
 
@@ -175,9 +186,10 @@ class Localizer:
             As in `locate`.
         """
         arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
-        step = None if moved is None else rigid_matrices("moved", moved)
+        step, spread = _checked_motion(moved, covariance)
         try:
-            return self._answer(self._core.update(arrays, previous_from_camera=step, up=vertical))
+            found = self._core.update(arrays, previous_from_camera=step, motion_covariance=spread, up=vertical)
+            return self._answer(found)
         except (ValueError, TypeError, OverflowError) as error:
             raise PomonaError(f"frame: {error}") from None
 
@@ -196,3 +208,16 @@ class Localizer:
             log_odds=found.log_odds,
             tracked=found.tracked,
         )
+
+
+def _checked_motion(
+    moved: ArrayLike | None, covariance: ArrayLike | None
+) -> tuple[NDArray[np.float64] | None, list[list[float]] | None]:
+    """Give the motion and its covariance, exactly symmetric, as the core takes them."""
+    if moved is None and covariance is not None:
+        raise PomonaError("covariance: found one without moved, expected that of a motion")
+    step = None if moved is None else rigid_matrices("moved", moved)
+    if covariance is None:
+        return step, None
+    spread = definite_matrices("covariance", covariance, (6, 6))
+    return step, (0.5 * (spread + spread.T)).tolist()

@@ -64,7 +64,9 @@ class LiveCamera:
         pose[:3, :3] = self._optics.rectified_from_left.T
         return pose
 
-    def look(self, left: Any, right: Any, moved: ArrayLike | None = None) -> tuple[FruitCloud, Localization]:
+    def look(
+        self, left: Any, right: Any, moved: ArrayLike | None = None, covariance: ArrayLike | None = None
+    ) -> tuple[FruitCloud, Localization]:
         """Give the fruits that a pair of `Image` messages shows, in the rectified camera, and where that is.
 
         Parameters
@@ -73,6 +75,8 @@ class LiveCamera:
             Of rosbags or of rclpy.
         moved : (4, 4) array_like, optional
             The camera's pose now in its frame at the last call, as for `pomona.Localizer.update`.
+        covariance : (6, 6) array_like, optional
+            Of `moved`, as there.
 
         Raises
         ------
@@ -85,4 +89,4 @@ class LiveCamera:
         self._count += 1
         boxes_px = self._detector(frame).boxes_px
         fruits = cloud_of(lift(self._measure(left_bgr, right_bgr, boxes_px), boxes_px, self._optics.calibration))
-        return fruits, self._localizer.update(fruits, moved)
+        return fruits, self._localizer.update(fruits, moved, covariance=covariance)

@@ -64,8 +64,6 @@ pub(super) struct Say {
     pub voice: f64,
     /// As the sighting's.
     pub age: usize,
-    /// Weighted mean of where its fruits are from there.
-    pub residual: Vector3<f64>,
     /// Sum of weighted inverse covariances.
     pub information: Matrix3<f64>,
     /// Slopes of its place by the step of the pose and by the slip.
@@ -73,9 +71,9 @@ pub(super) struct Say {
     /// The fruit with the largest weight.
     pub best: Option<usize>,
     /// Its pull: the sum of weighted inverse covariances times residuals.
-    pull: Vector3<f64>,
+    pub pull: Vector3<f64>,
     /// Sum of the weighted squared Mahalanobis distances.
-    squared: f64,
+    pub squared: f64,
     /// The sum of N over rho.
     ratio: f64,
 }
@@ -91,8 +89,6 @@ pub(super) struct Aligned {
     pub links: Vec<Link>,
     /// Evidence against chance, nats.
     pub log_odds: f64,
-    /// Mean squared Mahalanobis distance of a link, over 3.
-    pub spread: f64,
 }
 
 /// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
@@ -124,9 +120,8 @@ fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, sha
         .map(|(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links))))
         .collect();
     let (information, _) = normal(&says, slip);
-    let (squared, weight) = says.iter().fold((0.0, 0.0), |sum, say| (sum.0 + say.squared, sum.1 + say.weight));
     let log_odds = best_share(&says).1;
-    Aligned { pose, slip: *slip, information, says, links, log_odds, spread: squared / (3.0 * weight).max(1.0) }
+    Aligned { pose, slip: *slip, information, says, links, log_odds }
 }
 
 fn say(
@@ -155,7 +150,6 @@ fn say(
         weight: 0.0,
         voice: seen.voice,
         age: seen.age,
-        residual: Vector3::zeros(),
         information: Matrix3::zeros(),
         slopes,
         best: None,
@@ -167,16 +161,12 @@ fn say(
     for one in &near {
         let weight = share * one.height / whole;
         says.weight += weight;
-        says.residual += one.error * weight;
         says.information += one.inverse * weight;
         says.pull += one.inverse * one.error * weight;
         says.squared += weight * one.squared;
         if one.height > most {
             (most, says.best) = (one.height, Some(one.row));
         }
-    }
-    if says.weight > 0.0 {
-        says.residual /= says.weight;
     }
     if let Some((sighting, links)) = links {
         let link = |one: &Candidate| Link { sighting, map: one.row, probability: share * one.height / whole };

@@ -1,6 +1,7 @@
 //! What localisation gives.
 
 use crate::answer::Verdict;
+use crate::error::{Error, Result};
 use crate::pose::Pose;
 use nalgebra::Matrix6;
 
@@ -13,6 +14,36 @@ pub struct MapPair {
     pub map: usize,
     /// Probability that the two are one fruit.
     pub probability: f64,
+}
+
+/// How the camera moved, as odometry tells it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToldMotion {
+    /// The camera's pose now in its frame before.
+    pub previous_from_camera: Pose,
+    /// Covariance of its step, as [`Localization::covariance`]; `None`: what is usual of such a way.
+    pub covariance: Option<Matrix6<f64>>,
+}
+
+impl From<Pose> for ToldMotion {
+    fn from(previous_from_camera: Pose) -> Self {
+        Self { previous_from_camera, covariance: None }
+    }
+}
+
+impl ToldMotion {
+    /// Checks the covariance.
+    ///
+    /// # Errors
+    /// It is not symmetric positive definite.
+    pub fn validate(&self) -> Result<()> {
+        let is_one = |matrix: &Matrix6<f64>| *matrix == matrix.transpose() && matrix.cholesky().is_some();
+        if self.covariance.as_ref().is_none_or(is_one) {
+            return Ok(());
+        }
+        let reason = "found a matrix that is not symmetric positive definite".to_owned();
+        Err(Error::Request { name: "motion covariance", reason })
+    }
 }
 
 /// Where the camera is, or why nobody can say.

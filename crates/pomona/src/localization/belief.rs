@@ -4,15 +4,13 @@ use crate::bundle::steps::{carried, moved};
 use crate::pose::Pose;
 use nalgebra::{Matrix6, Vector6};
 
-/// Standard deviations of a place per axis, metres, and of a direction, radians.
-pub(super) type Sigmas = (f64, f64);
-
 /// How a pose steps from frame to frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {
     /// `previous_from_camera`.
     pub previous_from_camera: Pose,
-    pub sigmas: Sigmas,
+    /// Of its step in the frame of the camera after it.
+    pub covariance: Matrix6<f64>,
 }
 
 /// Of a motion that was measured: half a centimetre and two hundredths of the way.
@@ -25,8 +23,15 @@ const REPEATED: (f64, f64, f64) = (0.03, 0.5, 0.035);
 const UNKNOWN: (f64, f64, f64) = (0.15, 0.0, 0.1);
 
 impl Motion {
-    pub fn measured(previous_from_camera: Pose) -> Self {
-        Self::new(previous_from_camera, MEASURED)
+    /// `covariance` is what was told of it.
+    pub fn measured(previous_from_camera: Pose, covariance: Option<&Matrix6<f64>>) -> Self {
+        let usual = Self::new(previous_from_camera, MEASURED);
+        Self { covariance: covariance.copied().unwrap_or(usual.covariance), ..usual }
+    }
+
+    /// A motion that fruits correct at once.
+    pub fn sure(previous_from_camera: Pose) -> Self {
+        Self { previous_from_camera, covariance: Matrix6::zeros() }
     }
 
     pub fn repeated(previous_from_camera: Option<Pose>) -> Self {
@@ -35,7 +40,9 @@ impl Motion {
 
     fn new(previous_from_camera: Pose, (still_m, of_way, turn_rad): (f64, f64, f64)) -> Self {
         let way_m = previous_from_camera.translation.norm();
-        Self { previous_from_camera, sigmas: (still_m + of_way * way_m, turn_rad) }
+        let place = still_m + of_way * way_m;
+        let sigmas = Vector6::new(place, place, place, turn_rad, turn_rad, turn_rad);
+        Self { previous_from_camera, covariance: Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma)) }
     }
 }
 
@@ -55,11 +62,9 @@ impl Belief {
     pub fn after(&self, motion: &Motion) -> Self {
         let step = &motion.previous_from_camera;
         let turned = carried(step);
-        let (place, turn) = motion.sigmas;
-        let noise = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         Self {
             pose: self.pose.after(step),
-            covariance: turned * self.covariance * turned.transpose() + noise,
+            covariance: turned * self.covariance * turned.transpose() + motion.covariance,
             motion: Some(*step),
         }
     }

@@ -1,7 +1,7 @@
 //! The story of one frame after the other.
 
 use super::alignment::{Aligned, Joint, Link, align};
-use super::answer::{Localization, MapPair};
+use super::answer::{Localization, MapPair, ToldMotion};
 use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
 use super::known::KnownFruits;
@@ -103,23 +103,25 @@ impl Localizer {
         self.search(&Sighting::of(seen), seen, up)
     }
 
-    /// Where the camera is now, `previous_from_camera` being how it moved since the last call where that is known.
+    /// Where the camera is now, `told` being how it moved since the last call where that is known.
     ///
     /// # Errors
-    /// As [`Self::locate`].
+    /// As [`Self::locate`], and a covariance that is wrong.
     pub fn update(
         &mut self,
         seen: &FruitCloud,
-        previous_from_camera: Option<&Pose>,
+        told: Option<&ToldMotion>,
         up: Option<[Vector3<f64>; 2]>,
     ) -> Result<Localization> {
         seen.validate()?;
-        let moved = self.motions.next(previous_from_camera, &mut self.window);
+        told.map_or(Ok(()), ToldMotion::validate)?;
+        let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
+        let moved = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
         let predicted = self.predicted(moved.as_ref());
         match (moved, self.belief.and_then(|belief| belief.motion)) {
-            (Some(step), _) => self.window.step(&step, Motion::measured(step).sigmas),
+            (Some(motion), _) => self.window.step(&motion),
             // Where fruits tell how it moved, that is corrected at once.
-            (None, Some(step)) => self.window.step(&step, (0.0, 0.0)),
+            (None, Some(step)) => self.window.step(&Motion::sure(step)),
             (None, None) => self.window.forget(),
         }
         self.window.push(Sighting::of(seen), self.config.window_frames);
@@ -135,7 +137,7 @@ impl Localizer {
             // Whatever the camera lost itself by may be what was learned.
             self.motions = ToldMotions::default();
         }
-        self.learn(&found, moved.as_ref());
+        self.learn(&found, step.as_ref());
         Ok(found)
     }
 
@@ -146,10 +148,10 @@ impl Localizer {
         self.window.forget();
     }
 
-    fn predicted(&self, previous_from_camera: Option<&Pose>) -> Option<Belief> {
+    fn predicted(&self, moved: Option<&Motion>) -> Option<Belief> {
         let belief = self.belief.as_ref()?;
         let repeated = || Motion::repeated(belief.motion);
-        Some(belief.after(&previous_from_camera.map_or_else(repeated, |step| Motion::measured(*step))))
+        Some(belief.after(&moved.copied().unwrap_or_else(repeated)))
     }
 
     /// The pose near the predicted one, if the fruits agree with it.

@@ -1,7 +1,7 @@
 //! How surely a pose is known when fruits do not err independently.
 //!
 //! The pose is a weighted mean of what n sightings say, with gains G = H^-1 J^T W. Independent errors average out and leave
-//! H^-1. Errors that they share do not: the covariance is `H^-1 + H^-1 (sum over i, k of U_i C_ik U_k^T) H^-1` with
+//! phi H^-1. Errors that they share do not: the covariance is `phi H^-1 + H^-1 (sum over i, k of U_i C_ik U_k^T) H^-1` with
 //! `U = J^T W`, and `C_ik = a^2 + b^2 exp(-d^2 / 2 r^2)` of two sightings d apart; two sightings of one fruit also share
 //! where it hangs.
 //!
@@ -9,16 +9,14 @@
 //! of all pairs that are older.
 //!
 //! a is what all in view share: branches that grow heavy sink together. The pose takes it up, so that no residual shows
-//! it, and somebody has to say it; across the vertical, where that is known, it is less. b is what only neighbours share, and their residuals show it.
+//! it, and somebody has to say it; across the vertical, where that is known, it is less. b is what only neighbours share; their
+//! residuals show it, and phi, by how much sightings err more or less than their covariances say (`residuals`).
 
 use super::alignment::{Aligned, Joint, Say, UNKNOWNS};
-use super::belief::Sigmas;
 use super::config::LocalizationConfig;
 use super::known::KnownFruits;
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
-
-/// Pairs below which residuals say nothing about what neighbours share.
-const MIN_SHARED: f64 = 20.0;
+use super::residuals::{Shown, kinship, shown};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 /// How far fruits hang from where the map has them together.
 pub(super) struct Sag {
@@ -41,10 +39,10 @@ impl Sag {
 }
 
 /// Covariance of the pose's step and of the slip.
-pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Sigmas], sag: &Sag) -> Option<Joint> {
+pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Matrix6<f64>], sag: &Sag) -> Option<Joint> {
     let alone = aligned.information.cholesky()?.inverse();
-    let near = shown(&aligned.says, sag.reach_m).map_or(sag.all, Matrix3::from_diagonal_element);
-    let errors = Shared { together: sag.all, near, reach_m: sag.reach_m };
+    let Shown { scale, near } = shown(aligned, &alone, sag.reach_m);
+    let errors = Shared { together: sag.all, near: Matrix3::from_diagonal_element(near), reach_m: sag.reach_m };
     let pulls: Vec<Pull> = aligned.says.iter().map(|say| (say, say.slopes.transpose() * say.information)).collect();
     let mut middle = Joint::zeros();
     for (i, (one, pull)) in pulls.iter().enumerate() {
@@ -55,19 +53,18 @@ pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Sigmas], s
         let half = pull * sum;
         middle += half + half.transpose();
     }
-    for (before, sigmas) in way.iter().enumerate() {
-        middle += of_motion(&pulls, before, *sigmas);
+    for (before, motion) in way.iter().enumerate() {
+        middle += of_motion(&pulls, before, motion);
     }
-    Some(alone * aligned.spread.max(1.0) + alone * middle * alone)
+    Some(alone * scale + alone * middle * alone)
 }
 
 /// What the frames before a motion err by together, `after` being the motions after it.
-fn of_motion(pulls: &[Pull], after: usize, (place, turn): Sigmas) -> Joint {
+fn of_motion(pulls: &[Pull], after: usize, covariance: &Matrix6<f64>) -> Joint {
     let older = pulls.iter().filter(|(say, _)| say.age > after);
     let gain = older
         .fold(SMatrix::<f64, UNKNOWNS, 6>::zeros(), |sum, (say, pull)| sum + pull * say.slopes.fixed_columns::<6>(0));
-    let sigmas = Vector6::new(place, place, place, turn, turn, turn);
-    gain * Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma)) * gain.transpose()
+    gain * covariance * gain.transpose()
 }
 
 /// A sighting, and `U`.
@@ -91,25 +88,4 @@ impl Shared {
             _ => shared,
         }
     }
-}
-
-fn kinship(one: &Say, other: &Say, reach_m: f64) -> f64 {
-    (-0.5 * (one.place - other.place).norm_squared() / (reach_m * reach_m)).exp()
-}
-
-/// Variance per axis that neighbours' residuals share, square metres, of what the pose has not taken up; none where they
-/// are too few to tell.
-fn shown(says: &[Say], reach_m: f64) -> Option<f64> {
-    let (mut products, mut pairs, mut weights) = (0.0, 0.0, 0.0);
-    for (i, one) in says.iter().enumerate() {
-        weights += one.weight;
-        for other in &says[i + 1..] {
-            if one.best != other.best {
-                let kernel = one.weight * other.weight * kinship(one, other, reach_m);
-                products += kernel * one.residual.dot(&other.residual);
-                pairs += kernel;
-            }
-        }
-    }
-    (weights > MIN_SHARED && pairs > 0.0).then(|| (products / pairs / 3.0).max(0.0))
 }

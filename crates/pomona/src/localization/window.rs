@@ -1,9 +1,11 @@
 //! The last frames, seen from where the camera is now.
 
-use super::belief::Sigmas;
+use super::belief::Motion;
 use super::sightings::Sighting;
 use super::slip::Slip;
+use crate::bundle::steps::carried;
 use crate::pose::Pose;
+use nalgebra::Matrix6;
 use std::collections::VecDeque;
 
 /// How surely the way between two frames is known, metres: it adds up over the frames.
@@ -19,15 +21,19 @@ const ONE_FRUIT_M: f64 = 0.05;
 pub(super) struct Window {
     /// Newest first, each from its own camera, with `now_from_then`.
     frames: VecDeque<(Pose, Vec<Sighting>)>,
-    /// How surely the motion after each but the newest is known.
-    motions: VecDeque<Sigmas>,
+    /// Covariance of the motion after each but the newest, as a step of the camera as it is now.
+    motions: VecDeque<Matrix6<f64>>,
 }
 
 impl Window {
     /// The camera has moved: what was seen lies elsewhere from it.
-    pub fn step(&mut self, previous_from_camera: &Pose, sigmas: Sigmas) {
-        self.motions.push_front(sigmas);
-        let now_from_previous = previous_from_camera.inverse();
+    pub fn step(&mut self, motion: &Motion) {
+        let turned = carried(&motion.previous_from_camera);
+        for covariance in &mut self.motions {
+            *covariance = turned * *covariance * turned.transpose();
+        }
+        self.motions.push_front(motion.covariance);
+        let now_from_previous = motion.previous_from_camera.inverse();
         for (now_from_then, _) in &mut self.frames {
             *now_from_then = now_from_previous.after(now_from_then);
         }
@@ -60,8 +66,8 @@ impl Window {
         self.motions.clear();
     }
 
-    /// How surely each motion is known, the last one first.
-    pub fn way(&self) -> Vec<Sigmas> {
+    /// Covariance of each motion, the last one first.
+    pub fn way(&self) -> Vec<Matrix6<f64>> {
         self.motions.iter().copied().collect()
     }
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.core_threads import core_threads
 from pomona.localize import Localizer
 from pomona.survey.refinement import Motions
 
@@ -80,7 +81,7 @@ class Constellations:
     def __init__(
         self, clouds: Sequence[FruitCloud], *, config: Mapping[str, Any] | None = None, threads: int | None = None
     ) -> None:
-        self._clouds, self._threads = list(clouds), threads
+        self._clouds, self._threads = list(clouds), core_threads(threads)
         self._config = config or {}
         self._ready: dict[int, Localizer] = {}
 

@@ -99,7 +99,7 @@ class FruitSlam:
         moved: Array | None = None,
         information: Array | None = None,
         *,
-        doubtful: bool = False,
+        doubtful: bool = True,
     ) -> PlacedFrame:
         """Place the next frame.
 
@@ -112,7 +112,8 @@ class FruitSlam:
         information : (6, 6) float64
             Inverse covariance of `moved`, of a step (translation, rotation) in the frame of this camera.
         doubtful : bool
-            Whether `moved` may be wrong altogether, of wheels that slip: `way` lets it go where links contradict it.
+            Whether `moved` may be wrong altogether, as of wheels that slip: links and loops outvote such a motion. Else
+            it is trusted as far as its information says.
 
         Raises
         ------
