@@ -177,7 +177,12 @@ def test_before_the_cameras_are_known_nothing_is_said(graph, drive):
 def test_the_motion_past_a_pair_that_cannot_be_looked_at_is_not_lost(graph, drive, monkeypatch):
     moved = []
     update = Localizer.update
-    monkeypatch.setattr(Localizer, "update", lambda self, cloud, step: moved.append(step) or update(self, cloud, step))
+
+    def noting(self, cloud, step, **known):
+        moved.append(step)
+        return update(self, cloud, step, **known)
+
+    monkeypatch.setattr(Localizer, "update", noting)
     intact = drive["/stereo/left/image_rect_color"]
     broken = [intact[0], SimpleNamespace(**{**vars(intact[1]), "encoding": "secret"}), *intact[2:]]
     drive_past(graph, {**drive, "/stereo/left/image_rect_color": broken}, 3)

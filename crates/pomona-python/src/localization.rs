@@ -70,7 +70,11 @@ pub struct PyLocalizer {
 }
 
 #[pymethods]
-#[expect(clippy::needless_pass_by_value, reason = "arguments arrive by value from Python")]
+#[expect(
+    clippy::needless_pass_by_value,
+    clippy::large_types_passed_by_value,
+    reason = "arguments arrive by value from Python"
+)]
 impl PyLocalizer {
     #[new]
     #[pyo3(signature = (map, *, config, threads=None))]
