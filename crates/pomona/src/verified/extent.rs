@@ -12,9 +12,6 @@ use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-/// Share of the half-turns about a row's axes that a known vertical leaves.
-pub(super) const UPRIGHT: f64 = 0.5;
-
 /// Standard deviations of the annealing, in spacings of the map: from the width of a branch down by a factor 0.75.
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
 

@@ -147,7 +147,6 @@ pub(crate) fn without_scale(code: &Code) -> Code {
 pub(crate) fn enumerate(landscape: &Landscape, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
-        .with_min_len(SHARE_OF_FRUITS)
         .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), row as u32))
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
@@ -205,10 +204,6 @@ pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], row: u32) ->
     sets
 }
 
-/// Seeds that are worth a thread of their own, and fruits whose seeds are.
-const SHARE_OF_SEEDS: usize = 4096;
-const SHARE_OF_FRUITS: usize = 32;
-
 /// The seeds of the map, searchable by code.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedIndex {
@@ -225,7 +220,7 @@ impl SeedIndex {
             Scale::Free => without_scale(code),
         };
         let (codes, order) = CodeGrid::new(seeds.len(), |row| code(&seeds[row]));
-        let quads = order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| seeds[row as usize].0).collect();
+        let quads = order.par_iter().map(|&row| seeds[row as usize].0).collect();
         Self { quads, codes }
     }
 

@@ -6,10 +6,10 @@ use super::seed_blocks::Anchored;
 use super::shapes::{Scratch, Shape, Shapes, in_steps, rounded};
 use super::surroundings::Neighbourhood;
 use crate::verified::codes::Code;
+use crate::verified::contender::Contender;
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
-use crate::verified::proposal::Proposer;
-use crate::verified::search::{Contender, Effort};
+use crate::verified::proposal::{Effort, Proposer};
 use crate::verified::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, enumerate, near_ties, shuffled};
 use rayon::prelude::*;
 
