@@ -77,15 +77,17 @@ impl Cells {
             let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
             (at(beyond), at(values.len().saturating_sub(1 + beyond)))
         });
+        // Of cells finer than this single precision mistakes more than their rounding.
+        let finest = f32::EPSILON / ROUNDING;
         // Of codes that are all the same, or none, the finest edge is a number too.
-        let least = f32::MIN_POSITIVE / FINEST;
+        let least = f32::MIN_POSITIVE / finest;
         let widest = extents.iter().fold(least, |widest, (low, high)| widest.max(high - low));
         let cells = |(low, high): (f32, f32), edge: f32| ((high - low) / edge).ceil().max(1.0) as u32;
         let mut edge = widest;
         loop {
             let finer = 0.9 * edge;
             let all: f64 = extents.iter().map(|&extent| f64::from(cells(extent, finer))).product();
-            if all > most || finer < FINEST * widest {
+            if all > most || finer < finest * widest {
                 break;
             }
             edge = finer;
@@ -232,9 +234,6 @@ const SAMPLE: usize = 1024;
 
 /// Share of the sample beyond either end of an axis: a few large seeds shall not make the cells of all others coarse.
 const BEYOND: f64 = 0.02;
-
-/// Width of a cell over the widest axis, at the least: of finer ones single precision mistakes more than [`ROUNDING`].
-const FINEST: f32 = f32::EPSILON / ROUNDING;
 
 /// Written number by number: a sum over the numbers in the order of memory is compiled lane by lane.
 #[inline]

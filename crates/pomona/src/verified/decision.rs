@@ -55,7 +55,8 @@ const LEAST_LAID: f64 = 16.0;
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
 pub(super) const SURE: f64 = 6.0;
 
-/// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the other
+/// poses that an answer has to stand out of.
 const UPRIGHT_SEEDS: u64 = 2;
 
 /// Finds the query in the map.

@@ -12,8 +12,8 @@ use super::decision::{MIN_FRUITS, SURE, answer_of};
 use super::nearest::single;
 use super::placement::Placement;
 use super::proposal::{Effort, Proposer};
-use super::search::{RADIUS, of_some_fruits};
-use super::seeds::{Quad, SHORTEST, STARS, Seed};
+use super::search::of_some_fruits;
+use super::seeds::{Quad, SHORTEST, STARS, Seed, WITHIN};
 use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
@@ -70,7 +70,7 @@ impl Search<'_> {
         let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
         let fruits = quad.map(|row| self.query.points[row as usize]);
         let near = fruits.map(|fruit| self.near(&expected.apply(&fruit)));
-        let most = 2.0 * (RADIUS * self.model.sigma).powi(2);
+        let most = 2.0 * (WITHIN * self.model.sigma).powi(2);
         let effort = &mut Effort::default();
         self.each_alike(&fruits, &near, &mut |target| found.extend(proposer.contender(&target, most, effort)));
     }
@@ -89,7 +89,7 @@ impl Search<'_> {
         let place = |row: u32| self.map.points[row as usize];
         let alike = |one: usize, other: usize, rows: [u32; 2]| {
             let [here, there] = rows.map(place);
-            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < RADIUS * self.model.sigma
+            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < WITHIN * self.model.sigma
         };
         for &a in &near[0] {
             for &b in near[1].iter().filter(|&&b| alike(0, 1, [a, b])) {

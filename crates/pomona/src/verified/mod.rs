@@ -61,4 +61,4 @@ pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
 pub(crate) use landscape::{Landscape, median};
 pub(crate) use nearest::single;
-pub(crate) use seeds::{COMPANIONS, NEAR_TIE, Quad, SHORTEST, SeedIndex, canonical, frame, near_ties, shuffled};
+pub(crate) use seeds::{COMPANIONS, Quad, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled};

@@ -5,7 +5,7 @@ use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::{Hypothesis, Refiner};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
-use super::seeds::{NEAR_TIE, SHORTEST, Seed, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, shuffled, without_scale};
 use crate::geometry::Scale;
 use rayon::prelude::*;
 
@@ -51,11 +51,11 @@ impl Search<'_> {
         }
         // Standard deviations that the two seeds may differ by.
         let apart = match model.scale {
-            Scale::Metric => RADIUS * (length / (LONG * sigma)).clamp(1.0, WIDEST),
-            Scale::Free => RADIUS,
+            Scale::Metric => WITHIN * (length / (LONG * sigma)).clamp(1.0, WIDEST),
+            Scale::Free => WITHIN,
         };
         let (mut runs, mut hits) = (Vec::new(), Vec::new());
-        near_ties(&query.points, seed.0, NEAR_TIE * sigma, &mut |quad, code| {
+        near_ties(&query.points, seed.0, WITHIN * sigma, &mut |quad, code| {
             effort.codes += 1;
             let (code, radius) = match model.scale {
                 Scale::Metric => (code, apart * sigma),
@@ -85,11 +85,6 @@ impl Search<'_> {
         hypotheses
     }
 }
-
-/// Reach of the code search in standard deviations of one axis.
-///
-/// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
-pub(super) const RADIUS: f64 = 2.5;
 
 /// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many
 /// times.

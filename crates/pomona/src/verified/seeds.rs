@@ -22,8 +22,11 @@ const MIN_FLATNESS: f64 = 0.15;
 /// Seeds shorter than this, in standard deviations of the noise, fix no pose.
 pub(crate) const SHORTEST: f64 = 6.0;
 
-/// Standard deviations by which noise may have made one of two lengths the longer: twice that of their difference.
-pub(crate) const NEAR_TIE: f64 = 2.8;
+/// Standard deviations of one axis within which noise moves what a seed shows: the numbers of its code, the longer of two
+/// lengths, and how its pose leans.
+///
+/// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
+pub(crate) const WITHIN: f64 = 2.5;
 
 /// Four rows labelled A, B, C, D.
 pub(crate) type Quad = [u32; STARS];
