@@ -11,8 +11,7 @@ use crate::error::Result;
 use crate::geometry::{Scale, Similarity, fit};
 use crate::neighbours::tree::Tree;
 use crate::verified::{
-    COMPANIONS, Landscape, NEAR_TIE, Quad, SEED_SIGMA, SHORTEST, SeedIndex, canonical, frame, near_ties, shuffled,
-    single,
+    COMPANIONS, Landscape, Quad, SEED_SIGMA, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled, single,
 };
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -155,7 +154,7 @@ impl<'a> Search<'a> {
             if f64::from(code[0]) < SHORTEST * self.sigma {
                 continue;
             }
-            near_ties(&around, quad, NEAR_TIE * self.sigma, &mut |quad, code| {
+            near_ties(&around, quad, WITHIN * self.sigma, &mut |quad, code| {
                 hits.clear();
                 self.seeds.codes.within(&code, (RADIUS * self.sigma) as f32, &mut runs, |hit| hits.push(hit));
                 if let Some(axes) = frame(&around, &quad).filter(|_| hits.len() <= COMMON) {

@@ -6,7 +6,7 @@ use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::placement::Placement;
-use super::search::Effort;
+use super::proposal::Effort;
 use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::size::Diameters;

@@ -40,10 +40,6 @@ const LEAST_THICKNESS: f64 = 0.1;
 /// Different fruits among the neighbours of a fruit's neighbours, in clouds that have as many.
 const SEEN: f64 = 60.0;
 
-/// Fruits that are taken to hang alike in all directions, a spacing away, beside those seen: the weakest inverse-Wishart
-/// prior that has a mean counts for one.
-const ROUND: f64 = 1.0;
-
 /// A Gaussian.
 struct Kernel {
     scale: f64,
@@ -65,7 +61,8 @@ impl Kernel {
 /// How flat the cloud is around each fruit: the inverse covariance of a fruit's neighbours, less that of their longest
 /// extent, so that it is zero where fruits hang alike in all directions.
 ///
-/// A dozen fruits are flat by chance, so [`ROUND`] that hang alike in all directions are added to those seen.
+/// A dozen fruits are flat by chance, so one that hangs alike in all directions, a spacing away, is added to those seen: the
+/// weakest inverse-Wishart prior that has a mean. And noise gives some thickness to a wall that has none.
 fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Vec<Matrix3<f64>> {
     let around = |row: usize| {
         let near = neighbours.of(row);
@@ -86,7 +83,7 @@ fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> V
         let near = neighbours.of(row);
         let covariance =
             near.iter().map(|&other| of_each[other as usize]).sum::<Matrix3<f64>>() / near.len().max(1) as f64;
-        let covariance = (covariance * seen + round * ROUND) / (seen + ROUND) + noise;
+        let covariance = (covariance * seen + round) / (seen + 1.0) + noise;
         let longest = covariance.symmetric_eigenvalues().max();
         covariance.try_inverse().map_or(Matrix3::zeros(), |inverse| inverse - Matrix3::identity() / longest)
     };
@@ -107,12 +104,10 @@ pub(super) fn crowding(points: &[Vector3<f64>], neighbours: &Neighbours, spacing
     let total = counts.len().max(1) as f64;
     let mean = counts.iter().sum::<f64>() / total;
     let variance = counts.iter().map(|n| (n - mean).powi(2)).sum::<f64>() / total;
-    let shape = mean * mean / (variance - mean).max(LEAST_CROWDING * mean).max(f64::MIN_POSITIVE);
-    counts.iter().map(|n| (shape + n) / (shape + mean)).collect()
+    // Of counts that scatter no more than Poisson's, or are all none, every place is alike.
+    let inverse_shape = ((variance - mean) / (mean * mean)).max(0.0);
+    counts.iter().map(|n| (1.0 + inverse_shape * n) / (1.0 + inverse_shape * mean)).collect()
 }
-
-/// Variance of the counts beyond Poisson's, as a share of the mean, at the least.
-const LEAST_CROWDING: f64 = 0.05;
 
 /// The radial density of fruits around a fruit, from the cloud's own pairs.
 ///

@@ -77,15 +77,17 @@ impl Cells {
             let at = |place: usize| values.get(place).copied().unwrap_or(0.0);
             (at(beyond), at(values.len().saturating_sub(1 + beyond)))
         });
+        // Of cells finer than this single precision mistakes more than their rounding.
+        let finest = f32::EPSILON / ROUNDING;
         // Of codes that are all the same, or none, the finest edge is a number too.
-        let least = f32::MIN_POSITIVE / FINEST;
+        let least = f32::MIN_POSITIVE / finest;
         let widest = extents.iter().fold(least, |widest, (low, high)| widest.max(high - low));
         let cells = |(low, high): (f32, f32), edge: f32| ((high - low) / edge).ceil().max(1.0) as u32;
         let mut edge = widest;
         loop {
             let finer = 0.9 * edge;
             let all: f64 = extents.iter().map(|&extent| f64::from(cells(extent, finer))).product();
-            if all > most || finer < FINEST * widest {
+            if all > most || finer < finest * widest {
                 break;
             }
             edge = finer;
@@ -154,11 +156,12 @@ impl Cells {
 }
 
 impl CodeGrid {
-    /// The grid of the codes that the rows from 0 to `count` have, and the rows in its order.
+    /// The grid of the codes that the rows from 0 to `count` have, a cell for each code, and the rows in its order: with fewer
+    /// cells a search measures more codes, with more it looks into more cells.
     pub(crate) fn new(count: usize, code: impl Fn(usize) -> Code + Sync) -> (Self, Vec<u32>) {
-        let cut = Cells::cut(count, CELLS * count as f64, &code);
+        let cut = Cells::cut(count, count as f64, &code);
         let cell = |row: usize| cut.of(&code(row));
-        let cells: Vec<u32> = (0..count).into_par_iter().with_min_len(SHARE_OF_CODES).map(cell).collect();
+        let cells: Vec<u32> = (0..count).into_par_iter().map(cell).collect();
         let mut starts = vec![0u32; cut.len() + 1];
         for &cell in &cells {
             starts[cell as usize] += 1;
@@ -182,7 +185,7 @@ impl CodeGrid {
             }
             block
         };
-        let blocks = order.par_chunks(LANES).with_min_len(SHARE_OF_CODES / LANES).map(block).collect();
+        let blocks = order.par_chunks(LANES).map(block).collect();
         (Self { cells: cut, starts, blocks }, order)
     }
 
@@ -226,20 +229,11 @@ pub(crate) struct Run {
     gap: f32,
 }
 
-/// Codes that are worth a thread of their own.
-const SHARE_OF_CODES: usize = 4096;
-
-/// Cells a code: with fewer a search measures more codes, with more it looks into more cells.
-const CELLS: f64 = 1.0;
-
 /// Codes of which the extent of a grid is taken.
 const SAMPLE: usize = 1024;
 
 /// Share of the sample beyond either end of an axis: a few large seeds shall not make the cells of all others coarse.
 const BEYOND: f64 = 0.02;
-
-/// Width of a cell over the widest axis, at the least: single precision tells no finer ones apart.
-const FINEST: f32 = 1e-3;
 
 /// Written number by number: a sum over the numbers in the order of memory is compiled lane by lane.
 #[inline]

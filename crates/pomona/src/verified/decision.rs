@@ -2,6 +2,7 @@
 
 use super::acceptance::VerifiedConfig;
 use super::case::{Finding, Findings, Log, SETTLED, Search, Stages, VerifiedMap};
+use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
 use super::growth::{grow, hold, lay};
@@ -9,7 +10,8 @@ use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
 use super::placement::Placement;
-use super::search::{Contender, Effort, of_some_fruits};
+use super::proposal::Effort;
+use super::search::of_some_fruits;
 use super::seeds::{self, Seed};
 use super::size::Diameters;
 use super::vertical::Vertical;
@@ -53,7 +55,8 @@ const LEAST_LAID: f64 = 16.0;
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
 pub(super) const SURE: f64 = 6.0;
 
-/// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the other
+/// poses that an answer has to stand out of.
 const UPRIGHT_SEEDS: u64 = 2;
 
 /// Finds the query in the map.
@@ -126,7 +129,8 @@ impl<'a> Search<'a> {
             } else if index == 1 {
                 // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
                 findings.accepted.extend(self.by_outline());
-                log.threshold = self.threshold(extent::UPRIGHT);
+                // Of the half-turns about a row's axes a known vertical leaves one half.
+                log.threshold = self.threshold(0.5);
                 self.sift(&mut findings, &mut log);
             }
             if !findings.accepted.is_empty() {

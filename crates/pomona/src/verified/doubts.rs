@@ -1,12 +1,13 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
 use super::case::{Finding, Log, Search};
+use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Refiner};
 use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::{Landing, Moments, Placement};
-use super::search::{Contender, REACH, SAME_PLACE};
+use super::search::REACH;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -32,7 +33,7 @@ const MIRRORED: f64 = 1.3;
 const WHOLE: f64 = 0.7;
 
 /// Times that turned starts are tried.
-const POLISHES: usize = 3;
+pub(super) const POLISHES: usize = 3;
 
 /// Turns about each axis that a polish tries, radians: 7 degrees either way.
 const POLISH_TURNS: [f64; 2] = [-0.13, 0.13];

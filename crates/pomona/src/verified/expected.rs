@@ -7,12 +7,13 @@
 
 use super::acceptance::VerifiedConfig;
 use super::case::{Search, Stages, VerifiedMap};
+use super::contender::{Contender, by_evidence, distinct};
 use super::decision::{MIN_FRUITS, SURE, answer_of};
 use super::nearest::single;
 use super::placement::Placement;
-use super::proposal::Proposer;
-use super::search::{Contender, Effort, RADIUS, by_evidence, distinct, of_some_fruits};
-use super::seeds::{Quad, SHORTEST, STARS, Seed};
+use super::proposal::{Effort, Proposer};
+use super::search::of_some_fruits;
+use super::seeds::{Quad, SHORTEST, STARS, Seed, WITHIN};
 use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
@@ -20,9 +21,6 @@ use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 use nalgebra::Vector3;
-
-/// Spacings by which a fruit may be off from where it is expected: 27 cm in an orchard.
-const OFF: f64 = 1.0;
 
 /// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
 const FRUITS: usize = 128;
@@ -72,24 +70,15 @@ impl Search<'_> {
         let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
         let fruits = quad.map(|row| self.query.points[row as usize]);
         let near = fruits.map(|fruit| self.near(&expected.apply(&fruit)));
-        let most = 2.0 * (RADIUS * self.model.sigma).powi(2);
-        self.each_alike(&fruits, &near, &mut |target| {
-            let Some((pose, residual)) = proposer.fit(&target) else { return };
-            if residual > most {
-                return;
-            }
-            let Some(pose) = proposer.upright(pose) else { return };
-            let log_odds = proposer.first_look(&pose);
-            if log_odds > 0.0 {
-                found.push(Contender { pose, log_odds, place: proposer.centroid, key: (quad, target) });
-            }
-        });
+        let most = 2.0 * (WITHIN * self.model.sigma).powi(2);
+        let effort = &mut Effort::default();
+        self.each_alike(&fruits, &near, &mut |target| found.extend(proposer.contender(&target, most, effort)));
     }
 
-    /// Fruits of the map near a place.
+    /// Fruits of the map within a spacing of a place, 27 cm in an orchard: so far a fruit may be off from where it is expected.
     fn near(&self, place: &Vector3<f64>) -> Vec<u32> {
         let mut rows = Vec::new();
-        self.map.tree.within(&single(place), (OFF * self.map.spacing) as f32, |row, _| rows.push(row));
+        self.map.tree.within(&single(place), self.map.spacing as f32, |row, _| rows.push(row));
         rows.sort_unstable();
         rows
     }
@@ -100,7 +89,7 @@ impl Search<'_> {
         let place = |row: u32| self.map.points[row as usize];
         let alike = |one: usize, other: usize, rows: [u32; 2]| {
             let [here, there] = rows.map(place);
-            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < RADIUS * self.model.sigma
+            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < WITHIN * self.model.sigma
         };
         for &a in &near[0] {
             for &b in near[1].iter().filter(|&&b| alike(0, 1, [a, b])) {

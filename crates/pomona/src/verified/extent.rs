@@ -12,10 +12,8 @@ use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-/// Share of the half-turns about a row's axes that a known vertical leaves.
-pub(super) const UPRIGHT: f64 = 0.5;
-
-/// Standard deviations of the annealing, in spacings of the map: from the width of a branch down by a factor 0.75.
+/// Standard deviations of the annealing, in spacings of the map: from the width of a branch down to the noise at which the
+/// half-turns are compared.
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
 
 /// The pose of the outline with the evidence of its fine structure; `None` where it is no better than chance.
@@ -33,11 +31,12 @@ pub(crate) fn hypothesis(
         Scale::Metric => 1.0,
         Scale::Free => extents_map.norm() / extents_query.norm(),
     };
+    let [.., last] = ANNEALING;
     let annealed = |signs: [f64; 3]| {
         let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
         let rotation = turned * axes_query.transpose();
         let pose = anneal(query, map, Placement { rotation, translation: Vector3::zeros(), scale: ratio }, scale);
-        admits(&pose).then(|| (pose, fine_structure(query, map, &pose, SCREENING * map.spacing)))
+        admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
     };
     let found: Vec<_> = HALF_TURNS.into_par_iter().filter_map(annealed).collect();
     let (pose, first) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -145,9 +144,6 @@ fn fine_structure(query: &Landscape, map: &Landscape, pose: &Placement, sigma: f
 
 /// Noise in spacings that is tried: 1.5 to 11 cm in an orchard.
 const SIGMAS: [f64; 8] = [0.05, 0.07, 0.09, 0.12, 0.16, 0.2, 0.26, 0.33];
-
-/// Noise in spacings at which the half-turns are compared.
-const SCREENING: f64 = 0.25;
 
 /// Width in spacings of the crowns' structure that chance may share. So far aside fruits no longer lie on themselves at any
 /// noise that is tried.

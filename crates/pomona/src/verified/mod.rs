@@ -3,7 +3,7 @@
 //! 1. Seeds of four fruits, their metric codes (invariant ones where the scale is free), near-tie labelings included,
 //!    find candidates in the map (`seeds`, `codes`, `search`).
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
-//!    local density, with an early exit (`proposal`, `vertical`); the best are refined (`hypothesis`).
+//!    local density, with an early exit (`proposal`, `vertical`); the best of different poses (`contender`) are refined (`hypothesis`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
@@ -24,6 +24,7 @@ mod chance;
 mod codes;
 pub mod compact;
 mod conclusion;
+mod contender;
 mod cut;
 mod decision;
 mod displacement;
@@ -60,4 +61,4 @@ pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
 pub(crate) use landscape::{Landscape, median};
 pub(crate) use nearest::single;
-pub(crate) use seeds::{COMPANIONS, NEAR_TIE, Quad, SHORTEST, SeedIndex, canonical, frame, near_ties, shuffled};
+pub(crate) use seeds::{COMPANIONS, Quad, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled};

@@ -6,10 +6,12 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
+use super::doubts::POLISHES;
 use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
 use super::landscape::Landscape;
+use super::outlier::COMPARED;
 use super::placement::Placement;
-use super::votes::Rows;
+use super::votes::{Rows, STEP_RAD};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -28,14 +30,6 @@ const LOOKS: usize = 2;
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: f64 = 0.5;
 const SAME_TURN_RAD: f64 = 0.06;
-
-/// Turns about each axis, radians, from which a pose is refined once more, and how often: the votes' turns are 2 and 4 degrees
-/// apart, and at the ends of a row half of that is as far as fruits hang from each other.
-const TILTS: [f64; 2] = [-0.04, 0.04];
-const TILTINGS: usize = 3;
-
-/// Of the best poses so many are tilted: the answer, and what it must stand out of.
-const TILTED: usize = 3;
 
 /// Noise of a peak, in that of a pair: its cell is wider than the noise.
 const WIDE: f64 = 2.5;
@@ -66,9 +60,10 @@ pub(super) fn hypotheses(
     let looks = refined(&distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing), &wide, LOOKS);
     let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
     let mut found = refined(&best, &model, STEPS);
-    for seed in found.iter_mut().take(TILTED) {
-        for _ in 0..TILTINGS {
-            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &TILTS).collect();
+    // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.
+    for seed in found.iter_mut().take(COMPARED) {
+        for _ in 0..POLISHES {
+            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &[-STEP_RAD, STEP_RAD]).collect();
             match refined(&tilted, &model, STEPS).first() {
                 Some(better) if better.log_odds > seed.log_odds => *seed = *better,
                 _ => break,

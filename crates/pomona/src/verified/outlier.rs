@@ -12,7 +12,7 @@ use super::case::{Finding, Log, Search};
 const REACHED: f64 = 12.0;
 
 /// Poses that are polished before they are compared: the best and what may come to be second.
-const COMPARED: usize = 3;
+pub(super) const COMPARED: usize = 3;
 
 /// Share of the evidence needed that must be left when every fruit is predicted without its own partner: what true poses
 /// keep. Poses on wires that have far more than all others keep 0.5 to 0.75.

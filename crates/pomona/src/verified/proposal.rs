@@ -1,5 +1,6 @@
 //! A seed of the query laid on seeds of the map: the least-squares pose, and a first look at the fruits around.
 
+use super::contender::Contender;
 use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
 use super::placement::Placement;
@@ -7,6 +8,7 @@ use super::seeds::{Quad, STARS, frame_of};
 use super::vertical::Stands;
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::ops::Add;
 
 /// What a proposal asks of a map.
 pub(crate) trait Terrain {
@@ -39,6 +41,28 @@ impl Terrain for Landscape {
     #[inline]
     fn support(&self, place: &Vector3<f64>) -> f64 {
         self.support(place)
+    }
+}
+
+/// What proposing cost.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Effort {
+    pub(crate) codes: u64,
+    pub(crate) candidates: u64,
+    pub(crate) fitted: u64,
+    /// How those stood that fit in space.
+    pub(crate) stands: Stands,
+}
+
+impl Add for Effort {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            codes: self.codes + other.codes,
+            candidates: self.candidates + other.candidates,
+            fitted: self.fitted + other.fitted,
+            stands: self.stands + other.stands,
+        }
     }
 }
 
@@ -79,6 +103,21 @@ impl<'a, M: Terrain> Proposer<'a, M> {
         let square = moments.trace();
         let inverse_inertia = (Matrix3::identity() * square - moments).try_inverse()?;
         Some(Self { query, map, model, quad, middle, centroid, to_frame, fruits, square, inverse_inertia })
+    }
+
+    /// The pose on a seed of the map, where its squared residuals sum up to `most` at the most, it stands as a vertical asks and
+    /// the fruits around speak for it.
+    pub(super) fn contender(&self, target: &Quad, most: f64, effort: &mut Effort) -> Option<Contender> {
+        let (pose, residual) = self.fit(target)?;
+        if residual > most {
+            return None;
+        }
+        effort.stands = effort.stands + self.stand(&pose);
+        let pose = self.upright(pose)?;
+        effort.fitted += 1;
+        let log_odds = self.first_look(&pose);
+        let key = (self.quad, *target);
+        (log_odds > 0.0).then_some(Contender { pose, log_odds, place: self.centroid, key })
     }
 
     /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.

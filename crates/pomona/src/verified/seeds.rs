@@ -22,8 +22,11 @@ const MIN_FLATNESS: f64 = 0.15;
 /// Seeds shorter than this, in standard deviations of the noise, fix no pose.
 pub(crate) const SHORTEST: f64 = 6.0;
 
-/// Standard deviations by which noise may have made one of two lengths the longer: twice that of their difference.
-pub(crate) const NEAR_TIE: f64 = 2.8;
+/// Standard deviations of one axis within which noise moves what a seed shows: the numbers of its code, the longer of two
+/// lengths, and how its pose leans.
+///
+/// The residuals of a seed's fit, 12 - 6 degrees of freedom, may sum up to twice its square: 95 % of chi^2.
+pub(crate) const WITHIN: f64 = 2.5;
 
 /// Four rows labelled A, B, C, D.
 pub(crate) type Quad = [u32; STARS];
@@ -148,7 +151,6 @@ pub(crate) fn without_scale(code: &Code) -> Code {
 pub(crate) fn enumerate(landscape: &Landscape, companions: usize, shortest: f64) -> Vec<Seed> {
     (0..landscape.len())
         .into_par_iter()
-        .with_min_len(SHARE_OF_FRUITS)
         .flat_map_iter(|row| sets_of(&|row| landscape.neighbours(row), companions, row as u32))
         .filter_map(|set| canonical(&landscape.points, set))
         .filter(|(_, code)| f64::from(code[0]) >= shortest)
@@ -206,10 +208,6 @@ pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], most: usize,
     sets
 }
 
-/// Seeds that are worth a thread of their own, and fruits whose seeds are.
-const SHARE_OF_SEEDS: usize = 4096;
-const SHARE_OF_FRUITS: usize = 32;
-
 /// The seeds of the map, searchable by code.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedIndex {
@@ -226,7 +224,7 @@ impl SeedIndex {
             Scale::Free => without_scale(code),
         };
         let (codes, order) = CodeGrid::new(seeds.len(), |row| code(&seeds[row]));
-        let quads = order.par_iter().with_min_len(SHARE_OF_SEEDS).map(|&row| seeds[row as usize].0).collect();
+        let quads = order.par_iter().map(|&row| seeds[row as usize].0).collect();
         Self { quads, codes }
     }
 

@@ -1,14 +1,11 @@
 //! A vertical that is known in both clouds: what it leaves of a pose.
 
 use super::placement::Placement;
+use super::seeds::WITHIN;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// How far the vertical of the true pose may lean from the one given: 10 degrees, two standard deviations.
-const MAX_LEAN_RAD: f64 = 0.175;
-const LEAN_RAD: f64 = MAX_LEAN_RAD / 2.0;
-
-/// A proposed pose may lean by this many standard deviations of its own noise and the vertical's.
-const GATE: f64 = 2.5;
+/// How far the vertical of the true pose leans from the one given, radians: 4 degrees, one standard deviation. 10 are admitted.
+const LEAN_RAD: f64 = 0.07;
 
 /// Up in the query and in the map, unit vectors.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +26,7 @@ impl Vertical {
 
     /// Share of all turns that keep the vertical: the cap of directions within the lean, over the sphere.
     pub(crate) fn share_of_turns() -> f64 {
-        cap(MAX_LEAN_RAD)
+        cap(gate(0.0))
     }
 
     /// How a pose stands whose turn about each axis has the `variance` (rad^2).
@@ -40,7 +37,7 @@ impl Vertical {
     }
 
     pub(crate) fn admits(&self, pose: &Placement) -> bool {
-        self.lean(pose) < MAX_LEAN_RAD
+        self.lean(pose) < gate(0.0)
     }
 
     fn lean(&self, pose: &Placement) -> f64 {
@@ -69,7 +66,7 @@ impl Vertical {
 
 /// How far a pose may lean whose turn about each axis has the `variance`, radians.
 fn gate(variance: f64) -> f64 {
-    GATE * (variance + LEAN_RAD * LEAN_RAD).sqrt()
+    WITHIN * (variance + LEAN_RAD * LEAN_RAD).sqrt()
 }
 
 /// Share of all directions within an angle of one.

@@ -24,10 +24,11 @@ const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
 /// count by the cube of it, so that a query in millimetres would ask for more of them than there is memory.
 const ALIKE: f64 = 3.0;
 
-/// Steps either way, and their width in radians, of the turns about the axis across the row and about the one along it:
-/// the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
-const ACROSS: (i32, f64) = (6, 0.044);
-const ALONG: (i32, f64) = (1, 0.07);
+/// Radians between turns that are tried, 3 degrees, and steps either way about the axis across the row and about the one along
+/// it: the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
+pub(super) const STEP_RAD: f64 = 0.05;
+const ACROSS: i32 = 5;
+const ALONG: i32 = 1;
 
 /// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
 const CELL: [f64; 3] = [0.45, 0.45, 0.6];
@@ -45,12 +46,6 @@ const BLOCK: [usize; 3] = [4, 4, 2];
 /// Standard deviations by which a cell exceeds its surroundings at the least: of a row that is not there some hundred do, of one
 /// that is thousands.
 const OUTSTANDING: f64 = 5.7;
-
-/// Votes that a cell has at the least: a pair of clusters gives two.
-const LEAST_VOTES: u16 = 3;
-
-/// Cells that are asked at once whether any of them stands out.
-const AT_ONCE: usize = 32;
 
 /// Votes of a cell count four times, and those of the six next to it once.
 const WEIGHTS: f64 = 10.0;
@@ -151,19 +146,15 @@ impl Rows {
                 self.ask(x, counts);
             }
             self.weigh(x, counts);
-            let both = counts.weighted.chunks(AT_ONCE).zip(counts.asked.chunks(AT_ONCE));
-            // Hardly any stands out: what does is looked for among many at once.
+            let lines = counts.weighted.chunks_exact(deep).zip(counts.asked.chunks_exact(deep));
+            // Hardly any cell stands out: what does is looked for in a line at once.
             let any = |(_, (sums, asked)): &(usize, (&[u16], &[u16]))| {
                 sums.iter().zip(*asked).fold(0, |over, (sum, asked)| over | sum.saturating_sub(*asked)) > 0
             };
-            for (chunk, (sums, asked)) in both.enumerate().filter(any) {
-                for at in (0..sums.len()).filter(|&at| sums[at] > asked[at]).map(|at| chunk * AT_ONCE + at) {
-                    let [y, z] = [at / deep, at % deep];
-                    let inside = y > 0 && y + 1 < high && z > 0 && z + 1 < deep;
-                    if inside && counts.cells[x * high * deep + at] >= LEAST_VOTES {
-                        let (height, offset) = self.height(counts, [x, y, z]);
-                        peaks.push(Peak { height, pose: self.placement(turn, &offset) });
-                    }
+            for (y, (sums, asked)) in lines.enumerate().take(high - 1).skip(1).filter(any) {
+                for z in (1..deep - 1).filter(|&z| sums[z] > asked[z]) {
+                    let (height, offset) = self.height(counts, [x, y, z]);
+                    peaks.push(Peak { height, pose: self.placement(turn, &offset) });
                 }
             }
         }
@@ -276,7 +267,7 @@ fn cell(parts: i32) -> u32 {
 
 /// Turns of a row laid along a row, in the frames of their axes.
 fn turns() -> impl Iterator<Item = Matrix3<f64>> {
-    let steps = |(count, step): (i32, f64)| (-count..=count).map(move |i| f64::from(i) * step);
+    let steps = |count: i32| (-count..=count).map(|i| f64::from(i) * STEP_RAD);
     let of = move |signs: [f64; 3]| {
         steps(ACROSS).flat_map(move |across| {
             steps(ALONG).map(move |along| {

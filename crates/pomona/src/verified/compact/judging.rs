@@ -11,11 +11,13 @@ use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 use crate::verified::acceptance::VerifiedConfig;
 use crate::verified::case::{Search, VerifiedMap, model_of};
+use crate::verified::contender::{Contender, by_evidence, distinct};
 use crate::verified::decision::{self, MIN_FRUITS, answer_of};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::placement::Placement;
-use crate::verified::search::{Contender, Effort, REACH, by_evidence, distinct};
+use crate::verified::proposal::Effort;
+use crate::verified::search::REACH;
 use crate::verified::size::Diameters;
 use nalgebra::Vector3;
 

@@ -6,11 +6,11 @@ use super::seed_blocks::Anchored;
 use super::shapes::{Scratch, Shape, Shapes, in_steps, rounded};
 use super::surroundings::Neighbourhood;
 use crate::verified::codes::Code;
+use crate::verified::contender::Contender;
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
-use crate::verified::proposal::Proposer;
-use crate::verified::search::{Contender, Effort};
-use crate::verified::seeds::{NEAR_TIE, Quad, SHORTEST, Seed, enumerate, near_ties, shuffled};
+use crate::verified::proposal::{Effort, Proposer};
+use crate::verified::seeds::{Quad, SHORTEST, Seed, WITHIN, enumerate, near_ties, shuffled};
 use rayon::prelude::*;
 
 /// Reach of the code search in standard deviations of one axis: a third less than where the map is small. It holds half of
@@ -74,7 +74,7 @@ pub(super) fn looks(query: &Landscape, shapes: &Shapes, model: &Model, step: f64
     let reach = shapes.reach(reach_in(shapes, model));
     let of_seed = |&(quad, _): &Seed| {
         let (mut found, mut labelings) = (Vec::new(), 0.0f32);
-        near_ties(&query.points, quad, NEAR_TIE * model.sigma, &mut |quad, code: Code| {
+        near_ties(&query.points, quad, WITHIN * model.sigma, &mut |quad, code: Code| {
             labelings += 1.0;
             let steps = in_steps(&code, step);
             if let (Some(shape), Some(crowd)) = (rounded(&steps), shapes.crowd(&steps)) {
