@@ -34,12 +34,6 @@ pub(super) fn local_density(points: &[Vector3<f64>], neighbours: &Neighbours, sp
 /// Widths of the kernels in spacings: of a cluster, and of a branch.
 const KERNELS: [f64; 2] = [0.4, 0.8];
 
-/// Thickness of a wall in spacings that noise gives to one that has none.
-const LEAST_THICKNESS: f64 = 0.1;
-
-/// Different fruits among the neighbours of a fruit's neighbours, in clouds that have as many.
-const SEEN: f64 = 60.0;
-
 /// Fruits that are taken to hang alike in all directions, a spacing away, beside those seen: the weakest inverse-Wishart
 /// prior that has a mean counts for one.
 const ROUND: f64 = 1.0;
@@ -79,14 +73,13 @@ fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> V
     };
     let of_each: Vec<_> = (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(around).collect();
     // Two dozen fruits show a shape where there is none; those of their neighbours together do not.
-    let seen = SEEN.min(points.len() as f64);
+    let seen = neighbours.each as f64;
     let round = Matrix3::identity() * spacing.powi(2);
-    let noise = round * LEAST_THICKNESS.powi(2);
     let shape = |row: usize| {
         let near = neighbours.of(row);
         let covariance =
             near.iter().map(|&other| of_each[other as usize]).sum::<Matrix3<f64>>() / near.len().max(1) as f64;
-        let covariance = (covariance * seen + round * ROUND) / (seen + ROUND) + noise;
+        let covariance = (covariance * seen + round * ROUND) / (seen + ROUND);
         let longest = covariance.symmetric_eigenvalues().max();
         covariance.try_inverse().map_or(Matrix3::zeros(), |inverse| inverse - Matrix3::identity() / longest)
     };

@@ -33,6 +33,7 @@ mod expected;
 mod extent;
 #[cfg(test)]
 mod fixture;
+mod footing;
 mod growth;
 mod hypothesis;
 mod landscape;

@@ -3,10 +3,10 @@
 //! It does what [`crate::verified::hypothesis::refine`] does, without the map's side of the evidence and without what only a
 //! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
 
+use crate::verified::footing::Footing;
 use crate::verified::hypothesis::{Evidence, GATE, Model};
 use crate::verified::landscape::Landscape;
 use crate::verified::nearest::single;
-use crate::verified::patches::Footing;
 use crate::verified::placement::{FIXING, Moments, Placement};
 use crate::verified::proposal::Terrain;
 use crate::verified::search::{Contender, REACH, by_evidence};
