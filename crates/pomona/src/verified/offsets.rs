@@ -6,7 +6,7 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::hypothesis::{Hypothesis, Model, Refiner, TURNS};
+use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::votes::Rows;
@@ -65,11 +65,11 @@ pub(super) fn hypotheses(
     peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
     let looks = refined(&distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing), &wide, LOOKS);
     let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
-    let mut found = refined(&best, &model, TURNS);
+    let mut found = refined(&best, &model, STEPS);
     for seed in found.iter_mut().take(TILTED) {
         for _ in 0..TILTINGS {
             let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &TILTS).collect();
-            match refined(&tilted, &model, TURNS).first() {
+            match refined(&tilted, &model, STEPS).first() {
                 Some(better) if better.log_odds > seed.log_odds => *seed = *better,
                 _ => break,
             }
