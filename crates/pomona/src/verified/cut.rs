@@ -20,7 +20,6 @@ pub(crate) struct Cell {
     pub(super) pose: Placement,
     /// Whether growth has come here.
     pub(super) reached: bool,
-    pub(super) log_odds: f64,
 }
 
 /// Weighted sum of sums.
@@ -85,7 +84,6 @@ impl Cut {
                 moments: Moments::default(),
                 pose: Placement::identity(),
                 reached: false,
-                log_odds: 0.0,
             })
             .collect();
         Self { edge, cells, cell_of, index }

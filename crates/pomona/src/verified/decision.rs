@@ -27,9 +27,6 @@ pub(super) const MIN_FRUITS: usize = 5;
 /// Fruits of a map at the most whose seeds are all kept: some 7 kB a fruit; and of a query.
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
-/// Outlines sharper than this many spacings of noise are refined cell by cell.
-const SHARP: f64 = 0.18;
-
 /// Candidates that are refined in each round of the search (see [`Search::seeds_of`]).
 const ROUNDS: [usize; 4] = [32, 32, 48, 64];
 
@@ -335,12 +332,7 @@ impl<'a> Search<'a> {
     fn by_outline(&self) -> Option<Finding<'a>> {
         let seed = extent::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
         let model = Model { sigma: seed.sigma, ..self.model };
-        let growth = if seed.sigma < SHARP * self.map.spacing {
-            grow(self.query, self.map, &seed, &model)
-        } else {
-            hold(self.query, self.map, &seed, &model)
-        };
-        let mut finding = Finding::new(growth, seed);
+        let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
         Some(finding)
     }

@@ -5,31 +5,22 @@ use super::nearest::SHARE_OF_ROWS;
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
-/// Pairs below which residuals say nothing about what neighbours share.
-const MIN_AGREEING: f64 = 20.0;
-
-/// Variance that neighbours share, in that of the noise, at the least.
-const LEAST_SHARED: f64 = 0.01;
-
-/// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not. 0 where it is
-/// too little beside the noise, a standard deviation of `sigma`, to be told.
+/// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not.
 ///
 /// `residual` gives a fruit's residual and its weight.
 pub(super) fn shared_by_neighbours(
     query: &Landscape,
-    sigma: f64,
     residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
 ) -> f64 {
     let rows: Vec<usize> = (0..query.len()).collect();
     // Each is asked for as often as it is a neighbour.
     let residuals: Vec<_> = rows.par_iter().with_min_len(SHARE_OF_ROWS).map(|&row| residual(row)).collect();
-    let parts: Vec<[f64; 3]> = rows
+    let parts: Vec<[f64; 2]> = rows
         .par_chunks(SHARE_OF_ROWS)
         .map(|rows| {
-            let [mut products, mut pairs, mut weights] = [0.0; 3];
+            let [mut products, mut pairs] = [0.0; 2];
             for &row in rows {
                 let Some((own, weight)) = residuals[row] else { continue };
-                weights += weight;
                 for (other, kinship) in query.kin(row) {
                     let Some((rival, other_weight)) = residuals[other as usize] else { continue };
                     let kernel = weight * other_weight * kinship;
@@ -37,12 +28,11 @@ pub(super) fn shared_by_neighbours(
                     pairs += kernel;
                 }
             }
-            [products, pairs, weights]
+            [products, pairs]
         })
         .collect();
-    let [products, pairs, weights] = parts.iter().fold([0.0; 3], |sum, part| [0, 1, 2].map(|i| sum[i] + part[i]));
-    let shared = products / pairs / 3.0;
-    if weights > MIN_AGREEING && shared > LEAST_SHARED * sigma * sigma { shared } else { 0.0 }
+    let [products, pairs] = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    if products > 0.0 { products / pairs / 3.0 } else { 0.0 }
 }
 
 /// Neighbours that tell where a fruit has moved, at the most.

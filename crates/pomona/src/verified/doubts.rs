@@ -32,9 +32,6 @@ const MIRRORED: f64 = 1.3;
 /// A pose that explains this share of the query is no accident of a flat crown.
 const WHOLE: f64 = 0.7;
 
-/// Times that turned starts are tried.
-pub(super) const POLISHES: usize = 3;
-
 /// Turns about each axis that a polish tries, radians: 7 degrees either way.
 const POLISH_TURNS: [f64; 2] = [-0.13, 0.13];
 
@@ -114,31 +111,27 @@ impl<'a> Search<'a> {
         let translation = pose.apply(&middle) - rotation * middle * pose.scale;
         let seed =
             Hypothesis { pose: Placement { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
-        let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
+        let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
         self.polish(&mut mirrored);
         mirrored.overlap.log_odds > MIRRORED * log_odds
     }
 
-    /// Tries to leave the local optimum of a finding: turned starts, refined and grown; the best evidence wins.
+    /// Tries to leave the local optimum of a finding: turned starts, refined, the best grown; more evidence wins.
     ///
     /// A seed half a metre wide is turned by a few degrees by its noise. In a crown where fruits hang 8 cm apart the
     /// fruits a metre away then meet their neighbours, and the refinement can settle there.
     pub(super) fn polish(&self, finding: &mut Finding<'a>) {
-        for _ in 0..POLISHES {
-            let Overlap { pose, middle, sigma, .. } = finding.overlap;
-            let model = Model { sigma, ..self.model };
-            let starts: Vec<Placement> =
-                std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS)).collect();
-            let reach = REACH * self.query.spacing;
-            let refiner = || Refiner::new(self.query, self.map, &model);
-            let refined = |refiner: &mut Refiner, start: &Placement| refiner.refine(start, &middle, reach);
-            let refined: Vec<_> = starts.par_iter().map_init(refiner, refined).flatten_iter().collect();
-            let best = refined.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
-            let Some(seed) = best else { return };
-            let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.model), seed);
-            if better.overlap.log_odds < finding.overlap.log_odds + 0.5 || !self.admits(&better.overlap.pose) {
-                return;
-            }
+        let Overlap { pose, middle, sigma, .. } = finding.overlap;
+        let model = Model { sigma, ..self.model };
+        let starts: Vec<Placement> = std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS)).collect();
+        let reach = REACH * self.query.spacing;
+        let refiner = || Refiner::new(self.query, self.map, &model);
+        let refined = |refiner: &mut Refiner, start: &Placement| refiner.refine(start, &middle, reach);
+        let refined: Vec<_> = starts.par_iter().map_init(refiner, refined).flatten_iter().collect();
+        let best = refined.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
+        let Some(seed) = best else { return };
+        let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
+        if better.overlap.log_odds > finding.overlap.log_odds && self.admits(&better.overlap.pose) {
             *finding = better;
         }
     }

@@ -13,12 +13,12 @@
 //! when it grew, below zero where nothing was selected.
 
 use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
-use super::hypothesis::{DETECTION, SHARES};
+use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::landscape::Landscape;
 use super::pairing::{Laid, Meeting};
 
-/// Steps of expectation and maximisation of the share that is seen again, from [`DETECTION`].
-const STEPS: usize = 4;
+/// Halvings of what the share may be, to .002.
+const HALVINGS: usize = 8;
 
 /// Evidence of an overlap, nats.
 ///
@@ -30,7 +30,7 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
     let mut evidence = 0.0;
-    for _ in 0..STEPS {
+    for _ in 0..TURNS {
         let edge = |meeting: &Meeting| edge(map, meeting, share, there[meeting.map as usize]);
         let edges: Vec<Edge> = met.iter().filter_map(edge).collect();
         let beliefs = Beliefs::new(&edges, laid.query.len(), map.len());
@@ -39,6 +39,16 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
     }
     evidence
+}
+
+/// The share under which evidence of this slope, which falls, is largest.
+pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = SHARES;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        *(if slope(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    0.5 * (low + high)
 }
 
 /// The share p under which `found` pairs are likeliest, where the query and the map show so many fruits in the overlap.
@@ -73,6 +83,16 @@ mod tests {
         assert!([-0.01, 0.01].iter().all(|step| evidence(share + step) < evidence(share)));
         assert!((seen_again(60.0, [100.0, 100.0]) - 0.6).abs() < 1e-12);
         assert!(seen_again(0.0, [0.0, 5.0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_likeliest_share_is_where_the_slope_turns_and_never_beyond_what_is_believed() {
+        for turn in [0.2, 0.55, 0.9] {
+            assert!((likeliest_share(|share| turn - share) - turn).abs() < 0.002);
+        }
+        assert!(
+            (likeliest_share(|_| 1.0) - SHARES.1).abs() < 0.002 && (likeliest_share(|_| -1.0) - SHARES.0).abs() < 0.002
+        );
     }
 
     #[test]

@@ -4,13 +4,15 @@
 //! Each cell has its own pose ([`super::patches`]). Growth goes from cell to neighbouring cell and stops where the
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
-use super::cut::{Cell, Cut};
-use super::hypothesis::{Hypothesis, Model};
+use super::cut::{Cell, surroundings};
+use super::hypothesis::{GATE, Hypothesis, Model, TURNS};
 use super::landscape::Landscape;
-use super::placement::{Landing, Moments, Placement};
+use super::nearest::SHARE_OF_ROWS;
+use super::patches::{NEXT, Patchwork};
+use super::placement::Landing;
 use super::search::REACH;
 use super::sight::unseen;
-use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Growth ends at the latest after this many steps from cell to cell beyond the extent of the cloud.
 const EXTRA_ROUNDS: usize = 6;
@@ -24,67 +26,50 @@ const RIGID_ROUNDS: usize = 6;
 /// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.
 const WHOLE_ROUNDS: usize = 2;
 
+/// A patch, and its surroundings, may differ from the pose that they had as if this many pairs held them to it.
+pub(super) const HOLD: f64 = 2.0;
+
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 const CONVINCING: f64 = 2.0;
-
-/// The nearest fruit of the map, while growth goes on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Partner {
-    pub(super) row: u32,
-    /// From the place that the patch predicts, metres of the map.
-    pub(super) residual: Vector3<f64>,
-    /// Probability that it is no stranger.
-    pub(super) weight: f64,
-}
 
 /// A pose that grows over the cells of the query.
 #[derive(Debug)]
 pub(crate) struct Growth<'a> {
-    pub(super) query: &'a Landscape,
-    pub(super) map: &'a Landscape,
-    pub(super) model: Model,
-    pub(super) cells: Vec<Cell>,
-    pub(super) cut: &'a Cut,
-    /// Sums around every cell that was reached when pairs were made last.
-    pub(super) wide: Vec<Option<Moments>>,
-    pub(super) edge: f64,
-    pub(super) pose: Placement,
-    pub(super) sigma: f64,
-    /// Variance of the displacement that neighbours share, square metres.
-    pub(super) shared: f64,
-    pub(super) predictions: Vec<Option<Landing>>,
-    pub(super) partners: Vec<Option<Partner>>,
-    pub(super) owner: Vec<Option<u32>>,
-    /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
-    pub(super) unseen: [Vec<bool>; 2],
-    pub(super) patch_places: Vec<Vector3<f64>>,
+    pub(super) patches: Patchwork<'a>,
+    /// The nearest fruit of the map, where no other fruit of the query is likelier to be it.
+    pub(super) partners: Vec<Option<u32>>,
+    /// Evidence of every cell that is reached, nats.
+    log_odds: Vec<f64>,
     /// The pose is known to hold everywhere and the noise is given.
     pub(super) whole: bool,
-    /// Factor on the standard deviation of the predictions, to leave a seed's local optimum.
-    pub(super) widening: f64,
-    /// Patches follow the common pose.
-    pub(super) rigid: bool,
+}
+
+/// The nearest fruit of the map to where one of the query is expected.
+struct Nearest {
+    partner: u32,
+    /// Probability that it is no stranger.
+    weight: f64,
+    /// What it says for the pose, nats.
+    gain: f64,
 }
 
 /// Grows a hypothesis as far as the evidence goes.
 pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = Growth::new(query, map, seed, model);
-    let extent = growth.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
-    let most = (extent / growth.edge) as usize * 2 + EXTRA_ROUNDS;
+    let extent = growth.patches.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
+    let most = (extent / growth.patches.cut.edge) as usize * 2 + EXTRA_ROUNDS;
     let mut settled = 0;
     for round in 0..most {
-        growth.widening = WIDENING.get(round).copied().unwrap_or(1.0);
-        growth.rigid = round < RIGID_ROUNDS;
-        growth.predict();
-        growth.pair_up();
-        growth.refit();
+        let rigid = round < RIGID_ROUNDS;
+        let widening = WIDENING.get(round).copied().unwrap_or(1.0);
+        growth.meet(widening);
+        growth.refit(rigid);
         settled = if growth.spread() { 0 } else { settled + 1 };
-        if settled == 4 && round > RIGID_ROUNDS + 2 {
+        if settled == TURNS && round > RIGID_ROUNDS + 2 {
             break;
         }
     }
-    growth.predict();
-    growth.pair_up();
+    growth.meet(1.0);
     growth
 }
 
@@ -92,11 +77,8 @@ pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothes
 pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = Growth::new(query, map, whole, model);
     growth.whole = true;
-    for cell in &mut growth.cells {
-        cell.reached = true;
-    }
-    growth.predict();
-    growth.pair_up();
+    growth.patches.cells.iter_mut().for_each(|cell| cell.reached = true);
+    growth.meet(1.0);
     growth.go_on();
     growth
 }
@@ -105,12 +87,8 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
 /// cells that say nothing fall out in the end.
 pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = hold(query, map, whole, model);
-    growth.unseen = unseen(query, map, &growth.pose);
-    let hidden: Vec<usize> = (0..query.len()).filter(|&row| growth.unseen[0][row]).collect();
-    for row in hidden {
-        growth.forget(row);
-    }
-    growth.pair_up();
+    growth.patches.unseen = unseen(query, map, &growth.patches.pose);
+    growth.meet(1.0);
     growth.go_on();
     growth.whole = false;
     growth
@@ -118,52 +96,103 @@ pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothes
 
 impl<'a> Growth<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Self {
-        let cut = query.cut();
-        let mut cells = cut.cells.clone();
+        let mut patches = Patchwork::new(query, map, seed.pose, seed.sigma, model);
         let far = |cell: &Cell| (cell.centre - seed.place).norm();
-        for cell in &mut cells {
-            cell.pose = seed.pose;
+        for cell in &mut patches.cells {
             cell.reached = far(cell) < REACH * query.spacing;
         }
-        if let Some(nearest) = cells.iter_mut().min_by(|a, b| far(a).total_cmp(&far(b))) {
+        if let Some(nearest) = patches.cells.iter_mut().min_by(|a, b| far(a).total_cmp(&far(b))) {
             nearest.reached = true;
         }
-        Self {
-            query,
-            map,
-            model: *model,
-            wide: vec![None; cells.len()],
-            cells,
-            cut,
-            edge: cut.edge,
-            pose: seed.pose,
-            sigma: seed.sigma,
-            shared: 0.0,
-            predictions: vec![None; query.len()],
-            partners: vec![None; query.len()],
-            owner: vec![None; map.len()],
-            unseen: Default::default(),
-            patch_places: vec![Vector3::zeros(); query.len()],
-            whole: false,
-            widening: 1.0,
-            rigid: false,
+        let log_odds = vec![0.0; patches.cells.len()];
+        Self { patches, partners: vec![None; query.len()], log_odds, whole: false }
+    }
+
+    /// Predicts the fruits of the reached cells, and finds their nearest partners; of several claims on one fruit the likeliest
+    /// wins.
+    fn meet(&mut self, widening: f64) {
+        self.patches.predict(
+            |patches, cell| patches.footing(&surroundings(&patches.cells, cell), HOLD, cell),
+            |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
+        );
+        let nearest = |at: &Option<Landing>| self.nearest(at.as_ref()?);
+        let met: Vec<Option<Nearest>> =
+            self.patches.predictions.par_iter().with_min_len(SHARE_OF_ROWS).map(nearest).collect();
+        let mut owners: Vec<Option<(usize, f64)>> = vec![None; self.patches.map.len()];
+        for (row, met) in met.iter().enumerate() {
+            let Some(met) = met else { continue };
+            let owner = &mut owners[met.partner as usize];
+            if owner.is_none_or(|(_, most)| met.gain > most) {
+                *owner = Some((row, met.gain));
+            }
         }
+        let mut gains = vec![0.0; met.len()];
+        for (row, met) in met.into_iter().enumerate() {
+            let kept = met.filter(|met| owners[met.partner as usize].is_some_and(|(owner, _)| owner == row));
+            gains[row] = kept.as_ref().map_or_else(|| self.alone(row), |met| met.gain);
+            self.partners[row] = kept.as_ref().map(|met| met.partner);
+            self.patches.targets[row] = kept.map(|met| (self.patches.map.points[met.partner as usize], met.weight));
+        }
+        self.patches.sum_up();
+        let of_cell = |cell: &Cell| cell.rows.iter().map(|&row| gains[row as usize]).sum();
+        self.log_odds = self.patches.cells.iter().map(of_cell).collect();
+    }
+
+    /// The fruit of the map nearest to where one is expected.
+    fn nearest(&self, Landing { place, variance }: &Landing) -> Option<Nearest> {
+        let Patchwork { map, model, .. } = self.patches;
+        let (partner, d2) = map.nearest(place, GATE * variance.sqrt())?;
+        let ratio = model.met(d2, *variance, map.density[partner as usize]);
+        Some(Nearest { partner, weight: model.no_stranger(ratio).max(0.0), gain: ratio.ln() })
+    }
+
+    /// What a fruit without a partner says, nats.
+    fn alone(&self, row: usize) -> f64 {
+        let Patchwork { map, model, predictions, .. } = &self.patches;
+        predictions[row].map_or(0.0, |at| model.missed(map.support(&at.place)).ln())
+    }
+
+    /// New poses, noise and shared displacement from the current pairs: one `rigid` pose, or patches.
+    fn refit(&mut self, rigid: bool) {
+        let patches = &mut self.patches;
+        if !patches.fit_as_one() {
+            return;
+        }
+        if rigid {
+            patches.stiffen();
+        } else {
+            patches.bend(|_| HOLD);
+        }
+        if !self.whole {
+            self.estimate_noise();
+        }
+    }
+
+    /// Noise from the residuals less what neighbours share.
+    fn estimate_noise(&mut self) {
+        let patches = &mut self.patches;
+        patches.share();
+        let residuals = (0..self.partners.len()).filter_map(|row| patches.residual(row));
+        let (squares, weight) = residuals
+            .fold((0.0, 0.0), |sum, (residual, weight)| (sum.0 + weight * residual.norm_squared(), sum.1 + weight));
+        patches.sigma = patches.model.noise((squares - 3.0 * weight * patches.shared).max(0.0), weight);
     }
 
     /// Reaches the neighbours of cells whose surroundings speak for the pose; returns whether any is new.
     fn spread(&mut self) -> bool {
+        let cells = &self.patches.cells;
         let mut new = Vec::new();
-        for (i, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.reached) {
-            let beyond = |&&(other, closeness): &&(u32, f64)| closeness > 0.3 && !self.cells[other as usize].reached;
+        for (i, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.reached) {
+            let beyond = |&&(other, closeness): &&(u32, f64)| closeness > NEXT && !cells[other as usize].reached;
             let mut beyond = cell.around.iter().filter(beyond).peekable();
             if beyond.peek().is_some() && self.convincing(i) {
                 new.extend(beyond.map(|&(other, _)| (other as usize, cell.pose)));
             }
         }
         for &(i, pose) in &new {
-            if !self.cells[i].reached {
-                self.cells[i].reached = true;
-                self.cells[i].pose = pose;
+            let cell = &mut self.patches.cells[i];
+            if !cell.reached {
+                (cell.reached, cell.pose) = (true, pose);
             }
         }
         !new.is_empty()
@@ -172,50 +201,31 @@ impl<'a> Growth<'a> {
     /// Fits to the pairs and makes them anew.
     fn go_on(&mut self) {
         for _ in 0..WHOLE_ROUNDS {
-            self.refit();
-            self.predict();
-            self.pair_up();
+            self.refit(false);
+            self.meet(1.0);
         }
-    }
-
-    /// Leaves a fruit out, with its partner.
-    fn forget(&mut self, row: usize) {
-        self.predictions[row] = None;
-        if let Some(partner) = self.partners[row].take() {
-            self.owner[partner.row as usize] = None;
-        }
-    }
-
-    /// Fruits of the reached cells.
-    pub(super) fn active(&self) -> Vec<u32> {
-        self.cells.iter().filter(|cell| cell.reached).flat_map(|cell| cell.rows.iter().copied()).collect()
     }
 
     /// Whether a reached cell and its neighbours together have evidence for the pose.
     pub(super) fn convincing(&self, i: usize) -> bool {
-        let cell = &self.cells[i];
-        self.whole
-            || cell.reached
-                && cell.around.iter().map(|a| a.1 * self.cells[a.0 as usize].log_odds).sum::<f64>() > CONVINCING
+        let cell = &self.patches.cells[i];
+        let around = || cell.around.iter().map(|&(other, closeness)| closeness * self.log_odds[other as usize]);
+        self.whole || cell.reached && around().sum::<f64>() > CONVINCING
     }
 
     /// Looks once at the cells that growth did not reach: a crown may be cut off by a gap without fruits.
     ///
     /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
     pub(crate) fn reach_all(&mut self) {
-        for cell in self.cells.iter_mut().filter(|cell| !cell.reached) {
-            cell.reached = true;
-            cell.pose = self.pose;
+        for cell in self.patches.cells.iter_mut().filter(|cell| !cell.reached) {
+            (cell.reached, cell.pose) = (true, self.patches.pose);
         }
-        self.predict();
-        self.pair_up();
-        let outside: Vec<usize> = (0..self.cells.len()).filter(|&i| !self.convincing(i)).collect();
+        self.meet(1.0);
+        let outside: Vec<usize> = (0..self.patches.cells.len()).filter(|&i| !self.convincing(i)).collect();
         for i in outside {
-            self.cells[i].reached = false;
-            self.cells[i].moments = Moments::default();
-            let rows = self.cells[i].rows.clone();
-            rows.iter().for_each(|&row| self.forget(row as usize));
+            self.patches.cells[i].reached = false;
         }
+        self.meet(1.0);
         self.go_on();
     }
 }

@@ -34,6 +34,7 @@ mod expected;
 mod extent;
 #[cfg(test)]
 mod fixture;
+mod footing;
 mod growth;
 mod hypothesis;
 mod landscape;

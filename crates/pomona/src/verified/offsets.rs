@@ -6,7 +6,6 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::doubts::POLISHES;
 use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
 use super::landscape::Landscape;
 use super::outlier::COMPARED;
@@ -33,6 +32,9 @@ const SAME_TURN_RAD: f64 = 0.06;
 
 /// Noise of a peak, in that of a pair: its cell is wider than the noise.
 const WIDE: f64 = 2.5;
+
+/// Times that tilted starts are tried.
+const TILTINGS: usize = 3;
 
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(
@@ -62,7 +64,7 @@ pub(super) fn hypotheses(
     let mut found = refined(&best, &model, STEPS);
     // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.
     for seed in found.iter_mut().take(COMPARED) {
-        for _ in 0..POLISHES {
+        for _ in 0..TILTINGS {
             let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &[-STEP_RAD, STEP_RAD]).collect();
             match refined(&tilted, &model, STEPS).first() {
                 Some(better) if better.log_odds > seed.log_odds => *seed = *better,

@@ -8,12 +8,8 @@ use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Edges reach to `P(chi^2_3 > 14.8)` = 0.2 % of the noise, or as far as a branch may have moved for itself.
-const GATE: f64 = 3.85;
-const FAR_GATE: f64 = 7.0;
-
-/// The same in spacings at the most: 13 cm in an orchard.
-const FAR: f64 = 0.5;
+/// Standard deviations that an edge reaches: as far as a branch may have moved for itself.
+const GATE: f64 = 5.0;
 
 /// Share of the fruits that moved otherwise than their neighbours, and how much wider they scatter.
 ///
@@ -90,15 +86,12 @@ impl Marginals {
 }
 
 fn edges_of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
-    let Laid { query, map, pose, .. } = *laid;
-    let (scale, volume_scale) = (pose.scale, pose.scale.powi(3));
+    let Laid { query, map, .. } = *laid;
     laid.meetings(|meeting| {
         let Meeting { query: row, map: partner, distance, density, support } = *meeting;
         let seen = share * support;
-        // Fruits per cubic metre of the map that chance puts at this distance from a fruit of the map.
-        let companions = 0.5 * (query.companions(distance / scale) / volume_scale + map.companions(distance));
         let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
-        let new = (1.0 - seen) * (companions * crowding).max(map.floor);
+        let new = (1.0 - seen) * (laid.companions(distance) * crowding).max(map.floor);
         let ratio = seen / (1.0 - seen) * density / new * size(row, partner);
         (ratio > LEAST_RATIO).then_some(Edge { query: row, map: partner, ratio, distance })
     })
@@ -126,6 +119,14 @@ pub(crate) struct Laid<'a> {
 }
 
 impl Laid<'_> {
+    /// Fruits per cubic metre of the map that chance puts at a distance from a fruit: as many as both visits show around
+    /// their own.
+    pub(super) fn companions(&self, distance: f64) -> f64 {
+        let scale = self.pose.scale;
+        let both = self.query.companions(distance / scale) / scale.powi(3) + self.map.companions(distance);
+        (0.5 * both).max(self.map.floor)
+    }
+
     /// What `kept` makes of every meeting within the gate, by rows of the query.
     pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
         let rows: Vec<usize> = (0..self.predictions.len()).collect();
@@ -140,9 +141,9 @@ impl Laid<'_> {
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support(&place);
         let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
-        let gate = GATE.max(FAR_GATE.min(FAR * map.spacing / variance.sqrt()));
-        let widest = if own.is_some() && map.covariances.is_some() { WIDEST } else { 1.0 };
-        let reach = gate * (widest * variance).sqrt();
+        // No axis has more than the trace, three times the mean.
+        let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { 1.0 };
+        let reach = GATE * (widest * variance).sqrt();
         // Cells of the grid have more than what is within reach, which no covariance brings within the gate.
         let mut partners = Vec::new();
         map.near(&place, reach, |partner| {
@@ -158,7 +159,7 @@ impl Laid<'_> {
             let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
             let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
             let distance = offset.norm();
-            (mahalanobis2 <= gate * gate).then_some(Meeting {
+            (mahalanobis2 <= GATE * GATE).then_some(Meeting {
                 query: row as u32,
                 map: partner,
                 distance,
@@ -196,6 +197,3 @@ fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f6
     let mahalanobis2 = offset.dot(&factor.solve(offset));
     (mahalanobis2, tailed(mahalanobis2) / factor.l().diagonal().product())
 }
-
-/// Variance along the longest axis over the mean variance, at the most: less, as a tenth of it stays isotropic.
-const WIDEST: f64 = 3.0;

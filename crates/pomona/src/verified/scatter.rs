@@ -9,12 +9,9 @@
 //! true one where fruits crowd, so that the noise comes out small.
 
 use super::hypothesis::SHARES;
-use super::landscape::Landscape;
 use super::nearest::{SHARE_OF_ROWS, single};
 use super::pairing::Laid;
-use super::placement::Landing;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is known of the noise beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -46,21 +43,18 @@ const BIN: f64 = 1.0 / 24.0;
 /// Companions are as dense across the visits as within, as if this many had been counted so.
 const STEADY: f64 = 200.0;
 
-/// Noise in spacings that is tried, from 5 mm to 14 cm in an orchard.
-const FINEST: f64 = 0.02;
-const STEPS: usize = 40;
-const STEP: f64 = 1.085;
-
 /// Rounds of expectation and maximisation of the share.
 const ROUNDS: usize = 20;
+
+/// Noise that is tried, each an eighth of an octave above the last: from half a bin to 15, 5 mm to 16 cm in an orchard.
+const TRIED: usize = 40;
 
 /// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
 pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
     let counts = Counts::new(laid);
-    let finest = FINEST * laid.map.spacing;
-    let tried: Vec<(f64, f64)> = (0..STEPS)
+    let tried: Vec<(f64, f64)> = (0..TRIED)
         .map(|step| {
-            let sigma = finest * STEP.powi(step as i32);
+            let sigma = 0.5 * counts.bin * 2f64.powf(step as f64 / 8.0);
             let off = (sigma / expected.sigma).ln() / expected.width;
             // Cauchy's prior lets go of a noise that the counts contradict; a normal one would not.
             (counts.likelihood(sigma) - (off * off).ln_1p(), sigma)
@@ -76,69 +70,45 @@ pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
     (logarithm / total).exp()
 }
 
-/// What some of the fruits count.
-#[derive(Default)]
-struct Part {
-    across: [f64; BINS],
-    /// Companions of the fruits.
-    own: [f64; BINS],
-    fruits: f64,
-    due: f64,
-}
-
-impl Part {
-    fn add(mut self, other: &Self) -> Self {
-        for (sum, more) in self.across.iter_mut().zip(&other.across).chain(self.own.iter_mut().zip(&other.own)) {
-            *sum += more;
-        }
-        self.fruits += other.fruits;
-        self.due += other.due;
-        self
-    }
-
-    /// Companions of a fruit, by distance.
-    fn per_fruit(&self) -> [f64; BINS] {
-        self.own.map(|sum| sum / self.fruits.max(1.0))
-    }
-}
-
 impl Counts {
-    fn new(&Laid { query, map, predictions, pose }: &Laid) -> Self {
+    fn new(laid: &Laid) -> Self {
+        let &Laid { query, map, predictions, .. } = laid;
         let bin = BIN * map.spacing;
-        let met: Vec<AtomicBool> = (0..map.len()).map(|_| AtomicBool::new(false)).collect();
-        let here = in_parts(query.len(), |row, part| {
-            let Some(Landing { place, .. }) = &predictions[row] else { return };
-            part.fruits += 1.0;
-            part.due += map.support(place);
-            map.tree.within(&single(place), (BINS as f64 * bin) as f32, |partner, d2| {
-                met[partner as usize].store(true, Ordering::Relaxed);
-                add(&mut part.across, f64::from(d2).sqrt() / bin);
-            });
-            count_companions(query, row, pose.scale / bin, &mut part.own);
-        });
-        let there = in_parts(map.len(), |row, part| {
-            if met[row].load(Ordering::Relaxed) {
-                part.fruits += 1.0;
-                count_companions(map, row, 1.0 / bin, &mut part.own);
+        let part = |first: usize| {
+            let (mut across, mut due) = ([0.0; BINS], 0.0);
+            for at in predictions[first..query.len().min(first + SHARE_OF_ROWS)].iter().flatten() {
+                due += map.support(&at.place);
+                map.tree.within(&single(&at.place), (BINS as f64 * bin) as f32, |_, d2| {
+                    if let Some(count) = across.get_mut((f64::from(d2).sqrt() / bin) as usize) {
+                        *count += 1.0;
+                    }
+                });
             }
-        });
-        let mut companions = here.per_fruit();
-        for (sum, there) in companions.iter_mut().zip(there.per_fruit()) {
-            *sum = here.due * 0.5 * (*sum + there) + LEAST;
-        }
-        Self { bin, across: here.across, companions, due: here.due }
+            (across, due)
+        };
+        let parts: Vec<([f64; BINS], f64)> =
+            (0..query.len()).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
+        let across = std::array::from_fn(|i| parts.iter().map(|part| part.0[i]).sum());
+        let due: f64 = parts.iter().map(|part| part.1).sum();
+        let ball = |radius: usize| 4.0 / 3.0 * std::f64::consts::PI * (radius as f64 * bin).powi(3);
+        let companions =
+            std::array::from_fn(|i| due * laid.companions((i as f64 + 0.5) * bin) * (ball(i + 1) - ball(i)));
+        Self { bin, across, companions, due }
     }
 
     /// Log-likelihood of the counts under the noise, with the share that suits it.
     fn likelihood(&self, sigma: f64) -> f64 {
-        let cumulative: Vec<f64> = (0..=BINS).map(|i| maxwell(i as f64 * self.bin / sigma)).collect();
-        let found: Vec<f64> = cumulative.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let cumulative: [f64; BINS + 1] = std::array::from_fn(|i| maxwell(i as f64 * self.bin / sigma));
+        let bins = || {
+            let found = cumulative.windows(2).map(|ends| self.due * (ends[1] - ends[0]));
+            self.across.iter().zip(&self.companions).zip(found)
+        };
         let companions: f64 = self.companions.iter().sum();
         let (mut share, mut density) = (0.5, 1.0);
         for _ in 0..ROUNDS {
             let (mut own, mut other) = (0.0, 0.0);
-            for ((&count, &found), &companions) in self.across.iter().zip(&found).zip(&self.companions) {
-                let (a, b) = (share * self.due * found, density * companions);
+            for ((count, companions), found) in bins() {
+                let (a, b) = (share * found, density * companions);
                 own += count * a / (a + b);
                 other += count * b / (a + b);
             }
@@ -146,44 +116,12 @@ impl Counts {
             density = (other + STEADY) / (companions + STEADY);
         }
         let share = share.clamp(SHARES.0, SHARES.1);
-        let likelihood: f64 = self
-            .across
-            .iter()
-            .zip(&found)
-            .zip(&self.companions)
-            .map(|((&count, &found), &companions)| {
-                let mean = share * self.due * found + density * companions;
-                count * mean.ln() - mean
-            })
-            .sum();
+        let likelihoods = bins().map(|((count, companions), found)| {
+            let mean = share * found + density * companions;
+            count * mean.ln() - mean
+        });
         let prior = share.ln() + (1.0 - share).ln() + STEADY * (density.ln() - density);
-        likelihood + prior
-    }
-}
-
-/// Companions in a bin at the least, so that no distance is impossible.
-const LEAST: f64 = 0.1;
-
-/// What all rows count, the parts summed in the order of the rows.
-fn in_parts(rows: usize, count: impl Fn(usize, &mut Part) + Sync) -> Part {
-    let part = |first: usize| {
-        let mut part = Part::default();
-        (first..rows.min(first + SHARE_OF_ROWS)).for_each(|row| count(row, &mut part));
-        part
-    };
-    let parts: Vec<Part> = (0..rows).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
-    parts.iter().fold(Part::default(), Part::add)
-}
-
-fn add(bins: &mut [f64; BINS], place: f64) {
-    if let Some(bin) = bins.get_mut(place as usize) {
-        *bin += 1.0;
-    }
-}
-
-fn count_companions(cloud: &Landscape, row: usize, bins_per_metre: f64, bins: &mut [f64; BINS]) {
-    for &other in cloud.neighbours(row) {
-        add(bins, (cloud.points[other as usize] - cloud.points[row]).norm() * bins_per_metre);
+        likelihoods.sum::<f64>() + prior
     }
 }
 
@@ -204,7 +142,8 @@ fn erf(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::verified::fixture::visits;
-    use crate::verified::placement::Placement;
+    use crate::verified::landscape::Landscape;
+    use crate::verified::placement::{Landing, Placement};
     use nalgebra::Vector3;
 
     #[test]

@@ -4,10 +4,10 @@
 //! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
 
 use crate::verified::contender::{Contender, by_evidence};
+use crate::verified::footing::Footing;
 use crate::verified::hypothesis::{Evidence, GATE, Model};
 use crate::verified::landscape::Landscape;
 use crate::verified::nearest::single;
-use crate::verified::patches::Footing;
 use crate::verified::placement::{FIXING, Moments, Placement};
 use crate::verified::proposal::Terrain;
 use crate::verified::search::REACH;
