@@ -17,6 +17,10 @@ use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::landscape::Landscape;
 use super::pairing::{Laid, Meeting};
 
+/// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
+/// misses: of rows with 15 % in common 4 of 100 were no longer found.
+const SEEN_AGAIN: (f64, f64) = (0.35, 0.9);
+
 /// Halvings of what the share may be, to .002.
 const HALVINGS: usize = 8;
 
@@ -43,7 +47,7 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
 
 /// The share under which evidence of this slope, which falls, is largest.
 pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = SHARES;
+    let (mut low, mut high) = SEEN_AGAIN;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
         *(if slope(middle) > 0.0 { &mut low } else { &mut high }) = middle;
@@ -87,12 +91,11 @@ mod tests {
 
     #[test]
     fn the_likeliest_share_is_where_the_slope_turns_and_never_beyond_what_is_believed() {
-        for turn in [0.2, 0.55, 0.9] {
+        let (least, most) = SEEN_AGAIN;
+        for turn in [least + 0.05, 0.55, most - 0.05] {
             assert!((likeliest_share(|share| turn - share) - turn).abs() < 0.002);
         }
-        assert!(
-            (likeliest_share(|_| 1.0) - SHARES.1).abs() < 0.002 && (likeliest_share(|_| -1.0) - SHARES.0).abs() < 0.002
-        );
+        assert!((likeliest_share(|_| 1.0) - most).abs() < 0.002 && (likeliest_share(|_| -1.0) - least).abs() < 0.002);
     }
 
     #[test]

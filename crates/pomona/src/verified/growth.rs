@@ -133,6 +133,7 @@ impl<'a> Growth<'a> {
             self.partners[row] = kept.as_ref().map(|met| met.partner);
             self.patches.targets[row] = kept.map(|met| (self.patches.map.points[met.partner as usize], met.weight));
         }
+        self.patches.look();
         self.patches.sum_up();
         let of_cell = |cell: &Cell| cell.rows.iter().map(|&row| gains[row as usize]).sum();
         self.log_odds = self.patches.cells.iter().map(of_cell).collect();
@@ -164,18 +165,11 @@ impl<'a> Growth<'a> {
             patches.bend(|_| HOLD);
         }
         if !self.whole {
-            self.estimate_noise();
+            // What was left over before the patches moved: it goes too far in each round, and so reaches the tips of branches in
+            // fewer.
+            let (squares, weight) = patches.share();
+            patches.sigma = patches.model.noise(squares, weight);
         }
-    }
-
-    /// Noise from the residuals less what neighbours share.
-    fn estimate_noise(&mut self) {
-        let patches = &mut self.patches;
-        patches.share();
-        let residuals = (0..self.partners.len()).filter_map(|row| patches.residual(row));
-        let (squares, weight) = residuals
-            .fold((0.0, 0.0), |sum, (residual, weight)| (sum.0 + weight * residual.norm_squared(), sum.1 + weight));
-        patches.sigma = patches.model.noise((squares - 3.0 * weight * patches.shared).max(0.0), weight);
     }
 
     /// Reaches the neighbours of cells whose surroundings speak for the pose; returns whether any is new.

@@ -130,7 +130,7 @@ pub(crate) struct Refiner<'a> {
 
 const NOBODY: u32 = u32::MAX;
 
-/// Steps of a refinement: with four, one in thirty is lost of rows that have few fruits in common.
+/// Steps of a refinement: with four, two of 30 rows are lost that have few fruits in common.
 pub(super) const STEPS: usize = 6;
 
 /// Turns of every loop that ends when nothing new is learnt: pairs and patches, pairs and the share that is seen again. The

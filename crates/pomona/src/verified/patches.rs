@@ -42,6 +42,8 @@ pub(crate) struct Patchwork<'a> {
     /// Variance that neighbours' residuals about the patches share, square metres.
     pub(super) shared: f64,
     pub(super) targets: Vec<Target>,
+    /// What patches left over when it was looked at last: from where they put a fruit to its partner.
+    left_over: Vec<Target>,
     pub(super) predictions: Vec<Option<Landing>>,
     /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
     pub(super) unseen: [Vec<bool>; 2],
@@ -62,6 +64,7 @@ impl<'a> Patchwork<'a> {
             sigma,
             shared: 0.0,
             targets: vec![None; query.len()],
+            left_over: vec![None; query.len()],
             predictions: vec![None; query.len()],
             unseen: Default::default(),
         }
@@ -72,10 +75,15 @@ impl<'a> Patchwork<'a> {
         self.cells[self.cut.cell_of[row] as usize].pose.apply(&self.query.points[row])
     }
 
-    /// From where the patch puts a fruit to its partner.
-    pub(super) fn residual(&self, row: usize) -> Target {
+    /// From where the patch puts a fruit now to its partner.
+    fn residual(&self, row: usize) -> Target {
         let (target, weight) = self.targets[row]?;
         Some((target - self.placed(row), weight))
+    }
+
+    /// What the patch of a fruit left over of it.
+    pub(super) fn left_over(&self, row: usize) -> Target {
+        self.left_over[row]
     }
 
     /// Predicts the fruits of the reached cells that are not `unseen`: `footing` says how firmly pairs hold the poses of a cell,
@@ -103,7 +111,7 @@ impl<'a> Patchwork<'a> {
     /// as large.
     pub(super) fn landing(&self, row: usize, looseness: f64, widening: f64) -> Landing {
         let noise = self.sigma * self.sigma;
-        let (shift, unexplained) = carried_on(self.query, row, (self.shared, noise), |other| self.residual(other));
+        let (shift, unexplained) = carried_on(self.query, row, (self.shared, noise), |other| self.left_over(other));
         Landing {
             place: self.placed(row) + shift,
             variance: widening * widening * noise * (1.0 + looseness) + unexplained,
@@ -154,19 +162,27 @@ impl<'a> Patchwork<'a> {
         [of_patches, of_surroundings]
     }
 
-    /// What neighbours' residuals about the patches share.
-    pub(super) fn share(&mut self) {
-        self.shared = self.shared_residual();
+    /// Looks at what patches leave over.
+    pub(super) fn look(&mut self) {
+        self.left_over = (0..self.query.len()).map(|row| self.residual(row)).collect();
+    }
+
+    /// What neighbours share of what patches left over; returns the squares of the rest and the weight of the pairs.
+    pub(super) fn share(&mut self) -> (f64, f64) {
+        self.shared = shared_by_neighbours(self.query, |row| self.left_over(row));
+        let (squares, weight) = self
+            .left_over
+            .iter()
+            .flatten()
+            .fold((0.0, 0.0), |sum, (residual, weight)| (sum.0 + weight * residual.norm_squared(), sum.1 + weight));
+        ((squares - 3.0 * weight * self.shared).max(0.0), weight)
     }
 
     /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that
     /// together.
     pub(super) fn firmness(&self) -> f64 {
-        1.0 / (self.shared_residual() / (self.sigma * self.sigma)).max(f64::EPSILON)
-    }
-
-    fn shared_residual(&self) -> f64 {
-        shared_by_neighbours(self.query, |row| self.residual(row))
+        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
+        1.0 / (shared / (self.sigma * self.sigma)).max(f64::EPSILON)
     }
 
     /// Fits every cell's pose to the pairs around it, held to the pose that it has.

@@ -81,7 +81,7 @@ impl Settlement<'_> {
             // The patch follows its surroundings in the measure in which it is held to them.
             let looseness = near.looseness(p) + near.share_held(hold) * wide.looseness(p);
             let mut landing = patches.landing(row, looseness, 1.0);
-            if let Some((residual, weight)) = patches.residual(row) {
+            if let Some((residual, weight)) = patches.left_over(row) {
                 // Of a linear fit: the residual without the own partner is r / (1 - h), h the leverage.
                 let leverage = (weight * looseness).min(MAX_LEVERAGE);
                 landing.place -= residual * (leverage / (1.0 - leverage));
@@ -135,6 +135,7 @@ impl Settlement<'_> {
         self.patches.fit_as_one();
         self.patches.stiffen();
         self.holds = self.patches.bend(Patchwork::firmness);
+        self.patches.look();
         self.patches.share();
     }
 
