@@ -2,6 +2,7 @@
 
 import gc
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -352,6 +353,23 @@ def test_wrong_input_is_refused_in_one_line(fresh, give, expected):
     with pytest.raises(PomonaError, match=expected) as refused:
         give(fresh)
     assert "\n" not in str(refused.value)
+
+
+def test_two_threads_at_once_are_refused_in_one_line(row, fresh):
+    """It was a RuntimeError, `Already borrowed`."""
+    seen, refused = seen_from(row, pose_at(4.0), 1), []
+
+    def ask(_: int) -> None:
+        try:
+            fresh.reset()
+            fresh.update(seen)
+        except PomonaError as error:
+            refused.append(str(error))
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(ask, range(40)))
+    assert set(refused) == {"localizer: another thread uses it, expected one thread at a time"}
+    assert fresh.update(seen)
 
 
 def test_settings_are_the_cores(row):

@@ -8,7 +8,7 @@ use super::doubt::Doubt;
 use super::known::KnownFruits;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
-use super::slip::Slip;
+use super::slip::{Slip, lost_by_fit};
 use super::told_motions::{Settled, ToldMotions};
 use super::window::Window;
 use crate::answer::Verdict;
@@ -119,24 +119,29 @@ impl Localizer {
         seen.validate()?;
         told.map_or(Ok(()), ToldMotion::validate)?;
         let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
-        let moved = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
-        let predicted = self.predicted(moved.as_ref());
-        match (moved, self.belief.and_then(|belief| belief.motion)) {
+        let measured = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
+        let motion = measured.or_else(|| self.belief.map(|belief| Motion::repeated(belief.motion)));
+        let predicted = self.belief.zip(motion).map(|(belief, motion)| belief.after(&motion));
+        match (measured, motion) {
             (Some(motion), _) => self.window.step(&motion),
-            // Where fruits tell how it moved, that is corrected at once.
-            (None, Some(step)) => self.window.step(&Motion::sure(step)),
+            // What fruits say of it is settled with the pose.
+            (None, Some(motion)) => self.window.step(&Motion::sure(motion.previous_from_camera)),
             (None, None) => self.window.forget(),
         }
         self.window.push(Sighting::of(seen), self.config.window_frames);
-        let mut guess = predicted.map(|predicted| self.guess(&predicted, moved.is_some(), up));
+        let untold = motion.filter(|_| measured.is_none()).map(|motion| motion.covariance);
+        let mut guess = predicted.map(|predicted| self.guess(&predicted, untold.as_ref(), up));
         let agreed = guess.as_mut().and_then(Guess::agreed);
         let found = match agreed {
             Some((expected, followed)) => self.follow(&expected, followed),
-            None => self.found_again(guess.as_ref(), up)?,
+            None => {
+                if untold.is_some() {
+                    // Nobody knows where the frames before lie.
+                    self.window.keep(1);
+                }
+                self.found_again(guess.as_ref(), up)?
+            }
         };
-        if let (None, Some(predicted), Some(pose)) = (moved, predicted, found.pose) {
-            self.window.correct(&pose.seen_from(&predicted.pose));
-        }
         if !found.tracked {
             // Whatever the camera lost itself by may be what was learned.
             self.motions = ToldMotions::default();
@@ -153,16 +158,15 @@ impl Localizer {
         self.window.forget();
     }
 
-    fn predicted(&self, moved: Option<&Motion>) -> Option<Belief> {
-        let belief = self.belief.as_ref()?;
-        let repeated = || Motion::repeated(belief.motion);
-        Some(belief.after(&moved.copied().unwrap_or_else(repeated)))
-    }
-
     /// The pose near the predicted one, if the fruits agree with it, and what the newest ones say.
-    fn guess(&self, told: &Belief, is_measured: bool, up: Option<[Vector3<f64>; 2]>) -> Guess {
-        let settle = if is_measured { ToldMotions::settle } else { ToldMotions::as_before };
-        let settled = settle(&self.motions, &self.window, self.config.enough_fruits, &self.map, told);
+    ///
+    /// `untold` is the covariance of the last motion where that was not told.
+    fn guess(&self, told: &Belief, untold: Option<&Matrix6<f64>>, up: Option<[Vector3<f64>; 2]>) -> Guess {
+        let enough = self.config.enough_fruits;
+        let mut settled = match untold {
+            None => self.motions.settle(&self.window, enough, &self.map, told),
+            Some(expected) => ToldMotions::settle_untold(&self.window, enough, &self.map, told, expected),
+        };
         let Some(joint) = self.believed(&settled.aligned, up, 0.0) else {
             let expected = self.motions.ahead(told);
             let own_nats = evidence_at(&expected, self.window.newest(), &self.map);
@@ -172,7 +176,12 @@ impl Localizer {
         let found = Belief { pose: settled.aligned.pose, covariance, motion: told.motion };
         // What few fruits leave open, the motion tells.
         let expected = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
-        let doubt = self.doubt.after(settled.aligned.own_nats);
+        let mut own_nats = settled.aligned.own_nats;
+        if let (Some(_), Some(window)) = (untold, &mut settled.window) {
+            window.learn(joint.fixed_view::<6, 6>(6, 6).into_owned());
+            own_nats += lost_by_fit(&settled.aligned);
+        }
+        let doubt = self.doubt.after(own_nats);
         Guess { expected, followed: Some(Followed { settled, joint }), doubt }
     }
 

@@ -39,11 +39,10 @@ impl Window {
         }
     }
 
-    /// The camera is not where it was thought to be: what was seen before lies elsewhere from it.
-    pub fn correct(&mut self, thought_from_camera: &Pose) {
-        let camera_from_thought = thought_from_camera.inverse();
-        for (now_from_then, _) in self.frames.iter_mut().skip(1) {
-            *now_from_then = camera_from_thought.after(now_from_then);
+    /// Fruits have shown how the camera moved last, as surely as this.
+    pub fn learn(&mut self, covariance: Matrix6<f64>) {
+        if let Some(last) = self.motions.front_mut() {
+            *last = covariance;
         }
     }
 
