@@ -132,15 +132,14 @@ impl Localizer {
         let untold = motion.filter(|_| measured.is_none()).map(|motion| motion.covariance);
         let mut guess = predicted.map(|predicted| self.guess(&predicted, untold.as_ref(), up));
         let agreed = guess.as_mut().and_then(Guess::agreed);
-        let found = match agreed {
-            Some((expected, followed)) => self.follow(&expected, followed),
-            None => {
-                if untold.is_some() {
-                    // Nobody knows where the frames before lie.
-                    self.window.keep(1);
-                }
-                self.found_again(guess.as_ref(), up)?
+        let found = if let Some((expected, followed)) = agreed {
+            self.follow(&expected, followed)
+        } else {
+            if untold.is_some() {
+                // Nobody knows where the frames before lie.
+                self.window.keep(1);
             }
+            self.found_again(guess.as_ref(), up)?
         };
         if !found.tracked {
             // Whatever the camera lost itself by may be what was learned.
@@ -178,8 +177,10 @@ impl Localizer {
         let expected = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
         let mut own_nats = settled.aligned.own_nats;
         if let (Some(_), Some(window)) = (untold, &mut settled.window) {
-            window.learn(joint.fixed_view::<6, 6>(6, 6).into_owned());
-            own_nats += lost_by_fit(&settled.aligned);
+            window.learn(&joint.fixed_view::<6, 6>(6, 6).into_owned());
+            if !self.window.newest().is_empty() {
+                own_nats += lost_by_fit(&settled.aligned);
+            }
         }
         let doubt = self.doubt.after(own_nats);
         Guess { expected, followed: Some(Followed { settled, joint }), doubt }
@@ -197,7 +198,7 @@ impl Localizer {
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
     fn found_again(&mut self, guess: Option<&Guess>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
-        let found = self.from_nothing(up)?;
+        let found = self.search_anew(up)?;
         let poor = self.window.newest().len() < self.config.enough_fruits && found.verdict != Verdict::Found;
         let carried =
             guess.filter(|guess| poor && guess.followed.is_none() && guess.doubt.is_none() && guess.is_sharp());
@@ -211,7 +212,7 @@ impl Localizer {
     }
 
     /// The newest frame alone, for the way from those before may be what was wrong; else with these.
-    fn from_nothing(&mut self, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+    fn search_anew(&mut self, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
         let frame = self.window.newest();
         let found = self.search(frame, &cloud_of(frame), up)?;
         if found.verdict == Verdict::Found {

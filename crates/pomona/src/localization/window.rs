@@ -40,9 +40,9 @@ impl Window {
     }
 
     /// Fruits have shown how the camera moved last, as surely as this.
-    pub fn learn(&mut self, covariance: Matrix6<f64>) {
+    pub fn learn(&mut self, covariance: &Matrix6<f64>) {
         if let Some(last) = self.motions.front_mut() {
-            *last = covariance;
+            *last = *covariance;
         }
     }
 
