@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -149,13 +150,12 @@ class Localizer:
         Raises
         ------
         PomonaError
-            An array is wrong. That the camera is not found is no error: see `Localization.status`.
+            An array is wrong, or another thread is in `update` right now. That the camera is not found is no error: see
+            `Localization.status`.
         """
         arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
-        try:
+        with _refusing():
             return self._answer(self._core.locate(arrays, up=vertical))
-        except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"frame: {error}") from None
 
     def update(
         self,
@@ -187,15 +187,20 @@ class Localizer:
         """
         arrays, vertical = core_arrays(as_cloud(cloud)), core_vertical(up)
         step, spread = _checked_motion(moved, covariance)
-        try:
+        with _refusing():
             found = self._core.update(arrays, previous_from_camera=step, motion_covariance=spread, up=vertical)
             return self._answer(found)
-        except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"frame: {error}") from None
 
     def reset(self) -> None:
-        """Forget where the camera was: the next update starts from nothing."""
-        self._core.reset()
+        """Forget where the camera was: the next update starts from nothing.
+
+        Raises
+        ------
+        PomonaError
+            Another thread uses the localizer right now.
+        """
+        with _refusing():
+            self._core.reset()
 
     def _answer(self, found: _core.Localization) -> Localization:
         pairs = found.pairs
@@ -208,6 +213,18 @@ class Localizer:
             log_odds=found.log_odds,
             tracked=found.tracked,
         )
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Say in one line what the core refuses."""
+    try:
+        yield
+    except RuntimeError:
+        # The one that the core raises: it is borrowed by another call.
+        raise PomonaError("localizer: another thread uses it, expected one thread at a time") from None
+    except (ValueError, TypeError, OverflowError) as error:
+        raise PomonaError(f"frame: {error}") from None
 
 
 def _checked_motion(

@@ -78,6 +78,13 @@ pub(super) struct Say {
     ratio: f64,
 }
 
+impl Say {
+    /// Evidence against chance where a `share` of the sightings is in the map, nats.
+    fn evidence(&self, share: f64) -> f64 {
+        (1.0 - share + share * self.ratio).ln()
+    }
+}
+
 /// A pose, and what the sightings say of it.
 pub(super) struct Aligned {
     pub pose: Pose,
@@ -89,6 +96,8 @@ pub(super) struct Aligned {
     pub links: Vec<Link>,
     /// Evidence against chance, nats.
     pub log_odds: f64,
+    /// The part of it that the newest frame has, each of its fruits for itself.
+    pub own_nats: f64,
 }
 
 /// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
@@ -120,8 +129,16 @@ fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, sha
         .map(|(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links))))
         .collect();
     let (information, _) = normal(&says, slip);
-    let log_odds = best_share(&says).1;
-    Aligned { pose, slip: *slip, information, says, links, log_odds }
+    let (share, log_odds) = best_share(&says);
+    let own_nats = says.iter().filter(|say| say.age == 0).map(|say| say.evidence(share)).sum();
+    Aligned { pose, slip: *slip, information, says, links, log_odds, own_nats }
+}
+
+/// What a frame says of a pose that is expected, by its fruits as they lie, nats.
+pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> f64 {
+    let (slip, doubt) = (Slip::none(), Slip::none().doubt(&expected.covariance));
+    let says = |seen| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, None);
+    best_share(&frame.iter().map(says).collect::<Vec<_>>()).1
 }
 
 fn say(
@@ -216,7 +233,7 @@ fn solved(matrix: &Joint, right: &SVector<f64, UNKNOWNS>) -> SVector<f64, UNKNOW
 
 /// The share of sightings in the map that explains them best, and the evidence under it, nats.
 fn best_share(says: &[Say]) -> (f64, f64) {
-    let evidence = |share: f64| says.iter().map(|say| say.voice * (1.0 - share + share * say.ratio).ln()).sum::<f64>();
+    let evidence = |share: f64| says.iter().map(|say| say.voice * say.evidence(share)).sum::<f64>();
     let all = SHARES.map(|share| (share, evidence(share)));
     all.into_iter().fold((FIRST_SHARE, f64::NEG_INFINITY), |best, one| if one.1 > best.1 { one } else { best })
 }

@@ -1,14 +1,15 @@
 //! The story of one frame after the other.
 
-use super::alignment::{Aligned, Joint, Link, align};
+use super::alignment::{Aligned, Joint, Link, align, evidence_at};
 use super::answer::{Localization, MapPair, ToldMotion};
 use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
+use super::doubt::Doubt;
 use super::known::KnownFruits;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
-use super::slip::Slip;
-use super::told_motions::ToldMotions;
+use super::slip::{Slip, lost_by_fit};
+use super::told_motions::{Settled, ToldMotions};
 use super::window::Window;
 use crate::answer::Verdict;
 use crate::assignment::assign;
@@ -54,6 +55,7 @@ pub struct Localizer {
     map: KnownFruits,
     config: LocalizationConfig,
     belief: Option<Belief>,
+    doubt: Doubt,
     motions: ToldMotions,
     window: Window,
 }
@@ -86,6 +88,7 @@ impl Localizer {
             map: KnownFruits::new(map, config.own_m),
             config,
             belief: None,
+            doubt: Doubt::default(),
             motions: ToldMotions::default(),
             window: Window::default(),
         })
@@ -116,73 +119,108 @@ impl Localizer {
         seen.validate()?;
         told.map_or(Ok(()), ToldMotion::validate)?;
         let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
-        let moved = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
-        let predicted = self.predicted(moved.as_ref());
-        match (moved, self.belief.and_then(|belief| belief.motion)) {
+        let measured = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
+        let motion = measured.or_else(|| self.belief.map(|belief| Motion::repeated(belief.motion)));
+        let predicted = self.belief.zip(motion).map(|(belief, motion)| belief.after(&motion));
+        match (measured, motion) {
             (Some(motion), _) => self.window.step(&motion),
-            // Where fruits tell how it moved, that is corrected at once.
-            (None, Some(step)) => self.window.step(&Motion::sure(step)),
+            // What fruits say of it is settled with the pose.
+            (None, Some(motion)) => self.window.step(&Motion::sure(motion.previous_from_camera)),
             (None, None) => self.window.forget(),
         }
         self.window.push(Sighting::of(seen), self.config.window_frames);
-        let found = predicted.and_then(|predicted| self.followed(&predicted, moved.is_some(), up));
-        let found = match found {
-            Some(found) => found,
-            None => self.found_again(predicted.map(|told| self.motions.ahead(&told)).as_ref(), up)?,
+        let untold = motion.filter(|_| measured.is_none()).map(|motion| motion.covariance);
+        let mut guess = predicted.map(|predicted| self.guess(&predicted, untold.as_ref(), up));
+        let agreed = guess.as_mut().and_then(Guess::agreed);
+        let found = if let Some((expected, followed)) = agreed {
+            self.follow(&expected, followed)
+        } else {
+            if untold.is_some() {
+                // Nobody knows where the frames before lie.
+                self.window.keep(1);
+            }
+            self.found_again(guess.as_ref(), up)?
         };
-        if let (None, Some(predicted), Some(pose)) = (moved, predicted, found.pose) {
-            self.window.correct(&pose.seen_from(&predicted.pose));
-        }
         if !found.tracked {
             // Whatever the camera lost itself by may be what was learned.
             self.motions = ToldMotions::default();
         }
-        self.learn(&found, step.as_ref());
+        self.learn(&found, step.as_ref(), guess.as_ref());
         Ok(found)
     }
 
     /// Forgets where the camera was: the next update starts from nothing.
     pub fn reset(&mut self) {
         self.belief = None;
+        self.doubt = Doubt::default();
         self.motions = ToldMotions::default();
         self.window.forget();
     }
 
-    fn predicted(&self, moved: Option<&Motion>) -> Option<Belief> {
-        let belief = self.belief.as_ref()?;
-        let repeated = || Motion::repeated(belief.motion);
-        Some(belief.after(&moved.copied().unwrap_or_else(repeated)))
-    }
-
-    /// The pose near the predicted one, if the fruits agree with it.
-    fn followed(&mut self, told: &Belief, is_measured: bool, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
-        let settle = if is_measured { ToldMotions::settle } else { ToldMotions::as_before };
-        let settled = settle(&self.motions, &self.window, self.config.enough_fruits, &self.map, told);
-        let joint = self.believed(&settled.aligned, up, 0.0)?;
+    /// The pose near the predicted one, if the fruits agree with it, and what the newest ones say.
+    ///
+    /// `untold` is the covariance of the last motion where that was not told.
+    fn guess(&self, told: &Belief, untold: Option<&Matrix6<f64>>, up: Option<[Vector3<f64>; 2]>) -> Guess {
+        let enough = self.config.enough_fruits;
+        let mut settled = match untold {
+            None => self.motions.settle(&self.window, enough, &self.map, told),
+            Some(expected) => ToldMotions::settle_untold(&self.window, enough, &self.map, told, expected),
+        };
+        let Some(joint) = self.believed(&settled.aligned, up, 0.0) else {
+            let expected = self.motions.ahead(told);
+            let own_nats = evidence_at(&expected, self.window.newest(), &self.map);
+            return Guess { expected, followed: None, doubt: self.doubt.after(own_nats) };
+        };
         let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
         let found = Belief { pose: settled.aligned.pose, covariance, motion: told.motion };
         // What few fruits leave open, the motion tells.
-        let both = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
+        let expected = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
+        let mut own_nats = settled.aligned.own_nats;
+        if let (Some(_), Some(window)) = (untold, &mut settled.window) {
+            window.learn(&joint.fixed_view::<6, 6>(6, 6).into_owned());
+            if !self.window.newest().is_empty() {
+                own_nats += lost_by_fit(&settled.aligned);
+            }
+        }
+        let doubt = self.doubt.after(own_nats);
+        Guess { expected, followed: Some(Followed { settled, joint }), doubt }
+    }
+
+    /// Takes up a pose that the fruits agree with.
+    fn follow(&mut self, expected: &Belief, followed: Followed) -> Localization {
+        let Followed { settled, joint } = followed;
         self.motions = settled.motions.with(&settled.aligned.slip.known(&joint));
         if let Some(window) = settled.window {
             self.window = window;
         }
-        Some(Self::answer(&settled.aligned, &settled.sightings, &both, true))
+        Self::answer(&settled.aligned, &settled.sightings, expected, true)
     }
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
-    fn found_again(&self, predicted: Option<&Belief>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
-        let fruits = self.window.fruits(self.config.enough_fruits);
-        let found = self.search(&fruits, &cloud_of(&fruits), up)?;
-        let poor = self.window.newest() < self.config.enough_fruits && found.verdict != Verdict::Found;
-        let carried = predicted.filter(|belief| poor && belief.sigma_m() < LOST_M && belief.sigma_rad() < LOST_RAD);
-        Ok(carried.map_or(found, |belief| Localization {
+    fn found_again(&mut self, guess: Option<&Guess>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        let found = self.search_anew(up)?;
+        let poor = self.window.newest().len() < self.config.enough_fruits && found.verdict != Verdict::Found;
+        let carried =
+            guess.filter(|guess| poor && guess.followed.is_none() && guess.doubt.is_none() && guess.is_sharp());
+        Ok(carried.map_or(found, |guess| Localization {
             verdict: Verdict::Found,
-            pose: Some(belief.pose),
-            covariance: belief.covariance,
+            pose: Some(guess.expected.pose),
+            covariance: guess.expected.covariance,
             tracked: true,
             ..Localization::without_pose(Verdict::TooFew)
         }))
+    }
+
+    /// The newest frame alone, for the way from those before may be what was wrong; else with these.
+    fn search_anew(&mut self, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        let frame = self.window.newest();
+        let found = self.search(frame, &cloud_of(frame), up)?;
+        if found.verdict == Verdict::Found {
+            self.window.keep(1);
+            return Ok(found);
+        }
+        let fruits = self.window.fruits(self.config.enough_fruits);
+        if fruits.len() > frame.len() { self.search(&fruits, &cloud_of(&fruits), up) } else { Ok(found) }
     }
 
     fn search(&self, sightings: &[Sighting], seen: &FruitCloud, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
@@ -198,7 +236,8 @@ impl Localizer {
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let start = Belief { pose: start, covariance: doubt, motion: None };
         let aligned = align(sightings, &self.map, &start, &Slip::none());
-        let Some(joint) = self.believed(&aligned, up, SEARCHED_NATS) else {
+        let believed = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats >= 0.0);
+        let Some(joint) = believed else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
         let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
@@ -228,15 +267,50 @@ impl Localizer {
         .checked()
     }
 
-    fn learn(&mut self, found: &Localization, previous_from_camera: Option<&Pose>) {
-        let Some(pose) = found.pose else {
-            self.belief = None;
-            return;
-        };
+    fn learn(&mut self, found: &Localization, previous_from_camera: Option<&Pose>, guess: Option<&Guess>) {
         let before = self.belief.map(|belief| belief.pose);
-        let motion = previous_from_camera.copied().or_else(|| before.map(|before| pose.seen_from(&before)));
-        self.belief = Some(Belief { pose, covariance: found.covariance, motion });
+        (self.belief, self.doubt) = (None, Doubt::default());
+        if let Some(pose) = found.pose {
+            let motion = previous_from_camera.copied().or_else(|| before.map(|before| pose.seen_from(&before)));
+            self.belief = Some(Belief { pose, covariance: found.covariance, motion });
+        } else if let Some(guess) = guess.filter(|guess| !guess.doubt.is_none()) {
+            if guess.doubt.is_sure(self.config.false_alarm_rate) {
+                // What lies before may lie elsewhere.
+                self.window.keep(guess.doubt.frames());
+            } else if guess.is_sharp() {
+                (self.belief, self.doubt) = (Some(guess.expected), guess.doubt);
+            }
+        }
     }
+}
+
+/// Where the camera is by what is known from before.
+struct Guess {
+    /// By motion, and by fruits where they agree.
+    expected: Belief,
+    followed: Option<Followed>,
+    /// Whether the newest frame is against it.
+    doubt: Doubt,
+}
+
+impl Guess {
+    /// The pose that all fruits agree with, the newest too.
+    fn agreed(&mut self) -> Option<(Belief, Followed)> {
+        let followed = self.followed.take_if(|_| self.doubt.is_none() && self.expected.sigma_m() < LOST_M)?;
+        Some((self.expected, followed))
+    }
+
+    /// Whether it is known well enough to be a pose.
+    fn is_sharp(&self) -> bool {
+        self.expected.sigma_m() < LOST_M && self.expected.sigma_rad() < LOST_RAD
+    }
+}
+
+/// A pose that the fruits agree with.
+struct Followed {
+    settled: Settled,
+    /// Covariance of the pose and its slip.
+    joint: Joint,
 }
 
 /// One to one, of the newest frame.

@@ -9,7 +9,7 @@
 //! 4. A frame with few fruits is joined by the frames before it (`window`); where there are none at all, the motion
 //!    alone carries the pose as long as it is sure (`belief`).
 //! 5. Motions that are told and fall short alike are noticed and put right (`told_motions`, `slip`).
-//! 6. A pose that the fruits contradict is lost, and looked for from nothing ([`Localizer::update`]).
+//! 6. A pose that the fruits of the newest frame contradict is lost, and looked for from nothing (`doubt`).
 //!
 //! Equations, assumptions and limits: `docs/localization.md`.
 
@@ -17,6 +17,7 @@ mod alignment;
 mod answer;
 mod belief;
 mod config;
+mod doubt;
 mod known;
 mod localizer;
 mod residuals;

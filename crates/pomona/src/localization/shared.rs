@@ -42,7 +42,12 @@ impl Sag {
 pub(super) fn covariance(aligned: &Aligned, map: &KnownFruits, way: &[Matrix6<f64>], sag: &Sag) -> Option<Joint> {
     let alone = aligned.information.cholesky()?.inverse();
     let Shown { scale, near } = shown(aligned, &alone, sag.reach_m);
-    let errors = Shared { together: sag.all, near: Matrix3::from_diagonal_element(near), reach_m: sag.reach_m };
+    let errors = Shared {
+        together: sag.all,
+        near: Matrix3::from_diagonal_element(near),
+        own: scale.min(1.0),
+        reach_m: sag.reach_m,
+    };
     let pulls: Vec<Pull> = aligned.says.iter().map(|say| (say, say.slopes.transpose() * say.information)).collect();
     let mut middle = Joint::zeros();
     for (i, (one, pull)) in pulls.iter().enumerate() {
@@ -76,6 +81,9 @@ struct Shared {
     together: Matrix3<f64>,
     /// Those that are within `reach_m`, besides.
     near: Matrix3<f64>,
+    /// Two sightings of one fruit, of where it hangs: part of its covariance. No more than sightings are said to err by
+    /// alone, or the sum is no covariance.
+    own: f64,
     reach_m: f64,
 }
 
@@ -84,7 +92,7 @@ impl Shared {
     fn common(&self, one: &Say, other: &Say, map: &KnownFruits) -> Matrix3<f64> {
         let shared = self.together + self.near * kinship(one, other, self.reach_m);
         match (one.best, other.best) {
-            (Some(row), Some(same)) if row == same => shared + map.covariances[row],
+            (Some(row), Some(same)) if row == same => shared + map.covariances[row] * self.own,
             _ => shared,
         }
     }

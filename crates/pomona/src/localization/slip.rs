@@ -43,6 +43,11 @@ impl Slip {
         Self { since, covariance: unnoticed(), ..Self::none() }
     }
 
+    /// Of the last motion alone, which was not told but expected with this covariance.
+    pub fn unknown(covariance: &Matrix6<f64>) -> Self {
+        Self { since: 1, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
+    }
+
     /// The same, one motion later.
     pub fn later(&self) -> Self {
         let longer = (self.since + 1) as f64 / self.since as f64;
@@ -130,6 +135,15 @@ pub(super) fn evidence(aligned: &Aligned) -> f64 {
     let volume: f64 = factor.l_dirty().diagonal().iter().map(|side| side.ln()).sum();
     let before: f64 = expected.diagonal().iter().map(|information| 0.5 * information.ln()).sum();
     aligned.log_odds + 0.5 * aligned.slip.total.dot(&back) - volume + before
+}
+
+/// How much less the newest frame says, nats, for its motion being one of many that were expected and fitted to it: by
+/// Laplace's rule - D^T B^-1 D / 2 + ln(det C / det B) / 2, C being the covariance that is left of D.
+pub(super) fn lost_by_fit(aligned: &Aligned) -> f64 {
+    let (expected, back) = aligned.slip.expected();
+    let Some(factor) = aligned.information.cholesky() else { return f64::NEG_INFINITY };
+    let known = factor.inverse().fixed_view::<6, 6>(6, 6).into_owned();
+    0.5 * (aligned.slip.total.dot(&back) + (known * expected).determinant().ln())
 }
 
 fn unnoticed() -> Matrix6<f64> {

@@ -14,7 +14,7 @@ use super::slip::{Slip, evidence};
 use super::window::Window;
 use crate::bundle::steps::moved;
 use crate::pose::Pose;
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
 
 /// Motions that a slip is tried for: what began between two of them shows under both.
 const TRIED: [usize; 4] = [1, 2, 4, 8];
@@ -90,8 +90,30 @@ impl ToldMotions {
         }
     }
 
+    /// Settles the pose and the last motion, which was not told: the frames before show where the camera was then, the
+    /// newest one how far it came. `expected` is the covariance of the motion, which `told` has in its own.
+    pub fn settle_untold(
+        window: &Window,
+        enough: usize,
+        map: &KnownFruits,
+        told: &Belief,
+        expected: &Matrix6<f64>,
+    ) -> Settled {
+        let sightings = window.sightings(enough);
+        let joined = oldest(&sightings) > 0;
+        let aligned = if joined {
+            let before = Belief { covariance: told.covariance - expected, ..*told };
+            align(&sightings, map, &before, &Slip::unknown(expected))
+        } else {
+            align(&sightings, map, told, &Slip::none())
+        };
+        let mut window = window.clone();
+        window.slip(&aligned.slip);
+        Settled { sightings, aligned, motions: Self::default(), predicted: Some(*told), window: Some(window) }
+    }
+
     /// Settles the pose by motions that are as before or right.
-    pub fn as_before(&self, window: &Window, enough: usize, map: &KnownFruits, told: &Belief) -> Settled {
+    fn as_before(&self, window: &Window, enough: usize, map: &KnownFruits, told: &Belief) -> Settled {
         let sightings = window.sightings(enough);
         let right = align(&sightings, map, told, &Slip::none());
         let shown = self.slip.filter(|_| oldest(&sightings) > 0);

@@ -39,11 +39,10 @@ impl Window {
         }
     }
 
-    /// The camera is not where it was thought to be: what was seen before lies elsewhere from it.
-    pub fn correct(&mut self, thought_from_camera: &Pose) {
-        let camera_from_thought = thought_from_camera.inverse();
-        for (now_from_then, _) in self.frames.iter_mut().skip(1) {
-            *now_from_then = camera_from_thought.after(now_from_then);
+    /// Fruits have shown how the camera moved last, as surely as this.
+    pub fn learn(&mut self, covariance: &Matrix6<f64>) {
+        if let Some(last) = self.motions.front_mut() {
+            *last = *covariance;
         }
     }
 
@@ -57,8 +56,13 @@ impl Window {
     /// Takes a frame up, and forgets the oldest beyond `most`.
     pub fn push(&mut self, sightings: Vec<Sighting>, most: usize) {
         self.frames.push_front((Pose::IDENTITY, sightings));
-        self.frames.truncate(most);
-        self.motions.truncate(most - 1);
+        self.keep(most);
+    }
+
+    /// Keeps the newest frames only.
+    pub fn keep(&mut self, frames: usize) {
+        self.frames.truncate(frames);
+        self.motions.truncate(frames.saturating_sub(1));
     }
 
     pub fn forget(&mut self) {
@@ -72,8 +76,8 @@ impl Window {
     }
 
     /// Sightings of the newest frame.
-    pub fn newest(&self) -> usize {
-        self.frames.front().map_or(0, |(_, seen)| seen.len())
+    pub fn newest(&self) -> &[Sighting] {
+        self.frames.front().map_or(&[], |(_, seen)| seen)
     }
 
     /// Sightings of the newest frame, and of those before until there are enough.
@@ -93,7 +97,7 @@ impl Window {
     /// Each fruit once, as far as places tell: a cloud to be matched. A frame that stands alone is not mixed with those
     /// before: the way from them may be what is wrong.
     pub fn fruits(&self, enough: usize) -> Vec<Sighting> {
-        let wanted = if self.newest() < enough { ENOUGH_TO_SEARCH } else { enough };
+        let wanted = if self.newest().len() < enough { ENOUGH_TO_SEARCH } else { enough };
         let mut fruits: Vec<Sighting> = Vec::new();
         for one in self.sightings(wanted) {
             let known = |other: &Sighting| (other.place - one.place).norm() < ONE_FRUIT_M;
