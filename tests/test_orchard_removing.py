@@ -37,7 +37,9 @@ def table(path: Path) -> list[tuple[object, ...]]:
     fruits = OrchardMap(path).fruits()
     assert fruits.ids is not None
     assert fruits.diameters_m is not None
-    rows = zip(fruits.ids, map(tuple, fruits.positions.tolist()), map(str, fruits.diameters_m), strict=True)
+    # The scale of a frame, that sizes are told in, is 1 but for its last bit.
+    diameters = map("{:.9f}".format, fruits.diameters_m)
+    rows = zip(fruits.ids, map(tuple, fruits.positions.tolist()), diameters, strict=True)
     return [(*row, *about) for row, *about in zip(rows, *fruits.extras.values(), strict=True)]
 
 
