@@ -112,8 +112,9 @@ class FruitSlam:
         information : (6, 6) float64
             Inverse covariance of `moved`, of a step (translation, rotation) in the frame of this camera.
         doubtful : bool
-            Whether `moved` may be wrong altogether, as of wheels that slip: links and loops outvote such a motion. Else
-            it is trusted as far as its information says.
+            Whether `moved` may be wrong altogether, as of wheels that slip: where all is adjusted, in `way` and when a
+            loop closes, links outvote such a motion; until then frames are placed by it. Else it is trusted as far as
+            its information says.
 
         Raises
         ------
