@@ -1,8 +1,6 @@
-"""Ways by fruits alone: drawn graphs and rows whose truth is known, and a scan of a shipped recording."""
+"""Ways by fruits alone: drawn graphs and rows whose truth is known."""
 
 import gc
-import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud
-from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
-from pomona.recording import open_recording
 from pomona.survey.refinement import Motions, SeenFruits, refine
 from pomona.survey.slam import Anchors, Constellations, FruitSlam, FruitWay, chained, way_by_fruits
 from pomona.survey.slam.consistency import explained
@@ -21,11 +17,6 @@ from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.identities_of_links import joined_fruits
 from pomona.survey.slam.loops import Loop, joined
 from pomona.survey.slam.spanning import spanned_poses
-from recording_maker import make_recording
-
-ROW = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09"
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
 SIGMAS = np.array([0.02, 0.02, 0.03, 0.004, 0.004, 0.004])
@@ -456,51 +447,3 @@ def test_a_fruit_is_once_in_a_frame() -> None:
     fruits = joined_fruits(np.arange(4), frames, [(0, 2), (2, 3), (1, 3)])
     # The last pair would make both fruits of frame 0 one.
     assert fruits.tolist() == [0, 1, 0, 0]
-
-
-def test_scan_with_slam(pomona: Pomona, tmp_path: Path) -> None:
-    """The first 14 frames, 1.7 m, of a shipped row: poses by its fruits and pictures, the same again on another run."""
-    command = ("scan", ROW / "row.mp4", "--calibration", ROW / "calibration.json", "--detections", ROW / "boxes.csv")
-    flags = ("--retrack", "--slam", "--no-crops", "--to", "13", "--date", "2024-08-09")
-    code, out, err = pomona(*command, *flags, "-o", tmp_path / "row.gpkg", "--json")
-    assert code == 0, err
-    assert json.loads(out)["n_frames"] == 14
-    true = "\n".join((ROW / "poses_tum.txt").read_text().splitlines()[:15])
-    (tmp_path / "true.tum").write_text(true + "\n")
-    judge = ("evaluate", "trajectory", tmp_path / "row.gpkg", tmp_path / "true.tum", "--in-order", "--json")
-    figures = json.loads(pomona(*judge)[1])
-    assert figures["poses"] == 14
-    assert figures["absolute"]["translation_m"]["rmse"] < 0.004
-    assert figures["absolute"]["rotation_deg"]["rmse"] < 0.15
-
-
-def test_a_scan_with_slam_that_is_stopped_has_what_was_looked_at() -> None:
-    recording = open_recording(ROW / "row.mp4", calibration=ROW / "calibration.json")
-    asked = iter([False] * 6 + [True] * 20)
-    told: list[tuple[int, int, int]] = []
-    survey = pomona_scan(
-        recording,
-        detections=ROW / "boxes.csv",
-        slam=True,
-        retrack=True,
-        crops=False,
-        progress=lambda *done: told.append(done),
-        stop=lambda: next(asked),
-    )
-    assert survey.stopped == 6
-    assert survey.trajectory.frames.tolist() == list(range(7))
-    assert [done for done, _, _ in told] == [*range(1, 8), *range(49, 56)]
-
-
-def test_one_frame_is_no_way(tmp_path: Path) -> None:
-    recording = open_recording(make_recording(tmp_path / "R", (0.0,)))
-    with pytest.raises(PomonaError, match="found 1 frame to follow, expected two or more; leave out --slam"):
-        pomona_scan(recording, slam=True)
-
-
-def test_a_recording_whose_frames_share_nothing_is_told(tmp_path: Path) -> None:
-    recording = open_recording(make_recording(tmp_path / "R", (0.0, 0.1, 0.2)))
-    with pytest.raises(
-        PomonaError, match="found 3 frames that show no fruits in common, expected 5 or more in each two"
-    ):
-        pomona_scan(recording, slam=True)
