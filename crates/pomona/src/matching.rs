@@ -176,7 +176,7 @@ impl MapIndex {
                 Ok(Match::without_answer(Verdict::TooFew, stages))
             }
             PreparedMap::Verified(prepared) => {
-                Ok(crate::verified::search(prepared, &self.map.cloud, fruits, request, &self.config.verified))
+                Ok(crate::verified::search(prepared, fruits, request, &self.config.verified))
             }
             PreparedMap::Compact(index) => {
                 Ok(compact::search(index, &self.map.cloud, fruits, request, &self.config.verified))
@@ -209,10 +209,12 @@ impl MapIndex {
         let pose = self.map.conditioned_pose(&query, pose);
         let request = Request { noise_m: self.map.noise(noise_m)?, ..request };
         let config = &self.config.verified;
-        let (map, fruits) = (&self.map.cloud, &query.cloud);
+        let fruits = &query.cloud;
         let found = match &self.prepared {
-            PreparedMap::Verified(map_) => crate::verified::pairs_under(map_, map, fruits, &pose, &request, config),
-            PreparedMap::Compact(index) => compact::pairs_under(index, map, fruits, &pose, &request, config),
+            PreparedMap::Verified(prepared) => crate::verified::pairs_under(prepared, fruits, &pose, &request, config),
+            PreparedMap::Compact(index) => {
+                compact::pairs_under(index, &self.map.cloud, fruits, &pose, &request, config)
+            }
             PreparedMap::Paper(_) | PreparedMap::TooFew => {
                 let reason = "pairs under a known pose need an index of the verified method".to_owned();
                 return Err(Error::Request { name: "method", reason });
@@ -293,8 +295,7 @@ pub fn match_expected(
         return Ok(Match::without_answer(Verdict::NoMatch, Vec::new()));
     }
     let pose = map.conditioned_pose(query, map_from_query);
-    let sides = [(query_ready, &query.cloud), (map_ready, &map.cloud)];
-    let found = crate::verified::search_expected(sides, &pose, &request, &config.verified);
+    let found = crate::verified::search_expected(query_ready, map_ready, &pose, &request, &config.verified);
     Ok(map.restored(query, found))
 }
 

@@ -55,20 +55,24 @@ impl VerifiedConfig {
         }
         Ok(())
     }
-
-    /// Log-odds that a pose must exceed where any of `poses` could have been found, nats.
-    ///
-    /// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six or
-    /// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
-    /// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. `python -m benchmarks chance` fits the three constants; it
-    /// gives 14.7, 0.86 and 2.2 for crowns, more for a dozen fruits and less for rows. The cells without overlap and the
-    /// unrelated clouds of the benchmarks `cells` and `season` hold them to account.
-    ///
-    /// Where only a `share` of all turns is admitted, the probability is that share of it.
-    pub(crate) fn threshold(&self, poses: f64, share: f64) -> f64 {
-        reached(self.false_alarm_rate, poses, share)
-    }
 }
+
+/// Log-odds, in nats, that the best wrong pose exceeds with a probability of `rate`, where any of `poses` could have been found.
+///
+/// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six or
+/// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
+/// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. `python -m benchmarks chance` fits the three constants; it
+/// gives 14.7, 0.86 and 2.2 for crowns, more for a dozen fruits and less for rows. The cells without overlap and the
+/// unrelated clouds of the benchmarks `cells` and `season` hold them to account.
+///
+/// Where only a `share` of all turns is admitted, the probability is that share of it.
+pub(crate) fn reached(rate: f64, poses: f64, share: f64) -> f64 {
+    OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - rate.ln())
+}
+
+/// Rate of the log-odds from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
+/// in twenty.
+pub(super) const PATTERN: f64 = 0.05;
 
 /// Log-odds, in nats, that the best of many wrong poses exceeds with a probability of `rate` where the second best has
 /// `second`.
@@ -77,17 +81,6 @@ impl VerifiedConfig {
 /// `exp(-x / SPACING)`, however many there are and wherever they lie (Renyi 1953).
 pub(crate) fn outlying(rate: f64, second: f64) -> f64 {
     second - SPACING * rate.ln()
-}
-
-/// Log-odds, in nats, from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
-/// in twenty.
-pub(crate) fn pattern(poses: f64, share: f64) -> f64 {
-    reached(0.05, poses, share)
-}
-
-/// Log-odds, in nats, that the best wrong pose exceeds with a probability of `rate`.
-fn reached(rate: f64, poses: f64, share: f64) -> f64 {
-    OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - rate.ln())
 }
 
 /// Poses that two clouds offer: any fruit on any fruit; where the scale is free, at any of a hundred scales.
@@ -125,11 +118,9 @@ mod tests {
 
     #[test]
     fn more_poses_and_fewer_false_alarms_ask_for_more() {
-        let config = VerifiedConfig::default();
-        assert!(config.threshold(1e5, 1.0) > config.threshold(1e3, 1.0));
-        let strict = VerifiedConfig { false_alarm_rate: 1e-6, ..config };
-        assert!(config.threshold(1e3, 0.01) < config.threshold(1e3, 1.0));
-        assert!(strict.threshold(1e3, 1.0) > config.threshold(1e3, 1.0));
+        assert!(reached(1e-4, 1e5, 1.0) > reached(1e-4, 1e3, 1.0));
+        assert!(reached(1e-4, 1e3, 0.01) < reached(1e-4, 1e3, 1.0));
+        assert!(reached(1e-6, 1e3, 1.0) > reached(1e-4, 1e3, 1.0));
     }
 
     #[test]

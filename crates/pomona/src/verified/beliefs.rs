@@ -3,7 +3,7 @@
 
 /// A fruit of the query and one of the map that may be the same.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Edge {
+pub(crate) struct Edge {
     pub(super) query: u32,
     pub(super) map: u32,
     /// Likelihood ratio of "the same fruit" against both being alone.
@@ -11,12 +11,10 @@ pub(super) struct Edge {
     pub(super) distance: f64,
 }
 
-/// Pairs less likely than this against both being alone are left out.
-pub(super) const LEAST_RATIO: f64 = 1e-3;
-
 /// What all one-to-one sets of pairs say, each weighing the product of its edges' ratios.
-#[derive(Debug)]
-pub(super) struct Beliefs {
+#[derive(Debug, Clone)]
+pub(crate) struct Beliefs {
+    pub(super) edges: Vec<Edge>,
     /// Of each edge: the share of the sets that hold it.
     pub(super) probabilities: Vec<f64>,
     /// Logarithm of the sum over all sets, by Bethe's approximation (Vontobel 2013): exact where no edges form a loop.
@@ -28,12 +26,12 @@ const ROUNDS: usize = 40;
 const SETTLED: f64 = 1e-5;
 
 impl Beliefs {
-    pub(super) fn new(edges: &[Edge], n_query: usize, n_map: usize) -> Self {
+    pub(super) fn new(edges: Vec<Edge>, n_query: usize, n_map: usize) -> Self {
         let mut to_query = vec![1.0; edges.len()];
         let mut to_map = vec![0.0; edges.len()];
         let mut of_map = vec![1.0; n_map];
         for _ in 0..ROUNDS {
-            let of_query = sums(edges, &to_query, n_query);
+            let of_query = sums(&edges, &to_query, n_query);
             for ((edge, back), out) in edges.iter().zip(&to_query).zip(&mut to_map) {
                 *out = edge.ratio / (of_query[edge.query as usize] - edge.ratio * back).max(1e-12);
             }
@@ -51,14 +49,20 @@ impl Beliefs {
                 break;
             }
         }
-        let of_query = sums(edges, &to_query, n_query);
+        let of_query = sums(&edges, &to_query, n_query);
         let probability = |(edge, back): (&Edge, &f64)| edge.ratio * back / of_query[edge.query as usize];
         let logarithms = |sums: &[f64]| sums.iter().map(|sum| sum.ln()).sum::<f64>();
         let shared: f64 = to_map.iter().zip(&to_query).map(|(there, back)| (there * back).ln_1p()).sum();
         Self {
             probabilities: edges.iter().zip(&to_query).map(probability).collect(),
             log_sum: logarithms(&of_query) + logarithms(&of_map) - shared,
+            edges,
         }
+    }
+
+    /// The edges with their probabilities.
+    pub(super) fn links(&self) -> impl Iterator<Item = (&Edge, f64)> {
+        self.edges.iter().zip(self.probabilities.iter().copied())
     }
 }
 

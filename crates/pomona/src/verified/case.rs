@@ -1,6 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{VerifiedConfig, WORTH_IT, pattern, poses};
+use super::acceptance::{PATTERN, VerifiedConfig, WORTH_IT, poses, reached};
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
@@ -9,7 +9,6 @@ use super::placement::Placement;
 use super::proposal::Effort;
 use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
-use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
 use crate::geometry::Scale;
@@ -68,15 +67,13 @@ pub(super) struct Finding<'a> {
     pub(super) settled: Option<Settled>,
 }
 
-/// What a search has found.
-#[derive(Default)]
+/// What a search has found, and what it did for it.
 pub(super) struct Findings<'a> {
     /// Those with enough evidence, most first.
     pub(super) accepted: Vec<Finding<'a>>,
     /// Other poses that it grew: what chance and the planting's own pattern reach.
     pub(super) others: Vec<Finding<'a>>,
-    /// Evidence from which on these show a pattern, nats.
-    pub(super) pattern: f64,
+    pub(super) log: Log,
 }
 
 impl<'a> Finding<'a> {
@@ -85,6 +82,12 @@ impl<'a> Finding<'a> {
     }
 }
 
+/// Most evidence first.
+pub(super) fn best_first(findings: &mut [Finding]) {
+    findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+}
+
+#[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub(super) query: &'a Landscape,
     pub(super) map: &'a Landscape,
@@ -94,17 +97,14 @@ pub(super) struct Search<'a> {
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
     noise_m: Option<f64>,
-    sizes: Option<Diameters>,
 }
-
-pub(super) type Stages = Vec<(&'static str, f64)>;
 
 /// What the search did.
 pub(super) struct Log {
     pub(super) seeds: usize,
     pub(super) effort: Effort,
     pub(super) refined: usize,
-    pub(super) grown: u32,
+    pub(super) grown: usize,
     /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
     pub(super) best: f64,
     pub(super) settled: f64,
@@ -114,19 +114,12 @@ pub(super) struct Log {
     pub(super) settled_threshold: f64,
 }
 
-impl Log {
-    pub(super) fn new(threshold: f64) -> Self {
-        let none = f64::NEG_INFINITY;
-        Self {
-            seeds: 0,
-            effort: Effort::default(),
-            refined: 0,
-            grown: 0,
-            best: none,
-            settled: none,
-            threshold,
-            settled_threshold: SETTLED * threshold,
-        }
+impl Findings<'_> {
+    /// Nothing yet, where `effort` was spent and so much evidence is asked for.
+    pub(super) fn none(effort: Effort, threshold: f64) -> Self {
+        let (best, settled, settled_threshold) = (f64::NEG_INFINITY, f64::NEG_INFINITY, SETTLED * threshold);
+        let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
+        Self { accepted: Vec::new(), others: Vec::new(), log }
     }
 }
 
@@ -134,7 +127,6 @@ impl<'a> Search<'a> {
     pub(super) fn new(
         prepared: &'a VerifiedMap,
         query: &'a Landscape,
-        sizes: Option<Diameters>,
         request: &Request,
         config: &VerifiedConfig,
     ) -> Self {
@@ -146,35 +138,33 @@ impl<'a> Search<'a> {
             model: model_of(prepared.landscape.spacing, prepared.scale, request),
             config: *config,
             noise_m: request.noise_m,
-            sizes,
         }
     }
 
     /// The same search for poses that are upside down, where the vertical is known.
     pub(super) fn upside_down(&self) -> Option<Self> {
         let vertical = Some(self.model.vertical?.inverted());
-        // No size speaks for a pose that is not settled.
-        Some(Self { model: Model { vertical, ..self.model }, sizes: None, ..*self })
+        Some(Self { model: Model { vertical, ..self.model }, ..*self })
     }
 
     /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
     pub(super) fn threshold(&self, share: f64) -> f64 {
-        self.config.threshold(self.offered(), self.model.vertical.map_or(1.0, |_| share))
+        self.reached(self.config.false_alarm_rate, share)
     }
 
     /// Evidence from which on another pose counts as a rival, accepted or not, nats.
     pub(super) fn pattern(&self, share: f64) -> f64 {
-        pattern(self.offered(), self.model.vertical.map_or(1.0, |_| share))
+        self.reached(PATTERN, share)
+    }
+
+    fn reached(&self, rate: f64, share: f64) -> f64 {
+        let offered = poses(self.query.len(), self.map_fruits, self.model.scale);
+        reached(rate, offered, self.model.vertical.map_or(1.0, |_| share))
     }
 
     /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
     pub(super) fn least(&self) -> f64 {
-        self.config.threshold(poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
-    }
-
-    /// Poses that the two clouds offer.
-    fn offered(&self) -> f64 {
-        poses(self.query.len(), self.map_fruits, self.model.scale)
+        reached(self.config.false_alarm_rate, poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
     }
 
     pub(super) fn admits(&self, pose: &Placement) -> bool {
@@ -200,7 +190,7 @@ impl<'a> Search<'a> {
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where there is none.
     fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
-        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), WORTH_IT);
+        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), WORTH_IT);
         pairs.iter().map(|pair| pair.probability).sum::<f64>() / pairs.len().max(1) as f64
     }
 
@@ -211,7 +201,7 @@ impl<'a> Search<'a> {
             if !growth.whole {
                 growth.reach_all();
             }
-            settle(growth, self.noise_m, self.sizes.as_ref())
+            settle(growth, self.noise_m)
         });
         settled.evidence
     }

@@ -1,22 +1,28 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::case::{Finding, Findings, Search, Stages};
+use super::case::{Finding, Search};
 use super::overlap::Overlap;
-use super::pairing::Pairing;
 use crate::answer::{Match, Pair, Registration, Verdict};
 
 impl Search<'_> {
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
     /// The other optima of the same search show what wrong poses reach on this very planting.
-    pub(super) fn answer(&self, Findings { accepted, others, pattern }: Findings, mut stages: Stages) -> Match {
+    ///
+    /// `pattern` is the evidence from which on these count, nats.
+    pub(super) fn answer(
+        &self,
+        (accepted, others): (Vec<Finding>, &[Finding]),
+        pattern: f64,
+        mut stages: Vec<(&'static str, f64)>,
+    ) -> Match {
         let mut accepted = accepted.into_iter();
         let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
         let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap, pattern);
-        let pairs = settled.marginals.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), self.config.min_probability);
         let outdone = others.iter().any(rivals);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
@@ -28,24 +34,18 @@ impl Search<'_> {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),
             alternatives: rivals,
-            pairs: self.in_rows(&pairs),
+            pairs: self.in_rows(pairs),
             noise_m: overlap.sigma,
             stages,
         }
     }
 
     /// Pairs in the rows of the clouds, in the order of the query.
-    fn in_rows(&self, pairs: &[Pairing]) -> Vec<Pair> {
-        let mut pairs: Vec<Pair> = pairs
-            .iter()
-            .map(|pair| Pair {
-                query: self.query.rows[pair.query as usize] as usize,
-                map: self.map.rows[pair.map as usize] as usize,
-                probability: pair.probability,
-                distance_m: pair.distance,
-                support: pair.gain,
-            })
-            .collect();
+    fn in_rows(&self, mut pairs: Vec<Pair>) -> Vec<Pair> {
+        for pair in &mut pairs {
+            pair.query = self.query.rows[pair.query] as usize;
+            pair.map = self.map.rows[pair.map] as usize;
+        }
         pairs.sort_unstable_by_key(|pair| pair.query);
         pairs
     }

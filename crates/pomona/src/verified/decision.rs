@@ -1,7 +1,7 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
 use super::acceptance::VerifiedConfig;
-use super::case::{Finding, Findings, Log, SETTLED, Search, Stages, VerifiedMap};
+use super::case::{Finding, Findings, Log, SETTLED, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
@@ -13,7 +13,6 @@ use super::placement::Placement;
 use super::proposal::Effort;
 use super::search::of_some_fruits;
 use super::seeds::{self, Seed};
-use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
@@ -57,129 +56,125 @@ pub(super) const SURE: f64 = 6.0;
 const UPRIGHT_SEEDS: u64 = 2;
 
 /// Finds the query in the map.
-pub(crate) fn search(
-    prepared: &VerifiedMap,
-    map: &FruitCloud,
-    query: &FruitCloud,
-    request: &Request,
-    config: &VerifiedConfig,
-) -> Match {
-    if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS {
-        return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
+pub(crate) fn search(map: &VerifiedMap, query: &FruitCloud, request: &Request, config: &VerifiedConfig) -> Match {
+    let query = Landscape::new(query);
+    let search = Search::new(map, &query, request, config);
+    if query.len().min(search.map.len()) < MIN_FRUITS {
+        return Match::too_few();
     }
-    let landscape = Landscape::new(query);
-    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
-    let search = Search::new(prepared, &landscape, sizes, request, config);
-    answer_of(&search, search.run())
-}
-
-/// The answer to what a search has found.
-pub(super) fn answer_of<'a>(search: &Search<'a>, (mut findings, mut stages): (Findings<'a>, Stages)) -> Match {
-    if findings.accepted.first().is_some_and(|best| search.fits_better_mirrored(best)) {
-        stages.push(("mirrored", 1.0));
-        findings.accepted.clear();
-    }
-    let answer = search.answer(findings, stages);
-    // Where no pair is probable enough to be reported, there is nothing to answer with.
-    if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
+    search.answer_of(search.run())
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.
 pub(crate) fn pairs_under(
-    prepared: &VerifiedMap,
-    map: &FruitCloud,
+    map: &VerifiedMap,
     query: &FruitCloud,
     map_from_query: &Similarity,
     request: &Request,
     config: &VerifiedConfig,
 ) -> Match {
-    if query.is_empty() || map.len() < MIN_FRUITS {
-        return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
+    let query = Landscape::new(query);
+    let search = Search::new(map, &query, request, config);
+    if query.len() == 0 || search.map.len() < MIN_FRUITS {
+        return Match::too_few();
     }
-    let landscape = Landscape::new(query);
-    let sizes = Diameters::new(query, map, &landscape, &prepared.landscape);
-    let search = Search::new(prepared, &landscape, sizes, request, config);
-    let pose = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
+    let pose = Placement::from_similarity(map_from_query, &query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
-    let place = search.query.points.first().copied().unwrap_or_default();
+    let place = query.points.first().copied().unwrap_or_default();
     let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
-    let model = Model { sigma, ..search.model };
-    let growth = hold(search.query, search.map, &seed, &model);
-    let mut finding = Finding::new(growth, seed);
+    let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
     search.settle(&mut finding);
-    search.answer(Findings { accepted: vec![finding], ..Findings::default() }, Vec::new())
+    search.answer((vec![finding], &[]), 0.0, Vec::new())
+}
+
+impl Match {
+    pub(super) fn too_few() -> Self {
+        Self::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)])
+    }
 }
 
 impl<'a> Search<'a> {
     /// Rounds of seeds until a pose is accepted, then the outline.
-    fn run(&self) -> (Findings<'a>, Stages) {
-        let mut log = Log::new(self.threshold(Vertical::share_of_turns()));
-        let mut findings = Findings::default();
+    fn run(&self) -> Findings<'a> {
+        let mut findings = Findings::none(Effort::default(), self.threshold(Vertical::share_of_turns()));
         let mut longest = Vec::new();
         for (index, keep) in ROUNDS.into_iter().enumerate() {
             let seeds = self.seeds_of(index, &mut longest);
-            let (hypotheses, rest) = self.ask(&seeds, keep, &mut log);
-            self.grow_distinct(&hypotheses, &mut findings.accepted, &mut log);
-            self.sift(&mut findings, &mut log);
+            let (hypotheses, rest) = self.ask(&seeds, keep, &mut findings.log);
+            self.grow_distinct(&hypotheses, &mut findings);
+            self.sift(&mut findings);
             if !findings.accepted.is_empty() {
-                self.doubt(&mut findings, &rest, &mut log);
+                self.doubt(&mut findings, &rest);
             } else if index == 1 {
                 // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
                 findings.accepted.extend(self.by_outline());
                 // Of the half-turns about a row's axes a known vertical leaves one half.
-                log.threshold = self.threshold(0.5);
-                self.sift(&mut findings, &mut log);
+                findings.log.threshold = self.threshold(0.5);
+                self.sift(&mut findings);
             }
             if !findings.accepted.is_empty() {
                 break;
             }
         }
         if findings.accepted.is_empty() {
-            self.lay_along(&mut findings, &mut log);
+            self.lay_along(&mut findings);
         }
         if findings.accepted.is_empty() {
             findings.others.extend(self.upside_down_poses());
-            findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
+            self.accept_outlier(&mut findings, f64::NEG_INFINITY);
         }
-        findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
-        findings.pattern = self.pattern(log.effort.stands.share_left());
-        let stages = self.stages(&log, findings.accepted.len());
-        (findings, stages)
+        best_first(&mut findings.accepted);
+        findings
     }
 
     /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.
     fn upside_down_poses(&self) -> Vec<Finding<'a>> {
         let Some(inverted) = self.upside_down() else { return Vec::new() };
-        let mut log = Log::new(f64::INFINITY);
-        let (mut found, mut longest) = (Vec::new(), Vec::new());
+        let mut findings = Findings::none(Effort::default(), f64::INFINITY);
+        let mut longest = Vec::new();
         for (index, keep) in ROUNDS.into_iter().enumerate() {
             let seeds = inverted.seeds_of(index, &mut longest);
-            let (hypotheses, _) = inverted.ask(&seeds, keep, &mut log);
-            inverted.grow_distinct(&hypotheses, &mut found, &mut log);
+            let (hypotheses, _) = inverted.ask(&seeds, keep, &mut findings.log);
+            inverted.grow_distinct(&hypotheses, &mut findings);
         }
-        found.retain(|finding| inverted.admits(&finding.overlap.pose) && inverted.turns_are_fixed(finding));
-        found
+        findings.accepted.retain(|finding| inverted.is_pose(finding));
+        findings.accepted
     }
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
-    pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> (Findings<'a>, Stages) {
-        let mut log = Log { effort, ..Log::new(self.threshold(effort.stands.share_left())) };
-        let mut findings = Findings::default();
+    pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> Findings<'a> {
+        let mut findings = Findings::none(effort, self.threshold(effort.share_left()));
         let hypotheses = self.refined(contenders);
-        log.refined = hypotheses.len();
+        findings.log.refined = hypotheses.len();
         for some in hypotheses.chunks(GROWN) {
-            self.grow_distinct(some, &mut findings.accepted, &mut log);
+            self.grow_distinct(some, &mut findings);
         }
-        self.sift(&mut findings, &mut log);
+        self.sift(&mut findings);
         if findings.accepted.is_empty() {
-            findings.accepted.extend(self.single_out(&mut findings.others, self.least(), &mut log));
+            self.accept_outlier(&mut findings, self.least());
         } else {
-            self.doubt(&mut findings, &[], &mut log);
+            self.doubt(&mut findings, &[]);
         }
-        findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
-        findings.pattern = self.pattern(log.effort.stands.share_left());
-        let stages = self.stages(&log, findings.accepted.len());
-        (findings, stages)
+        best_first(&mut findings.accepted);
+        findings
+    }
+
+    /// The answer to what was found.
+    pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
+        let mut stages = self.stages(&findings);
+        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best)) {
+            stages.push(("mirrored", 1.0));
+            findings.accepted.clear();
+        }
+        let pattern = self.pattern(findings.log.effort.share_left());
+        let answer = self.answer((findings.accepted, &findings.others), pattern, stages);
+        // Where no pair is probable enough to be reported, there is nothing to answer with.
+        if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
+    }
+
+    /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
+    fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
+        accepted.extend(self.single_out(others, least, log));
     }
 
     /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
@@ -198,20 +193,21 @@ impl<'a> Search<'a> {
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
-    fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender], log: &mut Log) {
-        self.look_for_rivals(rest, &mut findings.accepted, log);
+    fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
+        self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
-        if log.seeds < FIRST_FRUITS {
-            let (fruits, missing) = (self.query.len(), FIRST_FRUITS - log.seeds);
+        if findings.log.seeds < FIRST_FRUITS {
+            let (fruits, missing) = (self.query.len(), FIRST_FRUITS - findings.log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
-            let (more, _) = self.ask(&more, RIVAL_CANDIDATES, log);
-            self.grow_distinct(&more, &mut findings.accepted, log);
+            let (more, _) = self.ask(&more, RIVAL_CANDIDATES, &mut findings.log);
+            self.grow_distinct(&more, findings);
         }
-        self.sift(findings, log);
-        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < SURE * log.threshold;
+        self.sift(findings);
+        let least = SURE * findings.log.threshold;
+        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < least;
         findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
-        self.sift(findings, log);
+        self.sift(findings);
     }
 
     /// Hypotheses of one round, and the candidates that were not refined.
@@ -219,25 +215,29 @@ impl<'a> Search<'a> {
         let (hypotheses, rest, spent) = self.round(seeds, keep);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
-        log.threshold = self.threshold(log.effort.stands.share_left());
+        log.threshold = self.threshold(log.effort.share_left());
         log.refined += hypotheses.len();
         (hypotheses, rest)
     }
 
     /// Tells findings with enough evidence, grown and settled, from the others.
-    fn sift(&self, findings: &mut Findings<'a>, log: &mut Log) {
+    fn sift(&self, findings: &mut Findings<'a>) {
         for mut finding in std::mem::take(&mut findings.accepted) {
-            if !self.admits(&finding.overlap.pose) || !self.turns_are_fixed(&finding) {
+            if !self.is_pose(&finding) {
                 continue;
             }
-            log.best = log.best.max(finding.overlap.log_odds);
-            let sorted =
-                if self.holds(&mut finding, SETTLED, log) { &mut findings.accepted } else { &mut findings.others };
-            sorted.push(finding);
+            findings.log.best = findings.log.best.max(finding.overlap.log_odds);
+            let enough = self.holds(&mut finding, SETTLED, &mut findings.log);
+            (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
         }
     }
 
-    fn stages(&self, log: &Log, verified: usize) -> Stages {
+    /// Whether a finding is a whole pose: it stands as a known vertical asks, and its turns are fixed.
+    fn is_pose(&self, finding: &Finding) -> bool {
+        self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
+    }
+
+    pub(super) fn stages(&self, Findings { accepted, log, .. }: &Findings) -> Vec<(&'static str, f64)> {
         let known = |nats: f64| if nats.is_finite() { nats } else { f64::NAN };
         vec![
             ("query_fruits", self.query.len() as f64),
@@ -247,69 +247,51 @@ impl<'a> Search<'a> {
             ("candidates", log.effort.candidates as f64),
             ("fitted", log.effort.fitted as f64),
             ("refined", log.refined as f64),
-            ("grown", f64::from(log.grown)),
+            ("grown", log.grown as f64),
             ("threshold_nats", log.threshold),
             ("best_nats", known(log.best)),
             ("settled_threshold_nats", log.settled_threshold),
             ("settled_nats", known(log.settled)),
-            ("verified", verified as f64),
+            ("verified", accepted.len() as f64),
         ]
     }
 
-    /// Grows the best hypotheses that no finding explains yet.
-    pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Vec<Finding<'a>>, log: &mut Log) {
+    /// Grows the best hypotheses that no accepted finding explains yet, and adds them to these.
+    pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Findings<'a>) {
         let mut grown = 0;
-        let mut left = hypotheses;
+        let mut left = hypotheses.iter();
         while grown < GROWN {
             // What one of them explains of the next is thrown away: the others do not depend on how many grow at once.
-            let (some, after) =
-                self.worth_growing(left, findings, log.threshold, rayon::current_num_threads().min(GROWN - grown));
+            let at_once = rayon::current_num_threads().min(GROWN - grown);
+            let worth = |seed: &&Hypothesis| self.is_worth_growing(seed, findings);
+            let some: Vec<&Hypothesis> = left.by_ref().filter(worth).take(at_once).collect();
             if some.is_empty() {
                 break;
             }
-            left = after;
-            let new: Vec<Finding> = some
-                .par_iter()
-                .map(|seed| Finding::new(grow(self.query, self.map, seed, &self.model), **seed))
-                .collect();
-            for finding in new {
-                if !self.worth_growing(&[finding.seed], findings, log.threshold, 1).0.is_empty() {
+            let grow = |seed: &&Hypothesis| Finding::new(grow(self.query, self.map, seed, &self.model), **seed);
+            for finding in some.par_iter().map(grow).collect::<Vec<_>>() {
+                if self.is_worth_growing(&finding.seed, findings) {
                     grown += 1;
-                    findings.push(finding);
+                    findings.accepted.push(finding);
                 }
             }
         }
-        log.grown += grown as u32;
+        findings.log.grown += grown;
     }
 
-    /// The first `most` hypotheses that no finding explains yet, and those after them; none where they are too weak to be rivals.
-    fn worth_growing<'h>(
-        &self,
-        hypotheses: &'h [Hypothesis],
-        findings: &[Finding],
-        threshold: f64,
-        most: usize,
-    ) -> (Vec<&'h Hypothesis>, &'h [Hypothesis]) {
-        let accepted = findings.iter().filter(|finding| finding.overlap.log_odds > threshold);
-        let least = RIVAL_SEED * accepted.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
-        let mut some: Vec<&Hypothesis> = Vec::new();
-        for (at, seed) in hypotheses.iter().enumerate() {
-            // Hypotheses come with most evidence first.
-            if some.len() == most || seed.log_odds < least {
-                return (some, &hypotheses[at..]);
-            }
-            if !findings.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose)) {
-                some.push(seed);
-            }
-        }
-        (some, &[])
+    /// Whether no finding explains a hypothesis, and it is strong enough to be a rival.
+    fn is_worth_growing(&self, seed: &Hypothesis, Findings { accepted, log, .. }: &Findings) -> bool {
+        let enough = accepted.iter().filter(|finding| finding.overlap.log_odds > log.threshold);
+        let best = enough.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
+        seed.log_odds >= RIVAL_SEED * best
+            && !accepted.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose))
     }
 
     /// Asks the offsets of all fruits, where too few are in common for any seed.
     ///
     /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
     /// much more the other poses of this search show: the answer must stand out of them.
-    fn lay_along(&self, findings: &mut Findings<'a>, log: &mut Log) {
+    fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
         let hypotheses = offsets::hypotheses(self.query, self.map, &self.model, &|pose| self.admits(pose));
         log.refined += hypotheses.len();
         if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
@@ -320,12 +302,12 @@ impl<'a> Search<'a> {
             Finding::new(lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few }), *seed)
         };
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
-        log.grown += laid.len() as u32;
-        laid.retain(|finding| self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding));
+        log.grown += laid.len();
+        laid.retain(|finding| self.is_pose(finding));
         let answer = self.single_out(&mut laid, f64::NEG_INFINITY, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
-            findings.accepted.push(answer);
-            findings.others.extend(laid);
+            accepted.push(answer);
+            others.extend(laid);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
-use super::case::{Finding, Log, Search};
+use super::case::{Finding, Findings, Search};
 use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
 use super::hypothesis::{Hypothesis, Model, Refiner};
@@ -38,16 +38,10 @@ const POLISH_TURNS: [f64; 2] = [-0.13, 0.13];
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
     /// the true one may have more of the best.
-    pub(super) fn look_for_rivals(&self, rest: &[Contender], findings: &mut Vec<Finding<'a>>, log: &mut Log) {
-        let others: Vec<Contender> = rest
-            .iter()
-            .filter(|candidate| {
-                !findings.iter().any(|finding| self.explains(finding, &candidate.place, &candidate.pose))
-            })
-            .take(RIVAL_CANDIDATES)
-            .copied()
-            .collect();
-        self.grow_distinct(&self.refined(&others), findings, log);
+    pub(super) fn look_for_rivals(&self, rest: &[Contender], findings: &mut Findings<'a>) {
+        let new = |one: &&Contender| !findings.accepted.iter().any(|found| self.explains(found, &one.place, &one.pose));
+        let others: Vec<Contender> = rest.iter().filter(new).take(RIVAL_CANDIDATES).copied().collect();
+        self.grow_distinct(&self.refined(&others), findings);
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.

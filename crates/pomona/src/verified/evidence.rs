@@ -12,9 +12,8 @@
 //! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
 //! when it grew, below zero where nothing was selected.
 
-use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
+use super::beliefs::Beliefs;
 use super::hypothesis::{DETECTION, SHARES, TURNS};
-use super::landscape::Landscape;
 use super::pairing::{Laid, Meeting};
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
@@ -35,9 +34,12 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..TURNS {
-        let edge = |meeting: &Meeting| edge(map, meeting, share, there[meeting.map as usize]);
-        let edges: Vec<Edge> = met.iter().filter_map(edge).collect();
-        let beliefs = Beliefs::new(&edges, laid.query.len(), map.len());
+        let edge = |meeting: &Meeting| {
+            let (seen, there) = (share * meeting.support, there[meeting.map as usize]);
+            let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
+            meeting.edge(seen * meeting.density / strangers)
+        };
+        let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
         let alone: f64 = here.iter().chain(there).map(|support| (1.0 - share * support).ln()).sum();
         evidence = beliefs.log_sum + alone + share * due[0];
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
@@ -63,13 +65,6 @@ pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
 fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
     let (here, missed) = (here.max(1.0), (there - found).max(0.0));
     ((missed * missed + 4.0 * here * found).sqrt() - missed) / (2.0 * here)
-}
-
-fn edge(map: &Landscape, meeting: &Meeting, share: f64, back: f64) -> Option<Edge> {
-    let seen = share * meeting.support;
-    let strangers = map.density[meeting.map as usize];
-    let ratio = seen * meeting.density / (strangers * (1.0 - seen) * (1.0 - share * back));
-    (ratio > LEAST_RATIO).then_some(Edge { query: meeting.query, map: meeting.map, ratio, distance: meeting.distance })
 }
 
 #[cfg(test)]

@@ -6,18 +6,16 @@
 //! that leaves a doubt is none: the other poses that would rule it out were not looked for.
 
 use super::acceptance::VerifiedConfig;
-use super::case::{Search, Stages, VerifiedMap};
+use super::case::{Search, VerifiedMap};
 use super::contender::{Contender, by_evidence, distinct};
-use super::decision::{MIN_FRUITS, SURE, answer_of};
+use super::decision::{MIN_FRUITS, SURE};
 use super::nearest::single;
 use super::placement::Placement;
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
 use super::seeds::{Quad, SHORTEST, STARS, Seed, WITHIN};
-use super::size::Diameters;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
-use crate::cloud::FruitCloud;
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 use nalgebra::Vector3;
@@ -26,28 +24,26 @@ use nalgebra::Vector3;
 const FRUITS: usize = 128;
 const REFINED: usize = 32;
 
-/// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt. Both are there without seeds, each
-/// with its cloud, the query first.
+/// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt. Both are there without seeds.
 pub(crate) fn search_expected(
-    [(ready, query), (prepared, map)]: [(&VerifiedMap, &FruitCloud); 2],
+    query: &VerifiedMap,
+    map: &VerifiedMap,
     map_from_query: &Similarity,
     request: &Request,
     config: &VerifiedConfig,
 ) -> Match {
-    if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS || request.scale != Scale::Metric {
-        return Match::without_answer(Verdict::NoMatch, Stages::new());
+    let search = Search::new(map, &query.landscape, request, config);
+    if search.query.len().min(search.map.len()) < MIN_FRUITS || request.scale != Scale::Metric {
+        return Match::without_answer(Verdict::NoMatch, Vec::new());
     }
-    let landscape = &ready.landscape;
-    let sizes = Diameters::new(query, map, landscape, &prepared.landscape);
-    let search = Search::new(prepared, landscape, sizes, request, config);
     let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
     let contenders = search.contenders(&expected);
-    let (findings, stages) = search.weigh(&contenders, Effort::default());
+    let findings = search.weigh(&contenders, Effort::default());
     let least = SURE * search.threshold(Vertical::share_of_turns());
     if findings.accepted.first().is_some_and(|best| best.overlap.log_odds > least) {
-        answer_of(&search, (findings, stages))
+        search.answer_of(findings)
     } else {
-        Match::without_answer(Verdict::NoMatch, stages)
+        Match::without_answer(Verdict::NoMatch, search.stages(&findings))
     }
 }
 
@@ -105,14 +101,14 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::FruitCloud;
     use crate::config::Config;
     use crate::verified::fixture::visits;
     use nalgebra::Rotation3;
 
     fn asked(query: &FruitCloud, map: &FruitCloud, expected: &Similarity) -> Match {
         let [ready, prepared] = [query, map].map(VerifiedMap::without_seeds);
-        let sides = [(&ready, query), (&prepared, map)];
-        search_expected(sides, expected, &Request::default(), &Config::default().verified)
+        search_expected(&ready, &prepared, expected, &Request::default(), &Config::default().verified)
     }
 
     #[test]
@@ -121,7 +117,7 @@ mod tests {
         let request = Request::default();
         let config = Config::default();
         let prepared = VerifiedMap::new(&map, Scale::Metric);
-        let searched = super::super::search(&prepared, &map, &query, &request, &config.verified);
+        let searched = super::super::search(&prepared, &query, &request, &config.verified);
         let [first, second] = [0.0, 0.02].map(|off: f64| {
             let turn = Rotation3::new(Vector3::new(off, -off, off));
             asked(&query, &map, &Similarity::rigid(turn, Vector3::new(off, 3.0 * off, -off)))

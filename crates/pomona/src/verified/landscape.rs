@@ -29,6 +29,8 @@ pub(crate) struct Landscape {
     pub(crate) points: Vec<Vector3<f64>>,
     /// Covariance of each point, square metres, where the cloud has them.
     pub(crate) covariances: Option<Vec<Matrix3<f64>>>,
+    /// Logarithm of each diameter, NaN where it is unknown, where the cloud has any.
+    pub(super) log_diameters: Option<Vec<f64>>,
     neighbours: Neighbours,
     /// Typical distance to the sixth-nearest fruit: the unit of length of the cloud, metres.
     pub(crate) spacing: f64,
@@ -89,11 +91,14 @@ impl Landscape {
             },
         );
         let covariances = cloud.covariances.as_ref().map(|all| rows.iter().map(|&row| all[row as usize]).collect());
+        let log_diameter = |all: &Vec<f64>| rows.iter().map(|&row| all[row as usize].ln()).collect();
+        let log_diameters = cloud.diameters_m.as_ref().map(log_diameter);
         Self {
             centre,
             rows,
             points,
             covariances,
+            log_diameters,
             neighbours,
             spacing,
             density,

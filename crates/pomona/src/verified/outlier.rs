@@ -5,7 +5,7 @@
 //! tell: the threshold does not know what rows on rows meet.
 
 use super::acceptance::outlying;
-use super::case::{Finding, Log, Search};
+use super::case::{Finding, Log, Search, best_first};
 
 /// Evidence, in nats, that chance is taken to reach in any search: the best wrong poses of small frames have 15 in the median,
 /// and below this they are not yet in the tail.
@@ -21,7 +21,7 @@ const KEPT: f64 = 0.9;
 impl<'a> Search<'a> {
     /// Takes the best pose out of those that were not accepted, where it stands out of the others and has the `least` evidence.
     pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, least: f64, log: &mut Log) -> Option<Finding<'a>> {
-        others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+        best_first(others);
         let distinct = self.distinct(others);
         distinct.first().filter(|&&best| self.admits(&others[best].overlap.pose))?;
         let rate = self.config.false_alarm_rate;

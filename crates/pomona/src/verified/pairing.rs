@@ -1,9 +1,10 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::beliefs::{Beliefs, Edge, LEAST_RATIO};
+use super::beliefs::{Beliefs, Edge};
 use super::landscape::Landscape;
 use super::nearest::SHARE_OF_ROWS;
 use super::placement::{Landing, Placement};
+use crate::answer::Pair;
 use crate::assignment::assign;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -18,83 +19,44 @@ const GATE: f64 = 5.0;
 const LOOSE: f64 = 0.01;
 const LOOSE_WIDTH: f64 = 3.0;
 
-/// One fruit of the query found again, rows of the centred clouds.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Pairing {
-    pub(crate) query: u32,
-    pub(crate) map: u32,
-    pub(crate) probability: f64,
-    pub(crate) distance: f64,
-    /// Log-odds of this pair against "new fruit", nats.
-    pub(crate) gain: f64,
-}
+/// Pairs less likely than this against both being alone are left out.
+const LEAST_RATIO: f64 = 1e-3;
 
-/// Probabilities of all edges of an overlap.
-#[derive(Debug, Clone)]
-pub(crate) struct Marginals {
-    edges: Vec<Edge>,
-    probabilities: Vec<f64>,
-}
-
-/// What an edge says to the fit.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Link {
-    pub(crate) query: u32,
-    pub(crate) map: u32,
-    pub(crate) probability: f64,
-}
-
-impl Marginals {
-    /// Joint likelihood of a set of pairs: a fruit of the map is seen again with probability p, an unmatched fruit of
-    /// the query is new with the density of new fruits at its place. Every pair thus weighs
-    /// `p / (1 - p) N(d) / new density` against leaving both alone. Marginals by belief propagation (Williams and Lau
-    /// 2014).
-    pub(crate) fn new(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
-        let edges = edges_of(laid, share, size);
-        let Beliefs { probabilities, .. } = Beliefs::new(&edges, laid.query.len(), laid.map.len());
-        Self { edges, probabilities }
+impl Beliefs {
+    /// Beliefs about an overlap where a fruit of the map is seen again with the probability `share`, `size` the likelihood ratio of two
+    /// diameters.
+    ///
+    /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
+    /// `p / (1 - p) N(d) / new density` against leaving both alone.
+    pub(super) fn of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
+        let Laid { query, map, .. } = *laid;
+        let edge = |meeting: &Meeting| {
+            let Meeting { query: row, map: partner, distance, density, support } = *meeting;
+            let seen = share * support;
+            let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
+            let new = (1.0 - seen) * (laid.companions(distance) * crowding).max(map.floor);
+            meeting.edge(seen / (1.0 - seen) * density / new * size(row, partner))
+        };
+        Self::new(laid.meetings(edge), query.len(), map.len())
     }
 
-    pub(crate) fn links(&self) -> impl Iterator<Item = Link> {
-        self.edges.iter().zip(&self.probabilities).map(|(edge, &probability)| Link {
-            query: edge.query,
-            map: edge.map,
+    /// The one-to-one pairs that gain most expected right answers, in rows of the landscapes.
+    pub(super) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Pair> {
+        let gain = |(edge, p): (&Edge, f64)| (edge.query as usize, edge.map as usize, p - min_probability);
+        let partners = assign(n_query, n_map, &self.links().map(gain).collect::<Vec<_>>());
+        let pair = |(edge, probability): (&Edge, f64)| Pair {
+            query: edge.query as usize,
+            map: edge.map as usize,
             probability,
-        })
-    }
-
-    /// The one-to-one pairs that gain most expected right answers.
-    pub(crate) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Pairing> {
-        let both = || self.edges.iter().zip(&self.probabilities);
-        let gains: Vec<(usize, usize, f64)> =
-            both().map(|(edge, &p)| (edge.query as usize, edge.map as usize, p - min_probability)).collect();
-        let partners = assign(n_query, n_map, &gains);
-        let mut pairs: Vec<Pairing> = both()
-            .filter(|(edge, _)| partners[edge.query as usize] == Some(edge.map as usize))
-            .map(|(edge, &probability)| Pairing {
-                query: edge.query,
-                map: edge.map,
-                probability,
-                distance: edge.distance,
-                gain: edge.ratio.ln(),
-            })
-            .collect();
+            distance_m: edge.distance,
+            support: edge.ratio.ln(),
+        };
+        let is_best = |pair: &Pair| partners[pair.query] == Some(pair.map);
+        let mut pairs: Vec<Pair> = self.links().map(pair).filter(is_best).collect();
         pairs.sort_unstable_by_key(|pair| (pair.query, pair.map));
         pairs.dedup_by_key(|pair| (pair.query, pair.map));
         pairs
     }
-}
-
-fn edges_of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
-    let Laid { query, map, .. } = *laid;
-    laid.meetings(|meeting| {
-        let Meeting { query: row, map: partner, distance, density, support } = *meeting;
-        let seen = share * support;
-        let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
-        let new = (1.0 - seen) * (laid.companions(distance) * crowding).max(map.floor);
-        let ratio = seen / (1.0 - seen) * density / new * size(row, partner);
-        (ratio > LEAST_RATIO).then_some(Edge { query: row, map: partner, ratio, distance })
-    })
 }
 
 /// A fruit of the map near the place where one of the query is expected.
@@ -107,6 +69,14 @@ pub(super) struct Meeting {
     pub(super) density: f64,
     /// How surely the map's visit would have shown a fruit there.
     pub(super) support: f64,
+}
+
+impl Meeting {
+    /// The pair with its likelihood ratio, where that is worth being looked at.
+    pub(super) fn edge(&self, ratio: f64) -> Option<Edge> {
+        let Self { query, map, distance, .. } = *self;
+        (ratio > LEAST_RATIO).then_some(Edge { query, map, ratio, distance })
+    }
 }
 
 /// The query laid on the map, each of its fruits where it is expected.

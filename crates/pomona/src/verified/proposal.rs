@@ -66,6 +66,13 @@ impl Add for Effort {
     }
 }
 
+impl Effort {
+    /// Share of the wrong poses that a known vertical leaves.
+    pub(super) fn share_left(&self) -> f64 {
+        self.stands.share_left()
+    }
+}
+
 /// A seed of the query with all that its candidates have in common.
 pub(crate) struct Proposer<'a, M> {
     query: &'a Landscape,

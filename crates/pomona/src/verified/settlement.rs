@@ -10,16 +10,17 @@
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
+use super::beliefs::Beliefs;
 use super::cut::{Cell, surroundings};
 use super::evidence::evidence;
 use super::footing::Footing;
 use super::growth::{Growth, HOLD};
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::overlap::Overlap;
-use super::pairing::{Laid, Marginals};
+use super::pairing::Laid;
 use super::patches::{Patchwork, next_to};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, scatter};
-use super::size::{Cue, Diameters};
+use super::size::Cue;
 use nalgebra::Vector3;
 
 /// A prediction loses at most this share of its fit when its own partner is left out.
@@ -29,7 +30,7 @@ const MAX_LEVERAGE: f64 = 0.8;
 pub(crate) struct Settled {
     pub(crate) overlap: Overlap,
     /// Pairs by their probabilities.
-    pub(crate) marginals: Marginals,
+    pub(crate) beliefs: Beliefs,
     /// What speaks for the pose when every fruit is predicted without its own partner, nats ([`super::evidence`]).
     pub(crate) evidence: f64,
 }
@@ -44,23 +45,23 @@ struct Settlement<'a> {
 }
 
 /// Settles what `growth` found; `noise_m` is the relative noise where it is known.
-pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>, sizes: Option<&Diameters>) -> Settled {
+pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>) -> Settled {
     let expected = match noise_m {
         Some(sigma) => KnownNoise { sigma, width: GIVEN },
         None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
         None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
     };
     let mut settlement = Settlement { patches: growth.patches.clone(), expected, share: DETECTION, holds: [HOLD; 2] };
-    let mut marginals = settlement.paired(None);
+    let mut beliefs = settlement.paired(None);
     for _ in 0..TURNS {
-        let cue = sizes.and_then(|sizes| sizes.cue(marginals.links()));
-        settlement.recount(&marginals);
-        settlement.refit(&marginals);
-        marginals = settlement.paired(cue.as_ref());
+        let cue = Cue::new([growth.patches.query, growth.patches.map], beliefs.links());
+        settlement.recount(&beliefs);
+        settlement.refit(&beliefs);
+        beliefs = settlement.paired(cue.as_ref());
     }
     let evidence = settlement.evidence();
     let Patchwork { pose, sigma, predictions, .. } = settlement.patches;
-    Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, marginals, evidence }
+    Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence }
 }
 
 impl Settlement<'_> {
@@ -109,18 +110,18 @@ impl Settlement<'_> {
     ///
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
-    fn recount(&mut self, marginals: &Marginals) {
+    fn recount(&mut self, beliefs: &Beliefs) {
         let due: f64 = self.patches.predictions.iter().flatten().map(|at| self.patches.map.support(&at.place)).sum();
-        let found: f64 = marginals.links().map(|link| link.probability).sum();
+        let found: f64 = beliefs.probabilities.iter().sum();
         self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
     }
 
     /// Predictions, noise and pairs under the poses as they are fitted now.
-    fn paired(&mut self, cue: Option<&Cue>) -> Marginals {
+    fn paired(&mut self, cue: Option<&Cue>) -> Beliefs {
         self.predict();
         self.measure();
         let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
-        Marginals::new(&self.laid(), self.share, &size)
+        Beliefs::of(&self.laid(), self.share, &size)
     }
 
     /// What the overlap says for the pose, nats.
@@ -130,8 +131,8 @@ impl Settlement<'_> {
     }
 
     /// Common pose, surroundings and patches from the mean partners.
-    fn refit(&mut self, marginals: &Marginals) {
-        self.follow(marginals);
+    fn refit(&mut self, beliefs: &Beliefs) {
+        self.follow(beliefs);
         self.patches.fit_as_one();
         self.patches.stiffen();
         self.holds = self.patches.bend(Patchwork::firmness);
@@ -140,12 +141,12 @@ impl Settlement<'_> {
     }
 
     /// Mean partners by the probabilities.
-    fn follow(&mut self, marginals: &Marginals) {
+    fn follow(&mut self, beliefs: &Beliefs) {
         let mut sums = vec![(Vector3::zeros(), 0.0); self.patches.query.len()];
-        for link in marginals.links() {
-            let sum = &mut sums[link.query as usize];
-            sum.0 += self.patches.map.points[link.map as usize] * link.probability;
-            sum.1 += link.probability;
+        for (edge, probability) in beliefs.links() {
+            let sum = &mut sums[edge.query as usize];
+            sum.0 += self.patches.map.points[edge.map as usize] * probability;
+            sum.1 += probability;
         }
         let mean = |(sum, weight): (Vector3<f64>, f64)| (weight > 0.0).then(|| (sum / weight, weight));
         self.patches.targets = sums.into_iter().map(mean).collect();

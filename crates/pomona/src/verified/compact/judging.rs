@@ -12,13 +12,12 @@ use crate::matching::Request;
 use crate::verified::acceptance::VerifiedConfig;
 use crate::verified::case::{Search, VerifiedMap, model_of};
 use crate::verified::contender::{Contender, by_evidence, distinct};
-use crate::verified::decision::{self, MIN_FRUITS, answer_of};
+use crate::verified::decision::{self, MIN_FRUITS};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::placement::Placement;
 use crate::verified::proposal::Effort;
 use crate::verified::search::REACH;
-use crate::verified::size::Diameters;
 use nalgebra::Vector3;
 
 /// Rounds of the search: what the looks of each may cost, in candidates, and contenders that are looked at more closely after
@@ -71,13 +70,12 @@ pub(crate) fn search(
     config: &VerifiedConfig,
 ) -> Match {
     if query.len() < MIN_FRUITS || map.len() < MIN_FRUITS {
-        return Match::without_answer(Verdict::TooFew, vec![("fruits_needed", MIN_FRUITS as f64)]);
+        return Match::too_few();
     }
     let landscape = Landscape::new(query);
     let case = Case {
         index,
         map,
-        query,
         landscape: &landscape,
         ground: Ground::new(index),
         model: model_of(index.facts.spacing, Scale::Metric, request),
@@ -100,14 +98,13 @@ pub(crate) fn pairs_under(
     let rows = Ground::new(index).around(places, MARGIN);
     let part = cut(map, &rows);
     let prepared = VerifiedMap::part(&part, index.facts.spacing, map.len());
-    in_map(decision::pairs_under(&prepared, &part, query, map_from_query, request, config), &rows)
+    in_map(decision::pairs_under(&prepared, query, map_from_query, request, config), &rows)
 }
 
 /// One query against one large map.
 struct Case<'a> {
     index: &'a CompactMap,
     map: &'a FruitCloud,
-    query: &'a FruitCloud,
     landscape: &'a Landscape,
     ground: Ground<'a>,
     model: Model,
@@ -176,10 +173,9 @@ impl Case<'_> {
         let rows = self.rows_around(contenders);
         let part = cut(self.map, &rows);
         let prepared = VerifiedMap::part(&part, self.index.facts.spacing, self.map.len());
-        let sizes = Diameters::new(self.query, &part, self.landscape, &prepared.landscape);
-        let search = Search::new(&prepared, self.landscape, sizes, self.request, self.config);
+        let search = Search::new(&prepared, self.landscape, self.request, self.config);
         let moved: Vec<Contender> = contenders.iter().map(|one| one.moved(-prepared.landscape.centre)).collect();
-        in_map(answer_of(&search, search.weigh(&moved, effort)), &rows)
+        in_map(search.answer_of(search.weigh(&moved, effort)), &rows)
     }
 
     /// The fruits of the map where the contenders put the query.
