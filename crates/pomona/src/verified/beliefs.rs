@@ -101,7 +101,7 @@ mod tests {
     }
 
     fn assert_close(edges: &[Edge], within: f64) {
-        let (found, (marginals, sum)) = (Beliefs::new(edges, 2, 2), exact(edges));
+        let (found, (marginals, sum)) = (Beliefs::new(edges.to_vec(), 2, 2), exact(edges));
         for (found, truth) in found.probabilities.iter().zip(marginals) {
             assert!((found - truth).abs() < within, "{found} {truth}");
         }

@@ -20,28 +20,28 @@ pub(super) fn by_evidence(a: &Contender, b: &Contender) -> std::cmp::Ordering {
     b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key))
 }
 
-/// Takes the best `keep` candidates out of those given best first, one of each pose.
-pub(super) fn distinct(
-    query: &Landscape,
-    map_spacing: f64,
-    candidates: &mut Vec<Contender>,
-    keep: usize,
-) -> Vec<Contender> {
+/// The best `keep` candidates of those given best first, one of each pose.
+pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Contender], keep: usize) -> Vec<Contender> {
     let (near, same) = (query.spacing, SAME_PLACE * map_spacing);
-    let mut kept: Vec<Contender> = Vec::new();
-    candidates.retain(|candidate| {
+    first_of_each(candidates.iter().copied(), keep, |candidate, other| {
         let place = candidate.place;
-        let proposed = |other: &Contender| {
-            (place - other.place).norm() < near
-                && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
-                && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
-        };
-        let new = kept.len() < keep && !kept.iter().any(proposed);
-        if new {
-            kept.push(*candidate);
+        (place - other.place).norm() < near
+            && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
+            && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
+    })
+}
+
+/// The first `most` of those that are not the `same` as one before.
+pub(super) fn first_of_each<T>(some: impl Iterator<Item = T>, most: usize, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
+    for one in some {
+        if kept.len() == most {
+            break;
         }
-        !new
-    });
+        if !kept.iter().any(|other| same(&one, other)) {
+            kept.push(one);
+        }
+    }
     kept
 }
 

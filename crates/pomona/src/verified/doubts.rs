@@ -3,13 +3,12 @@
 use super::case::{Finding, Findings, Search};
 use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
-use super::hypothesis::{Hypothesis, Model, Refiner};
+use super::hypothesis::{Hypothesis, Model, STEPS, refined};
 use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::{Landing, Moments, Placement};
 use super::search::REACH;
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -117,13 +116,10 @@ impl<'a> Search<'a> {
     pub(super) fn polish(&self, finding: &mut Finding<'a>) {
         let Overlap { pose, middle, sigma, .. } = finding.overlap;
         let model = Model { sigma, ..self.model };
-        let starts: Vec<Placement> = std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS)).collect();
+        let turned = std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS));
+        let starts: Vec<_> = turned.map(|start| (start, middle)).collect();
         let reach = REACH * self.query.spacing;
-        let refiner = || Refiner::new(self.query, self.map, &model);
-        let refined = |refiner: &mut Refiner, start: &Placement| refiner.refine(start, &middle, reach);
-        let refined: Vec<_> = starts.par_iter().map_init(refiner, refined).flatten_iter().collect();
-        let best = refined.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
-        let Some(seed) = best else { return };
+        let Some(&seed) = refined([self.query, self.map], &model, STEPS, reach, &starts).first() else { return };
         let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
         if better.overlap.log_odds > finding.overlap.log_odds && self.admits(&better.overlap.pose) {
             *finding = better;

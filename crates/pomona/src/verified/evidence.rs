@@ -71,6 +71,7 @@ fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::verified::fixture::visits;
+    use crate::verified::landscape::Landscape;
     use crate::verified::placement::{Landing, Placement};
     use nalgebra::Vector3;
 

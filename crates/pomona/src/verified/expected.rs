@@ -56,7 +56,7 @@ impl Search<'_> {
             self.lay(seed, expected, &mut found);
         }
         found.sort_unstable_by(by_evidence);
-        distinct(self.query, self.map.spacing, &mut found, REFINED)
+        distinct(self.query, self.map.spacing, &found, REFINED)
     }
 
     fn lay(&self, &(quad, code): &Seed, expected: &Placement, found: &mut Vec<Contender>) {

@@ -7,6 +7,7 @@ use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
 pub(super) const DETECTION: f64 = 0.55;
@@ -113,9 +114,26 @@ pub(crate) struct Hypothesis {
     pub(crate) sigma: f64,
 }
 
+/// Improves poses, each on the fruits within `reach` of a place, in so many steps of pairing, of which the last only weighs; most
+/// evidence first. Poses that no pairs fix are left out.
+pub(super) fn refined(
+    [query, map]: [&Landscape; 2],
+    model: &Model,
+    steps: usize,
+    reach: f64,
+    starts: &[(Placement, Vector3<f64>)],
+) -> Vec<Hypothesis> {
+    let refiner = || Refiner::new(query, map, model);
+    let from =
+        |refiner: &mut Refiner, (start, place): &(Placement, Vector3<f64>)| refiner.refine(steps, start, place, reach);
+    let mut found: Vec<Hypothesis> = starts.par_iter().map_init(refiner, from).flatten_iter().collect();
+    found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+    found
+}
+
 /// Improves poses on the fruits around a place, its buffers reused from pose to pose.
 #[derive(Debug)]
-pub(crate) struct Refiner<'a> {
+struct Refiner<'a> {
     query: &'a Landscape,
     map: &'a Landscape,
     model: Model,
@@ -139,24 +157,13 @@ pub(super) const STEPS: usize = 6;
 pub(super) const TURNS: usize = 4;
 
 impl<'a> Refiner<'a> {
-    pub(crate) fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
+    fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
         let owner = vec![(0, 0); map.len()];
         Self { query, map, model: *model, region: Vec::new(), partners: Vec::new(), owner, stamp: 0 }
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
-    pub(crate) fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
-        self.refine_in(STEPS, start, place, reach)
-    }
-
-    /// The same in fewer steps of pairing, of which the last only weighs.
-    pub(super) fn refine_in(
-        &mut self,
-        steps: usize,
-        start: &Placement,
-        place: &Vector3<f64>,
-        reach: f64,
-    ) -> Option<Hypothesis> {
+    fn refine(&mut self, steps: usize, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
         self.region.clear();
         self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
         self.region.sort_unstable();

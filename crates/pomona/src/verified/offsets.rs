@@ -6,14 +6,14 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
+use super::contender::first_of_each;
+use super::hypothesis::{Hypothesis, Model, STEPS, refined};
 use super::landscape::Landscape;
 use super::outlier::COMPARED;
 use super::placement::Placement;
 use super::votes::{Rows, STEP_RAD};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
@@ -49,13 +49,10 @@ pub(super) fn hypotheses(
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
     let wide = Model { sigma: WIDE * model.sigma, ..model };
-    let refined = |poses: &[Placement], model: &Model, steps: usize| -> Vec<Hypothesis> {
-        let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-        let refiner = || Refiner::new(query, map, model);
-        let from = |refiner: &mut Refiner, pose: &Placement| refiner.refine_in(steps, pose, &Vector3::zeros(), reach);
-        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(refiner, from).flatten_iter().collect();
-        found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-        found
+    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+    let refined = |poses: &[Placement], model: &Model, steps: usize| {
+        let starts: Vec<_> = poses.iter().map(|&pose| (pose, Vector3::zeros())).collect();
+        refined([query, map], model, steps, reach, &starts)
     };
     let mut peaks = rows.peaks(admits);
     peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
@@ -78,19 +75,10 @@ pub(super) fn hypotheses(
 
 /// The first poses, one of those that are the same.
 fn distinct(poses: impl Iterator<Item = Placement>, most: usize, spacing: f64) -> Vec<Placement> {
-    let mut kept: Vec<Placement> = Vec::new();
-    for pose in poses {
-        let same = |other: &Placement| {
-            (other.translation - pose.translation).norm() < SAME * spacing && other.turn_to(&pose) < SAME_TURN_RAD
-        };
-        if !kept.iter().any(same) {
-            kept.push(pose);
-        }
-        if kept.len() == most {
-            break;
-        }
-    }
-    kept
+    let same = |one: &Placement, other: &Placement| {
+        (one.translation - other.translation).norm() < SAME * spacing && one.turn_to(other) < SAME_TURN_RAD
+    };
+    first_of_each(poses, most, same)
 }
 
 #[cfg(test)]

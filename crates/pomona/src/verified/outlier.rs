@@ -6,6 +6,7 @@
 
 use super::acceptance::outlying;
 use super::case::{Finding, Log, Search, best_first};
+use super::contender::first_of_each;
 
 /// Evidence, in nats, that chance is taken to reach in any search: the best wrong poses of small frames have 15 in the median,
 /// and below this they are not yet in the tail.
@@ -46,13 +47,8 @@ impl<'a> Search<'a> {
 
     /// Those of `findings`, most evidence first, that lie apart from all before them.
     fn distinct(&self, findings: &[Finding]) -> Vec<usize> {
-        let mut kept: Vec<usize> = Vec::new();
-        for (at, finding) in findings.iter().enumerate() {
-            if kept.iter().all(|&better| self.apart(&findings[better].overlap, &finding.overlap)) {
-                kept.push(at);
-            }
-        }
-        kept
+        let same = |&at: &usize, &better: &usize| !self.apart(&findings[better].overlap, &findings[at].overlap);
+        first_of_each(0..findings.len(), findings.len(), same)
     }
 }
 

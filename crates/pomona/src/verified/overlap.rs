@@ -38,31 +38,25 @@ impl Growth<'_> {
     /// fruits seen again that suits it best.
     fn log_odds(&self) -> f64 {
         let (map, partners) = (self.patches.map, &self.partners);
-        // Of each partner, by how much it is likelier than a stranger; of each fruit without, how surely one would be seen.
-        let (mut ratios, mut alone, mut due) = (Vec::new(), Vec::new(), 0.0);
+        // A fruit of the query that meets its partner has 1 + p x, x by how much that is likelier than a stranger; one that is alone
+        // 1 - p u, u how surely it would be seen: -u is its x.
+        let (mut terms, mut due) = (Vec::new(), 0.0);
         for (at, partner) in self.patches.predictions.iter().zip(partners) {
             let Some(at) = at else { continue };
             let support = map.support(&at.place);
             due += support;
-            match partner {
-                Some(partner) => {
-                    let d2 = (map.points[*partner as usize] - at.place).norm_squared();
-                    ratios.push(gaussian(d2, at.variance) / map.density[*partner as usize]);
-                }
-                None => alone.push(support),
-            }
+            terms.push(partner.map_or(-support, |partner| {
+                let d2 = (map.points[partner as usize] - at.place).norm_squared();
+                gaussian(d2, at.variance) / map.density[partner as usize] - 1.0
+            }));
         }
         let mut found = vec![false; map.len()];
         partners.iter().flatten().for_each(|&partner| found[partner as usize] = true);
         let missed = (0..map.len()).filter(|&row| !found[row]).map(|row| self.patches.looked_at(row));
-        alone.extend(missed.filter(|support| *support > 0.0));
+        terms.extend(missed.filter(|support| *support > 0.0).map(|support| -support));
         // The evidence is concave in the share.
-        let slope = |share: f64| {
-            let of_pairs: f64 = ratios.iter().map(|ratio| (ratio - 1.0) / (1.0 - share + share * ratio)).sum();
-            of_pairs - alone.iter().map(|support| support / (1.0 - share * support)).sum::<f64>() + due
-        };
+        let slope = |share: f64| due + terms.iter().map(|x| x / (1.0 + share * x)).sum::<f64>();
         let share = likeliest_share(slope);
-        let of_pairs: f64 = ratios.iter().map(|ratio| (1.0 - share + share * ratio).ln()).sum();
-        of_pairs + alone.iter().map(|support| (1.0 - share * support).ln()).sum::<f64>() + share * due
+        share * due + terms.iter().map(|x| (share * x).ln_1p()).sum::<f64>()
     }
 }

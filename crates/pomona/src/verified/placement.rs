@@ -88,7 +88,7 @@ pub(crate) struct Landing {
 pub(super) const FIXING: f64 = 3.5;
 
 /// Sums of weighted pairs, enough for one least-squares step from a current pose.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Moments {
     pub(crate) weight: f64,
     query: Vector3<f64>,
@@ -97,18 +97,6 @@ pub(crate) struct Moments {
     cross: Matrix3<f64>,
     /// Sum of w q q^T.
     square: Matrix3<f64>,
-}
-
-impl Default for Moments {
-    fn default() -> Self {
-        Self {
-            weight: 0.0,
-            query: Vector3::zeros(),
-            map: Vector3::zeros(),
-            cross: Matrix3::zeros(),
-            square: Matrix3::zeros(),
-        }
-    }
 }
 
 impl Moments {

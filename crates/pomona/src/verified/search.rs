@@ -2,7 +2,7 @@
 
 use super::case::Search;
 use super::contender::{Contender, by_evidence, distinct};
-use super::hypothesis::{Hypothesis, Refiner};
+use super::hypothesis::{Hypothesis, STEPS, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
 use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, shuffled, without_scale};
@@ -32,7 +32,8 @@ impl Search<'_> {
         let effort = of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
         let mut candidates: Vec<Contender> = of_each.into_iter().flat_map(|(found, _)| found).collect();
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &mut candidates, keep);
+        let best = distinct(self.query, self.map.spacing, &candidates, keep);
+        candidates.retain(|one| best.iter().all(|other| other.key != one.key));
         (self.refined(&best), candidates, effort)
     }
 
@@ -77,12 +78,8 @@ impl Search<'_> {
 
     /// Candidates refined around their places, most evidence first.
     pub(super) fn refined(&self, candidates: &[Contender]) -> Vec<Hypothesis> {
-        let reach = REACH * self.query.spacing;
-        let refiner = || Refiner::new(self.query, self.map, &self.model);
-        let refined = |refiner: &mut Refiner, one: &Contender| refiner.refine(&one.pose, &one.place, reach);
-        let mut hypotheses: Vec<Hypothesis> = candidates.par_iter().map_init(refiner, refined).flatten_iter().collect();
-        hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-        hypotheses
+        let starts: Vec<_> = candidates.iter().map(|one| (one.pose, one.place)).collect();
+        refined([self.query, self.map], &self.model, STEPS, REACH * self.query.spacing, &starts)
     }
 }
 

@@ -36,26 +36,16 @@ pub(crate) type Seed = (Quad, Code);
 
 /// Labels a set: A and B farthest apart, A nearer the centroid, C farther from the line AB than D.
 pub(crate) fn canonical(points: &[Vector3<f64>], set: [u32; STARS]) -> Option<Seed> {
-    let mut longest = (0, 1);
-    let mut length2 = -1.0;
-    for i in 0..STARS {
-        for j in i + 1..STARS {
-            let d2 = (points[set[i] as usize] - points[set[j] as usize]).norm_squared();
-            if d2 > length2 {
-                length2 = d2;
-                longest = (i, j);
-            }
-        }
-    }
-    let rest = others(longest);
-    let labelled = oriented(points, [set[longest.0], set[longest.1], set[rest.0], set[rest.1]]);
+    let length2 = |&[a, b, ..]: &Quad| (points[a as usize] - points[b as usize]).norm_squared();
+    // Of lengths that are the same the first.
+    let longest = with_ends(set).reduce(|best, next| if length2(&next) > length2(&best) { next } else { best })?;
+    let labelled = oriented(points, longest);
     code(points, labelled).map(|code| (labelled, code))
 }
 
-/// The two indices of 0..4 that are not in `pair`.
-fn others(pair: (usize, usize)) -> (usize, usize) {
-    let mut rest = (0..STARS).filter(|&i| i != pair.0 && i != pair.1);
-    (rest.next().unwrap_or(0), rest.next().unwrap_or(0))
+/// The six ways to take two of four fruits for the ends, which come first.
+fn with_ends([a, b, c, d]: Quad) -> impl Iterator<Item = Quad> {
+    [[a, b, c, d], [a, c, b, d], [a, d, b, c], [b, c, a, d], [b, d, a, c], [c, d, a, b]].into_iter()
 }
 
 /// Swaps A with B and C with D until A is nearer the centroid and C farther from the line.
@@ -100,17 +90,10 @@ fn code(points: &[Vector3<f64>], quad: Quad) -> Option<Code> {
 
 /// Every labeling that noise of `margin` metres could have made canonical, the given one among them.
 pub(crate) fn near_ties(points: &[Vector3<f64>], quad: Quad, margin: f64, emit: &mut impl FnMut(Quad, Code)) {
-    let p = |i: usize| points[quad[i] as usize];
-    let longest = (p(1) - p(0)).norm();
-    for i in 0..STARS {
-        for j in i + 1..STARS {
-            if (p(i) - p(j)).norm() < longest - margin {
-                continue;
-            }
-            let rest = others((i, j));
-            let [a, b, c, d] = oriented(points, [quad[i], quad[j], quad[rest.0], quad[rest.1]]);
-            orientations(points, [a, b, c, d], margin, emit);
-        }
+    let length = |[a, b, ..]: Quad| (points[b as usize] - points[a as usize]).norm();
+    let longest = length(quad);
+    for ends in with_ends(quad).filter(|&ends| length(ends) >= longest - margin) {
+        orientations(points, oriented(points, ends), margin, emit);
     }
 }
 
@@ -123,27 +106,20 @@ fn orientations(points: &[Vector3<f64>], quad: Quad, margin: f64, emit: &mut imp
     let swap_ends = (along - (p(b) - p(a)).norm()).abs() < margin;
     let across = |row: u32| (p(row) - p(a)).cross(&axis).norm();
     let swap_sides = across(c) - across(d) < margin;
-    let mut emit_valid = |labelled: Quad| {
+    let swapped =
+        [(true, quad), (swap_ends, [b, a, c, d]), (swap_sides, [a, b, d, c]), (swap_ends && swap_sides, [b, a, d, c])];
+    for (_, labelled) in swapped.into_iter().filter(|(possible, _)| *possible) {
         if let Some(code) = code(points, labelled) {
             emit(labelled, code);
         }
-    };
-    emit_valid(quad);
-    if swap_ends {
-        emit_valid([b, a, c, d]);
-    }
-    if swap_sides {
-        emit_valid([a, b, d, c]);
-    }
-    if swap_ends && swap_sides {
-        emit_valid([b, a, d, c]);
     }
 }
 
 /// Divides by |AB|, so that the code no longer knows the scale.
 pub(crate) fn without_scale(code: &Code) -> Code {
     let inverse = 1.0 / code[0];
-    [0.0, code[1] * inverse, code[2] * inverse, code[3] * inverse, code[4] * inverse, code[5] * inverse]
+    let [_, c1, c2, d1, d2, d3] = code.map(|number| number * inverse);
+    [0.0, c1, c2, d1, d2, d3]
 }
 
 /// Every seed of a cloud among so many `companions` of each fruit, each set once, in a fixed order; `shortest` is the least |AB| in

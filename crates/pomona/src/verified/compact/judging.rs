@@ -148,6 +148,7 @@ impl Case<'_> {
     /// The best contenders on a closer look; they are taken out of the others.
     fn looked_at(&self, contenders: &mut Vec<Contender>, count: usize) -> Vec<Contender> {
         let best = distinct(self.landscape, self.index.facts.spacing, contenders, count);
+        contenders.retain(|one| best.iter().all(|other| other.key != one.key));
         closer(self.landscape, &self.ground, &self.model, &best)
     }
 
