@@ -15,6 +15,12 @@ pub(crate) fn cell_of(p: &Vector3<f64>, inverse_cell: f64) -> CellKey {
     [p.x, p.y, p.z].map(|x| floor(x * inverse_cell))
 }
 
+/// All cells within `reach` of one along each axis, in order.
+pub(crate) fn around([x, y, z]: CellKey, reach: i64) -> impl Iterator<Item = CellKey> {
+    let steps = move |from: i64| from.saturating_sub(reach)..=from.saturating_add(reach);
+    steps(x).flat_map(move |x| steps(y).flat_map(move |y| steps(z).map(move |z| [x, y, z])))
+}
+
 /// By truncation: not every processor has an instruction that rounds down, and a call costs more than the rest of a
 /// look.
 #[inline]

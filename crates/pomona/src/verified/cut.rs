@@ -1,7 +1,7 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
 use super::placement::{Moments, Placement};
-use crate::neighbours::cells::CellMap;
+use crate::neighbours::cells::{CellKey, CellMap, around};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -36,10 +36,7 @@ pub(super) fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
     total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
 }
 
-/// Number of the cell at each place of the grid.
-pub(super) type CellIndex = CellMap<usize>;
-
-pub(super) fn key_of(p: &Vector3<f64>, edge: f64) -> [i64; 3] {
+pub(super) fn key_of(p: &Vector3<f64>, edge: f64) -> CellKey {
     [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
 }
 
@@ -50,13 +47,14 @@ pub(crate) struct Cut {
     pub(super) cells: Vec<Cell>,
     /// Cell of each fruit.
     pub(super) cell_of: Vec<u32>,
-    pub(super) index: CellIndex,
+    /// Number of the cell at each place of the grid.
+    pub(super) index: CellMap<usize>,
 }
 
 impl Cut {
     /// Cuts the cloud into cells of `edge` metres that have fruits.
     pub(super) fn new(points: &[Vector3<f64>], edge: f64) -> Self {
-        let mut index = CellIndex::default();
+        let mut index = CellMap::default();
         let mut keys = Vec::new();
         let mut rows: Vec<Vec<u32>> = Vec::new();
         let mut cell_of = Vec::with_capacity(points.len());
@@ -74,13 +72,18 @@ impl Cut {
             rows.iter().fold(Vector3::zeros(), |sum, &row| sum + points[row as usize]) / rows.len() as f64
         };
         let centres: Vec<Vector3<f64>> = rows.iter().map(middle).collect();
+        let neighbours = |key: CellKey| around(key, 2).filter_map(|near| index.get(&near).copied());
+        let closeness = |one: usize, other: usize| {
+            let d2 = (centres[other] - centres[one]).norm_squared() / (edge * edge);
+            (-0.5 * d2).exp()
+        };
         let cells = rows
             .into_iter()
             .enumerate()
             .map(|(i, rows)| Cell {
                 centre: centres[i],
                 rows: rows.into(),
-                around: around(&index, &keys[i], &centres, &centres[i], edge),
+                around: neighbours(keys[i]).map(|other| (other as u32, closeness(i, other))).collect(),
                 moments: Moments::default(),
                 pose: Placement::identity(),
                 reached: false,
@@ -88,25 +91,4 @@ impl Cut {
             .collect();
         Self { edge, cells, cell_of, index }
     }
-}
-
-fn around(
-    index: &CellIndex,
-    key: &[i64; 3],
-    centres: &[Vector3<f64>],
-    centre: &Vector3<f64>,
-    edge: f64,
-) -> Arc<[(u32, f64)]> {
-    let mut around = Vec::new();
-    for dx in -2..=2i64 {
-        for dy in -2..=2i64 {
-            for dz in -2..=2i64 {
-                if let Some(&other) = index.get(&[key[0] + dx, key[1] + dy, key[2] + dz]) {
-                    let d2 = (centres[other] - centre).norm_squared() / (edge * edge);
-                    around.push((other as u32, (-0.5 * d2).exp()));
-                }
-            }
-        }
-    }
-    around.into()
 }

@@ -18,6 +18,7 @@ use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::matching::Request;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
@@ -80,8 +81,7 @@ pub(crate) fn pairs_under(
     }
     let pose = Placement::from_similarity(map_from_query, &query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
-    let place = query.points.first().copied().unwrap_or_default();
-    let seed = Hypothesis { pose, log_odds: f64::NAN, place, sigma };
+    let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
     search.settle(&mut finding);
     search.answer((vec![finding], &[]), 0.0, Vec::new())
@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
     pub(super) fn weigh(&self, contenders: &[Contender], effort: Effort) -> Findings<'a> {
-        let mut findings = Findings::none(effort, self.threshold(effort.share_left()));
+        let mut findings = Findings::none(effort, self.threshold(effort.stands.share_left()));
         let hypotheses = self.refined(contenders);
         findings.log.refined = hypotheses.len();
         for some in hypotheses.chunks(GROWN) {
@@ -166,7 +166,7 @@ impl<'a> Search<'a> {
             stages.push(("mirrored", 1.0));
             findings.accepted.clear();
         }
-        let pattern = self.pattern(findings.log.effort.share_left());
+        let pattern = self.pattern(findings.log.effort.stands.share_left());
         let answer = self.answer((findings.accepted, &findings.others), pattern, stages);
         // Where no pair is probable enough to be reported, there is nothing to answer with.
         if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
@@ -215,7 +215,7 @@ impl<'a> Search<'a> {
         let (hypotheses, rest, spent) = self.round(seeds, keep);
         log.seeds += seeds.len();
         log.effort = log.effort + spent;
-        log.threshold = self.threshold(log.effort.share_left());
+        log.threshold = self.threshold(log.effort.stands.share_left());
         log.refined += hypotheses.len();
         (hypotheses, rest)
     }

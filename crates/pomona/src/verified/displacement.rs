@@ -5,16 +5,12 @@ use super::nearest::SHARE_OF_ROWS;
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
+/// From where a fruit was put to its partner, or to the mean of all that it may be, and the probability that it has one.
+pub(super) type Residual = Option<(Vector3<f64>, f64)>;
+
 /// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not.
-///
-/// `residual` gives a fruit's residual and its weight.
-pub(super) fn shared_by_neighbours(
-    query: &Landscape,
-    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)> + Sync + Send,
-) -> f64 {
+pub(super) fn shared_by_neighbours(query: &Landscape, residuals: &[Residual]) -> f64 {
     let rows: Vec<usize> = (0..query.len()).collect();
-    // Each is asked for as often as it is a neighbour.
-    let residuals: Vec<_> = rows.par_iter().with_min_len(SHARE_OF_ROWS).map(|&row| residual(row)).collect();
     let parts: Vec<[f64; 2]> = rows
         .par_chunks(SHARE_OF_ROWS)
         .map(|rows| {
@@ -55,13 +51,13 @@ pub(super) fn carried_on(
     query: &Landscape,
     row: usize,
     (shared, noise): (f64, f64),
-    residual: impl Fn(usize) -> Option<(Vector3<f64>, f64)>,
+    residuals: &[Residual],
 ) -> (Vector3<f64>, f64) {
     if shared <= 0.0 {
         return (Vector3::zeros(), 0.0);
     }
     let variance = shared * (1.0 + FARTHER * shared / noise).min(FARTHEST);
-    let known = query.neighbours(row).iter().filter_map(|&other| Some((other, residual(other as usize)?)));
+    let known = query.neighbours(row).iter().filter_map(|&other| Some((other, residuals[other as usize]?)));
     let told: Vec<(u32, (Vector3<f64>, f64))> = known.take(TELLING).collect();
     let precision = -0.5 / (REACH * query.spacing).powi(2);
     let correlation = |a: usize, b: usize| (precision * (query.points[a] - query.points[b]).norm_squared()).exp();
@@ -96,10 +92,11 @@ mod tests {
             let own = query.points[row];
             // Only what lies before the fruit is known.
             let known = |other: usize| (query.points[other].x < own.x).then(|| (bend(&query.points[other]), 1.0));
-            if (0..query.len()).filter(|&other| known(other).is_some()).count() < 50 {
+            let known: Vec<Residual> = (0..query.len()).map(known).collect();
+            if known.iter().flatten().count() < 50 {
                 continue;
             }
-            carried += (carried_on(&query, row, (1e-3, noise), known).0 - bend(&own)).norm();
+            carried += (carried_on(&query, row, (1e-3, noise), &known).0 - bend(&own)).norm();
             bent += bend(&own).norm();
         }
         assert!(carried < 0.1 * bent, "{carried} {bent}");
@@ -108,8 +105,9 @@ mod tests {
     #[test]
     fn nothing_is_told_where_nobody_is_near_or_nothing_is_shared() {
         let query = Landscape::new(&visits(0.02).0);
-        let (mean, left) = carried_on(&query, 0, (1e-3, 1e-4), |_| None);
+        let (mean, left) = carried_on(&query, 0, (1e-3, 1e-4), &vec![None; query.len()]);
         assert!(mean.norm() < 1e-12 && (left - FARTHEST * 1e-3).abs() < 1e-12);
-        assert_eq!(carried_on(&query, 0, (0.0, 1e-4), |_| Some((Vector3::x(), 1.0))), (Vector3::zeros(), 0.0));
+        let all = vec![Some((Vector3::x(), 1.0)); query.len()];
+        assert_eq!(carried_on(&query, 0, (0.0, 1e-4), &all), (Vector3::zeros(), 0.0));
     }
 }

@@ -28,7 +28,7 @@ const HALVINGS: usize = 8;
 /// `there` has, for each fruit of the map, how surely the query would have shown it; 0 outside the overlap.
 pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
     let map = laid.map;
-    let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support(&at.place))).collect();
+    let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support.at(&at.place))).collect();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
@@ -102,7 +102,7 @@ mod tests {
             let pose = Placement { translation: query.centre - map.centre + shift, ..Placement::identity() };
             let land = |p: &Vector3<f64>| Some(Landing { place: pose.apply(p), variance: 0.02 * 0.02 });
             let predictions: Vec<_> = query.points.iter().map(land).collect();
-            let there: Vec<f64> = map.points.iter().map(|p| query.support(&pose.apply_inverse(p))).collect();
+            let there: Vec<f64> = map.points.iter().map(|p| query.support.at(&pose.apply_inverse(p))).collect();
             evidence(&Laid { query: &query, map: &map, predictions: &predictions, pose: &pose }, &there)
         };
         assert!(at(Vector3::zeros()) > 300.0);

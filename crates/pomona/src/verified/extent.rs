@@ -51,7 +51,7 @@ pub(crate) fn hypothesis(
         .map(|aside| fine_structure(query, map, &aside, sigma))
         .fold(0.0, f64::max);
     let log_odds = sharp - shared;
-    (log_odds > OUTSTANDING * threshold(query)).then(|| Hypothesis { pose, log_odds, place: middle(query), sigma })
+    (log_odds > OUTSTANDING * threshold(query)).then(|| Hypothesis { pose, log_odds, place: Vector3::zeros(), sigma })
 }
 
 /// The pose moved along each of the axes, and turned about each, either way, so that fruits move by `distance`.
@@ -81,11 +81,6 @@ pub(crate) fn threshold(query: &Landscape) -> f64 {
 /// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over
 /// disjoint rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
 const OUTSTANDING: f64 = 0.85;
-
-/// The fruit nearest the centre.
-fn middle(cloud: &Landscape) -> Vector3<f64> {
-    cloud.points.iter().copied().min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared())).unwrap_or_default()
-}
 
 fn anneal(query: &Landscape, map: &Landscape, start: Placement, scale: Scale) -> Placement {
     let mut pose = start;

@@ -44,15 +44,6 @@ pub(crate) struct Growth<'a> {
     pub(super) whole: bool,
 }
 
-/// The nearest fruit of the map to where one of the query is expected.
-struct Nearest {
-    partner: u32,
-    /// Probability that it is no stranger.
-    weight: f64,
-    /// What it says for the pose, nats.
-    gain: f64,
-}
-
 /// Grows a hypothesis as far as the evidence goes.
 pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = Growth::new(query, map, seed, model);
@@ -115,23 +106,26 @@ impl<'a> Growth<'a> {
             |patches, cell| patches.footing(&surroundings(&patches.cells, cell), HOLD, cell),
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
+        let Patchwork { map, model, .. } = self.patches;
         let nearest = |at: &Option<Landing>| self.nearest(at.as_ref()?);
-        let met: Vec<Option<Nearest>> =
+        let met: Vec<Option<(u32, f64)>> =
             self.patches.predictions.par_iter().with_min_len(SHARE_OF_ROWS).map(nearest).collect();
-        let mut owners: Vec<Option<(usize, f64)>> = vec![None; self.patches.map.len()];
+        let mut owners: Vec<Option<(usize, f64)>> = vec![None; map.len()];
         for (row, met) in met.iter().enumerate() {
-            let Some(met) = met else { continue };
-            let owner = &mut owners[met.partner as usize];
-            if owner.is_none_or(|(_, most)| met.gain > most) {
-                *owner = Some((row, met.gain));
+            let &Some((partner, ratio)) = met else { continue };
+            let owner = &mut owners[partner as usize];
+            if owner.is_none_or(|(_, most)| ratio > most) {
+                *owner = Some((row, ratio));
             }
         }
         let mut gains = vec![0.0; met.len()];
         for (row, met) in met.into_iter().enumerate() {
-            let kept = met.filter(|met| owners[met.partner as usize].is_some_and(|(owner, _)| owner == row));
-            gains[row] = kept.as_ref().map_or_else(|| self.alone(row), |met| met.gain);
-            self.partners[row] = kept.as_ref().map(|met| met.partner);
-            self.patches.targets[row] = kept.map(|met| (self.patches.map.points[met.partner as usize], met.weight));
+            let kept = met.filter(|met| owners[met.0 as usize].is_some_and(|(owner, _)| owner == row));
+            gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
+            self.partners[row] = kept.map(|(partner, _)| partner);
+            let target =
+                |(partner, ratio): (u32, f64)| (map.points[partner as usize], model.no_stranger(ratio).max(0.0));
+            self.patches.targets[row] = kept.map(target);
         }
         self.patches.look();
         self.patches.sum_up();
@@ -139,18 +133,17 @@ impl<'a> Growth<'a> {
         self.log_odds = self.patches.cells.iter().map(of_cell).collect();
     }
 
-    /// The fruit of the map nearest to where one is expected.
-    fn nearest(&self, Landing { place, variance }: &Landing) -> Option<Nearest> {
+    /// The fruit of the map nearest to where one is expected, and the likelihood ratio of the two being one.
+    fn nearest(&self, Landing { place, variance }: &Landing) -> Option<(u32, f64)> {
         let Patchwork { map, model, .. } = self.patches;
         let (partner, d2) = map.nearest(place, GATE * variance.sqrt())?;
-        let ratio = model.met(d2, *variance, map.density[partner as usize]);
-        Some(Nearest { partner, weight: model.no_stranger(ratio).max(0.0), gain: ratio.ln() })
+        Some((partner, model.met(d2, *variance, map.density[partner as usize])))
     }
 
     /// What a fruit without a partner says, nats.
     fn alone(&self, row: usize) -> f64 {
         let Patchwork { map, model, predictions, .. } = &self.patches;
-        predictions[row].map_or(0.0, |at| model.missed(map.support(&at.place)).ln())
+        predictions[row].map_or(0.0, |at| model.missed(map.support.at(&at.place)).ln())
     }
 
     /// New poses, noise and shared displacement from the current pairs: one `rigid` pose, or patches.

@@ -224,7 +224,7 @@ impl<'a> Refiner<'a> {
         for (&row, &(partner, d2, variance)) in self.region.iter().zip(&self.partners) {
             let p = self.query.points[row as usize];
             if partner == NOBODY {
-                evidence.multiply(self.model.missed(self.map.support(&pose.apply(&p))));
+                evidence.multiply(self.model.missed(self.map.support.at(&pose.apply(&p))));
                 continue;
             }
             let met = self.model.met(d2, variance, self.map.density[partner as usize]);
@@ -242,12 +242,12 @@ impl<'a> Refiner<'a> {
     /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
     /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
     fn other_side(&self, pose: &Placement, place: &Vector3<f64>, reach: f64) -> f64 {
-        let support = |&row: &u32| self.map.support(&pose.apply(&self.query.points[row as usize]));
+        let support = |&row: &u32| self.map.support.at(&pose.apply(&self.query.points[row as usize]));
         let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
         let mut missing = Evidence::default();
         self.map.tree.within(&single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
             if self.owner[row as usize].0 != self.stamp {
-                let seen = self.query.support(&pose.apply_inverse(&self.map.points[row as usize]));
+                let seen = self.query.support.at(&pose.apply_inverse(&self.map.points[row as usize]));
                 missing.multiply(self.model.missed(seen));
             }
         });

@@ -45,11 +45,11 @@ pub(crate) struct Landscape {
     pub(crate) tree: Tree,
     /// Cells that growth goes by, once it is asked for.
     cut: OnceLock<Cut>,
-    companions: Companions,
+    pub(super) companions: Companions,
     grid: Grid,
     /// By their reach.
     vicinities: [Vicinity; 2],
-    support: Support,
+    pub(super) support: Support,
 }
 
 impl Landscape {
@@ -139,58 +139,26 @@ impl Landscape {
     /// The nearest point within `gate`, with its squared distance.
     #[inline]
     pub(crate) fn nearest(&self, place: &Vector3<f64>, gate: f64) -> Option<(u32, f64)> {
-        let mut nearest = Nearest { points: &self.points, place, limit: gate * gate, row: None };
+        let nearer = |(best, limit): (Option<u32>, f64), row: u32| {
+            let d2 = (self.points[row as usize] - place).norm_squared();
+            if d2 <= limit { (Some(row), d2) } else { (best, limit) }
+        };
+        let mut found = (None, gate * gate);
         // What is beyond the reach of a list may be listed nevertheless, and be beaten by what is not.
         for list in &self.vicinities {
-            list.of(place).iter().for_each(|&row| nearest.offer(row));
-            if nearest.limit <= list.reach * list.reach {
-                return nearest.found();
+            found = list.of(place).iter().copied().fold(found, nearer);
+            if found.1 <= list.reach * list.reach {
+                return found.0.map(|row| (row, found.1));
             }
         }
-        self.near(place, gate, |row| nearest.offer(row));
-        nearest.found()
+        self.near(place, gate, |row| found = nearer(found, row));
+        found.0.map(|row| (row, found.1))
     }
 
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.
     #[inline]
     pub(crate) fn near(&self, place: &Vector3<f64>, gate: f64, visit: impl FnMut(u32)) {
         self.grid.near(place, gate, visit);
-    }
-
-    /// Other fruits per cubic metre at `distance` from a fruit.
-    #[inline]
-    pub(crate) fn companions(&self, distance: f64) -> f64 {
-        self.companions.at(distance)
-    }
-
-    /// Probability in 0..1 that the recording would have shown a fruit at `place`: 1 inside the crowns, 0 beyond.
-    #[inline]
-    pub(crate) fn support(&self, place: &Vector3<f64>) -> f64 {
-        self.support.at(place)
-    }
-}
-
-/// The nearest of the points that were offered.
-struct Nearest<'a> {
-    points: &'a [Vector3<f64>],
-    place: &'a Vector3<f64>,
-    /// Squared distance of the nearest, or within which it has to be.
-    limit: f64,
-    row: Option<u32>,
-}
-
-impl Nearest<'_> {
-    fn found(&self) -> Option<(u32, f64)> {
-        self.row.map(|row| (row, self.limit))
-    }
-
-    #[inline]
-    fn offer(&mut self, row: u32) {
-        let d2 = (self.points[row as usize] - self.place).norm_squared();
-        if d2 <= self.limit {
-            self.limit = d2;
-            self.row = Some(row);
-        }
     }
 }
 

@@ -55,8 +55,8 @@ pub(super) fn hypotheses(
         refined([query, map], model, steps, reach, &starts)
     };
     let mut peaks = rows.peaks(admits);
-    peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
-    let looks = refined(&distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing), &wide, LOOKS);
+    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let looks = refined(&distinct(peaks.iter().map(|peak| peak.1), LOOKED_AT, map.spacing), &wide, LOOKS);
     let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
     let mut found = refined(&best, &model, STEPS);
     // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.

@@ -43,7 +43,7 @@ impl Growth<'_> {
         let (mut terms, mut due) = (Vec::new(), 0.0);
         for (at, partner) in self.patches.predictions.iter().zip(partners) {
             let Some(at) = at else { continue };
-            let support = map.support(&at.place);
+            let support = map.support.at(&at.place);
             due += support;
             terms.push(partner.map_or(-support, |partner| {
                 let d2 = (map.points[partner as usize] - at.place).norm_squared();

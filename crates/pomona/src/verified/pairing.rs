@@ -93,7 +93,7 @@ impl Laid<'_> {
     /// their own.
     pub(super) fn companions(&self, distance: f64) -> f64 {
         let scale = self.pose.scale;
-        let both = self.query.companions(distance / scale) / scale.powi(3) + self.map.companions(distance);
+        let both = self.query.companions.at(distance / scale) / scale.powi(3) + self.map.companions.at(distance);
         (0.5 * both).max(self.map.floor)
     }
 
@@ -109,7 +109,7 @@ impl Laid<'_> {
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
         let (map, pose) = (self.map, self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
-        let support = map.support(&place);
+        let support = map.support.at(&place);
         let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
         // No axis has more than the trace, three times the mean.
         let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { 1.0 };

@@ -7,7 +7,7 @@
 //! fruit ([`super::displacement`]).
 
 use super::cut::{Cell, Cut, key_of, surroundings, total};
-use super::displacement::{carried_on, shared_by_neighbours};
+use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
@@ -43,7 +43,7 @@ pub(crate) struct Patchwork<'a> {
     pub(super) shared: f64,
     pub(super) targets: Vec<Target>,
     /// What patches left over when it was looked at last: from where they put a fruit to its partner.
-    left_over: Vec<Target>,
+    pub(super) left_over: Vec<Residual>,
     pub(super) predictions: Vec<Option<Landing>>,
     /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
     pub(super) unseen: [Vec<bool>; 2],
@@ -75,15 +75,10 @@ impl<'a> Patchwork<'a> {
         self.cells[self.cut.cell_of[row] as usize].pose.apply(&self.query.points[row])
     }
 
-    /// From where the patch puts a fruit now to its partner.
-    fn residual(&self, row: usize) -> Target {
-        let (target, weight) = self.targets[row]?;
-        Some((target - self.placed(row), weight))
-    }
-
-    /// What the patch of a fruit left over of it.
-    pub(super) fn left_over(&self, row: usize) -> Target {
-        self.left_over[row]
+    /// From where the patches put the fruits now to their partners.
+    fn residuals(&self) -> Vec<Residual> {
+        let targets = self.targets.iter().enumerate();
+        targets.map(|(row, target)| target.map(|(target, weight)| (target - self.placed(row), weight))).collect()
     }
 
     /// Predicts the fruits of the reached cells that are not `unseen`: `footing` says how firmly pairs hold the poses of a cell,
@@ -111,7 +106,7 @@ impl<'a> Patchwork<'a> {
     /// as large.
     pub(super) fn landing(&self, row: usize, looseness: f64, widening: f64) -> Landing {
         let noise = self.sigma * self.sigma;
-        let (shift, unexplained) = carried_on(self.query, row, (self.shared, noise), |other| self.left_over(other));
+        let (shift, unexplained) = carried_on(self.query, row, (self.shared, noise), &self.left_over);
         Landing {
             place: self.placed(row) + shift,
             variance: widening * widening * noise * (1.0 + looseness) + unexplained,
@@ -164,12 +159,12 @@ impl<'a> Patchwork<'a> {
 
     /// Looks at what patches leave over.
     pub(super) fn look(&mut self) {
-        self.left_over = (0..self.query.len()).map(|row| self.residual(row)).collect();
+        self.left_over = self.residuals();
     }
 
     /// What neighbours share of what patches left over; returns the squares of the rest and the weight of the pairs.
     pub(super) fn share(&mut self) -> (f64, f64) {
-        self.shared = shared_by_neighbours(self.query, |row| self.left_over(row));
+        self.shared = shared_by_neighbours(self.query, &self.left_over);
         let (squares, weight) = self
             .left_over
             .iter()
@@ -181,7 +176,7 @@ impl<'a> Patchwork<'a> {
     /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that
     /// together.
     pub(super) fn firmness(&self) -> f64 {
-        let shared = shared_by_neighbours(self.query, |row| self.residual(row));
+        let shared = shared_by_neighbours(self.query, &self.residuals());
         1.0 / (shared / (self.sigma * self.sigma)).max(f64::EPSILON)
     }
 
@@ -207,7 +202,7 @@ impl<'a> Patchwork<'a> {
         }
         let place = self.pose.apply_inverse(&self.map.points[row]);
         let cell = self.cut.index.get(&key_of(&place, self.cut.edge));
-        if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support(&place) } else { 0.0 }
+        if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
     }
 }
 

@@ -40,7 +40,7 @@ impl Terrain for Landscape {
 
     #[inline]
     fn support(&self, place: &Vector3<f64>) -> f64 {
-        self.support(place)
+        self.support.at(place)
     }
 }
 
@@ -63,13 +63,6 @@ impl Add for Effort {
             fitted: self.fitted + other.fitted,
             stands: self.stands + other.stands,
         }
-    }
-}
-
-impl Effort {
-    /// Share of the wrong poses that a known vertical leaves.
-    pub(super) fn share_left(&self) -> f64 {
-        self.stands.share_left()
     }
 }
 

@@ -77,7 +77,7 @@ impl Counts {
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], 0.0);
             for at in predictions[first..query.len().min(first + SHARE_OF_ROWS)].iter().flatten() {
-                due += map.support(&at.place);
+                due += map.support.at(&at.place);
                 map.tree.within(&single(&at.place), (BINS as f64 * bin) as f32, |_, d2| {
                     if let Some(count) = across.get_mut((f64::from(d2).sqrt() / bin) as usize) {
                         *count += 1.0;

@@ -82,7 +82,7 @@ impl Settlement<'_> {
             // The patch follows its surroundings in the measure in which it is held to them.
             let looseness = near.looseness(p) + near.share_held(hold) * wide.looseness(p);
             let mut landing = patches.landing(row, looseness, 1.0);
-            if let Some((residual, weight)) = patches.left_over(row) {
+            if let Some((residual, weight)) = patches.left_over[row] {
                 // Of a linear fit: the residual without the own partner is r / (1 - h), h the leverage.
                 let leverage = (weight * looseness).min(MAX_LEVERAGE);
                 landing.place -= residual * (leverage / (1.0 - leverage));
@@ -111,7 +111,7 @@ impl Settlement<'_> {
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
     fn recount(&mut self, beliefs: &Beliefs) {
-        let due: f64 = self.patches.predictions.iter().flatten().map(|at| self.patches.map.support(&at.place)).sum();
+        let due: f64 = self.patches.predictions.iter().flatten().map(|at| self.patches.map.support.at(&at.place)).sum();
         let found: f64 = beliefs.probabilities.iter().sum();
         self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
     }

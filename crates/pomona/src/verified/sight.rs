@@ -28,8 +28,8 @@ pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Placement) -> [V
     let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.apply(p)).collect();
     // Trees that only one visit shows say nothing about how far the other sees.
     let both = [
-        here.iter().filter(|place| map.support(place) > 0.0).map(depth).collect::<Vec<f64>>(),
-        map.points.iter().filter(|p| query.support(&pose.apply_inverse(p)) > 0.0).map(depth).collect(),
+        here.iter().filter(|place| map.support.at(place) > 0.0).map(depth).collect::<Vec<f64>>(),
+        map.points.iter().filter(|p| query.support.at(&pose.apply_inverse(p)) > 0.0).map(depth).collect(),
     ];
     let variance = (WIDTH * map.spacing).powi(2);
     let shown =

@@ -53,13 +53,6 @@ const WEIGHTS: f64 = 10.0;
 /// Votes beside those expected, so that a cell does not stand out by one where none are.
 const LEAST_EXPECTED: f64 = 0.3;
 
-/// A pose whose cell stands out, by so many standard deviations.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Peak {
-    pub(super) height: f64,
-    pub(super) pose: Placement,
-}
-
 /// Two rows, each in the frame of its axes: along, up, in depth.
 pub(super) struct Rows {
     axes: [Matrix3<f64>; 2],
@@ -73,17 +66,10 @@ pub(super) struct Rows {
     blocks: [usize; 3],
 }
 
-/// Votes of all cells, and what is asked of them.
+/// Votes of all cells.
 struct Counts {
     /// In the last one what lies outside of all. A cell never has more votes than there are pairs.
     cells: Vec<u16>,
-    /// Sums of blocks, each a mean with those around.
-    blocks: Vec<f32>,
-    /// Votes of the lines in depth of a row of blocks together.
-    line: Vec<u16>,
-    /// For a slab of cells across the row: their weighted votes, and what these must exceed.
-    weighted: Vec<u16>,
-    asked: Vec<u16>,
     /// Cells that one fruit votes for.
     voted: Vec<u32>,
 }
@@ -108,8 +94,8 @@ impl Rows {
         Some(Self { axes, query, map, edges, half, size, blocks })
     }
 
-    /// Poses that stand out, turn by turn, of those that are admitted.
-    pub(super) fn peaks(&self, admits: &(impl Fn(&Placement) -> bool + Sync)) -> Vec<Peak> {
+    /// Poses whose cells stand out, with the standard deviations by which, turn by turn, of those that are admitted.
+    pub(super) fn peaks(&self, admits: &(impl Fn(&Placement) -> bool + Sync)) -> Vec<(f64, Placement)> {
         let turns: Vec<Matrix3<f64>> =
             turns().filter(|turn| admits(&self.placement(turn, &Vector3::zeros()))).collect();
         turns
@@ -125,44 +111,46 @@ impl Rows {
     }
 
     fn no_counts(&self) -> Counts {
-        let [_, high, deep] = self.size;
-        Counts {
-            cells: vec![0; self.size.iter().product::<usize>() + 1],
-            blocks: vec![0.0; self.blocks.iter().product()],
-            line: vec![0; deep],
-            weighted: vec![0; high * deep],
-            asked: vec![0; high * deep],
-            voted: vec![0; self.map[0].len()],
-        }
+        let all = self.size.iter().product::<usize>() + 1;
+        Counts { cells: vec![0; all], voted: vec![0; self.map[0].len()] }
     }
 
-    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<Peak> {
+    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Placement)> {
         self.count(turn, counts);
-        self.sum_up(counts);
+        let expected = self.expected(&counts.cells);
+        let asked: Vec<f64> =
+            expected.iter().map(|votes| WEIGHTS * (votes + OUTSTANDING * (votes + LEAST_EXPECTED).sqrt())).collect();
         let [long, high, deep] = self.size;
         let mut peaks = Vec::new();
-        for x in 1..long - 1 {
-            if x == 1 || x.is_multiple_of(BLOCK[0]) {
-                self.ask(x, counts);
-            }
-            self.weigh(x, counts);
-            let lines = counts.weighted.chunks_exact(deep).zip(counts.asked.chunks_exact(deep));
-            // Hardly any cell stands out: what does is looked for in a line at once.
-            let any = |(_, (sums, asked)): &(usize, (&[u16], &[u16]))| {
-                sums.iter().zip(*asked).fold(0, |over, (sum, asked)| over | sum.saturating_sub(*asked)) > 0
-            };
-            for (y, (sums, asked)) in lines.enumerate().take(high - 1).skip(1).filter(any) {
-                for z in (1..deep - 1).filter(|&z| sums[z] > asked[z]) {
-                    let (height, offset) = self.height(counts, [x, y, z]);
-                    peaks.push(Peak { height, pose: self.placement(turn, &offset) });
+        for (x, y) in (1..long - 1).flat_map(|x| (1..high - 1).map(move |y| (x, y))) {
+            let line = |x: usize, y: usize| &counts.cells[(x * high + y) * deep..][..deep];
+            let [here, before, after, below, above] =
+                [line(x, y), line(x - 1, y), line(x + 1, y), line(x, y - 1), line(x, y + 1)];
+            let (blocks, expected) = (&asked[self.block(x, y)..], &expected[self.block(x, y)..]);
+            for z in 1..deep - 1 {
+                let beside = [[before[z], after[z]], [below[z], above[z]], [here[z - 1], here[z + 1]]];
+                // Sums of whole numbers; where one cell has a fourth of all votes the clouds are no rows.
+                let sum = beside.iter().flatten().fold(here[z].wrapping_mul(4), |sum, &votes| sum.wrapping_add(votes));
+                if f64::from(sum) > blocks[z / BLOCK[2]] {
+                    let expected = expected[z / BLOCK[2]];
+                    let height = (f64::from(sum) / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
+                    let aside = Vector3::from(beside.map(|[less, more]| f64::from(more) - f64::from(less)));
+                    let cell = Vector3::new(x as f64, y as f64, z as f64) - Vector3::from(self.half.map(f64::from));
+                    let offset = (cell + aside / f64::from(sum)).component_mul(&self.edges);
+                    peaks.push((height, self.placement(turn, &offset)));
                 }
             }
         }
         peaks
     }
 
+    /// The first block of a line in depth.
+    fn block(&self, x: usize, y: usize) -> usize {
+        (x / BLOCK[0] * self.blocks[1] + y / BLOCK[1]) * self.blocks[2]
+    }
+
     /// Counts the offsets of all fruits of the map from all of the query.
-    fn count(&self, turn: &Matrix3<f64>, Counts { cells, voted, .. }: &mut Counts) {
+    fn count(&self, turn: &Matrix3<f64>, Counts { cells, voted }: &mut Counts) {
         cells.fill(0);
         let outside = cells.len() as u32 - 1;
         let [long, high, deep] = self.size.map(|cells| cells as u32);
@@ -183,77 +171,23 @@ impl Rows {
         }
     }
 
-    /// Sums of the blocks, each a mean with those around.
-    fn sum_up(&self, Counts { cells, blocks: sums, line, .. }: &mut Counts) {
-        let ([long, high, deep], [along, up, back]) = (self.size, self.blocks);
-        for (i, sums) in sums.chunks_exact_mut(back).enumerate() {
-            let [x, y] = [i / up * BLOCK[0], i % up * BLOCK[1]];
-            line.fill(0);
-            for x in x..long.min(x + BLOCK[0]) {
-                let lines = cells[(x * high + y) * deep..].chunks_exact(deep);
-                for cells in lines.take(BLOCK[1].min(high - y)) {
-                    line.iter_mut().zip(cells).for_each(|(sum, votes)| *sum += votes);
-                }
-            }
-            for (sum, votes) in sums.iter_mut().zip(line.chunks(BLOCK[2])) {
-                *sum = f32::from(votes.iter().sum::<u16>());
+    /// Votes of a cell of each block that these, each a mean with those around, let expect.
+    fn expected(&self, cells: &[u16]) -> Vec<f64> {
+        let ([_, high, deep], [along, up, back]) = (self.size, self.blocks);
+        let mut votes = vec![0.0; along * up * back];
+        for (at, line) in cells.chunks_exact(deep).enumerate() {
+            let blocks = &mut votes[self.block(at / high, at % high)..];
+            for (sum, votes) in blocks.iter_mut().zip(line.chunks(BLOCK[2])) {
+                *sum += f64::from(votes.iter().sum::<u16>());
             }
         }
         for (stride, count) in [(up * back, along), (back, up), (1, back)] {
-            smooth(sums, stride, count);
+            smooth(&mut votes, stride, count);
         }
+        let cells = BLOCK.iter().product::<usize>() as f64;
+        votes.iter_mut().for_each(|sum| *sum /= cells);
+        votes
     }
-
-    /// What the cells of the slab at `x` must exceed to stand out of their blocks.
-    fn ask(&self, x: usize, Counts { blocks, asked, .. }: &mut Counts) {
-        let [_, up, back] = self.blocks;
-        let blocks = blocks[x / BLOCK[0] * up * back..].chunks_exact(back);
-        for (lines, blocks) in asked.chunks_mut(BLOCK[1] * self.size[2]).zip(blocks) {
-            let (first, others) = lines.split_at_mut(self.size[2]);
-            for (asked, &sum) in first.chunks_mut(BLOCK[2]).zip(blocks) {
-                let expected = expected(sum);
-                asked.fill((WEIGHTS * (expected + OUTSTANDING * (expected + LEAST_EXPECTED).sqrt())) as u16);
-            }
-            others.chunks_exact_mut(first.len()).for_each(|line| line.copy_from_slice(first));
-        }
-    }
-
-    /// Votes of the cells of the slab at `x`, four times, and of the six next to each; those of its rim mean
-    /// nothing, and where one cell has a fourth of all votes the clouds are no rows.
-    fn weigh(&self, x: usize, Counts { cells, weighted, .. }: &mut Counts) {
-        let [_, high, deep] = self.size;
-        let (first, rim) = (x * high * deep, deep + 1);
-        let inner = high * deep - 2 * rim;
-        let at = |offset: usize| &cells[first + rim + offset - high * deep..][..inner];
-        let slab = high * deep;
-        let [here, a, b] = [at(slab), at(0), at(2 * slab)];
-        let [c, d, e, f] = [at(slab - deep), at(slab + deep), at(slab - 1), at(slab + 1)];
-        let sums = &mut weighted[rim..][..inner];
-        for i in 0..inner {
-            let next =
-                a[i].wrapping_add(b[i]).wrapping_add(c[i]).wrapping_add(d[i]).wrapping_add(e[i]).wrapping_add(f[i]);
-            sums[i] = here[i].wrapping_mul(4).wrapping_add(next);
-        }
-    }
-
-    /// Standard deviations by which a cell with its neighbours exceeds its surroundings, and the offset that it stands for.
-    fn height(&self, Counts { cells, blocks, weighted, .. }: &Counts, at: [usize; 3]) -> (f64, Vector3<f64>) {
-        let ([_, high, deep], [_, up, back]) = (self.size, self.blocks);
-        let (slab, place) = (high * deep, (at[0] * high + at[1]) * deep + at[2]);
-        let sum = f64::from(weighted[place % slab]);
-        let votes = |place: usize| f64::from(cells[place]);
-        let aside = Vector3::from([slab, deep, 1]).map(|stride| votes(place + stride) - votes(place - stride));
-        let [x, y, z] = [0, 1, 2].map(|i| at[i] / BLOCK[i]);
-        let expected = expected(blocks[(x * up + y) * back + z]);
-        let height = (sum / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
-        let cell = Vector3::from_fn(|i, _| at[i] as f64 - f64::from(self.half[i]));
-        (height, (cell + aside / sum).component_mul(&self.edges))
-    }
-}
-
-/// Votes of a cell that the sum of its block, a mean with those around, lets expect.
-fn expected(sum: f32) -> f64 {
-    f64::from(sum) / BLOCK.iter().product::<usize>() as f64
 }
 
 /// A length in cells as whole parts of one.
@@ -280,7 +214,7 @@ fn turns() -> impl Iterator<Item = Matrix3<f64>> {
 }
 
 /// Mean of each of `count` values a `stride` apart with its neighbours, the own one twice.
-fn smooth(values: &mut [f32], stride: usize, count: usize) {
+fn smooth(values: &mut [f64], stride: usize, count: usize) {
     for values in values.chunks_exact_mut(stride * count) {
         for first in 0..stride {
             let mut before = 0.0;

@@ -2,7 +2,7 @@
 
 use super::CompactMap;
 use super::surroundings::{Surroundings, density_of};
-use crate::neighbours::cells::{CellKey, cell_of, hash};
+use crate::neighbours::cells::{self, CellKey, cell_of, hash};
 use crate::verified::proposal::Terrain;
 use nalgebra::{Point3, Vector3};
 
@@ -70,14 +70,7 @@ impl<'a> Ground<'a> {
     pub(super) fn around(&self, places: impl Iterator<Item = Vector3<f64>>, reach: i64) -> Vec<u32> {
         let mut own: Vec<CellKey> = places.map(|place| cell_of(&place, self.inverse_cell)).collect();
         distinct(&mut own);
-        let steps = move || -reach..=reach;
-        let near = |cell: CellKey| {
-            let beside = move |axis: usize, step: i64| cell[axis].saturating_add(step);
-            steps().flat_map(move |dx| {
-                steps().flat_map(move |dy| steps().map(move |dz| [beside(0, dx), beside(1, dy), beside(2, dz)]))
-            })
-        };
-        let mut cells: Vec<CellKey> = own.into_iter().flat_map(near).collect();
+        let mut cells: Vec<CellKey> = own.into_iter().flat_map(|cell| cells::around(cell, reach)).collect();
         distinct(&mut cells);
         let mut rows = Vec::new();
         for cell in cells {
