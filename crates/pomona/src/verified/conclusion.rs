@@ -1,6 +1,6 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::case::{Finding, Search};
+use super::case::{Finding, Findings, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
 
@@ -8,14 +8,9 @@ impl Search<'_> {
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
     /// The other optima of the same search show what wrong poses reach on this very planting.
-    ///
-    /// `pattern` is the evidence from which on these count, nats.
-    pub(super) fn answer(
-        &self,
-        (accepted, others): (Vec<Finding>, &[Finding]),
-        pattern: f64,
-        mut stages: Vec<(&'static str, f64)>,
-    ) -> Match {
+    pub(super) fn answer(&self, findings: Findings, mut stages: Vec<(&'static str, f64)>) -> Match {
+        let Findings { accepted, others, log } = findings;
+        let pattern = self.pattern(log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
         let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
             return Match::without_answer(Verdict::NoMatch, stages);

@@ -1,7 +1,7 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
 use super::placement::{Moments, Placement};
-use crate::neighbours::cells::{CellKey, CellMap, around};
+use crate::neighbours::cells::{self, CellKey, CellMap, around};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -36,10 +36,6 @@ pub(super) fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
     total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
 }
 
-pub(super) fn key_of(p: &Vector3<f64>, edge: f64) -> CellKey {
-    [p.x, p.y, p.z].map(|x| (x / edge).floor() as i64)
-}
-
 /// The cells of a cloud, as every growth starts with them.
 #[derive(Debug, Clone)]
 pub(crate) struct Cut {
@@ -59,7 +55,7 @@ impl Cut {
         let mut rows: Vec<Vec<u32>> = Vec::new();
         let mut cell_of = Vec::with_capacity(points.len());
         for (row, p) in points.iter().enumerate() {
-            let key = key_of(p, edge);
+            let key = cells::cell_of(p, 1.0 / edge);
             let at = *index.entry(key).or_insert_with(|| {
                 keys.push(key);
                 rows.push(Vec::new());

@@ -84,7 +84,7 @@ pub(crate) fn pairs_under(
     let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
     search.settle(&mut finding);
-    search.answer((vec![finding], &[]), 0.0, Vec::new())
+    search.answer(Findings { accepted: vec![finding], ..Findings::none(Effort::default(), 0.0) }, Vec::new())
 }
 
 impl Match {
@@ -166,8 +166,7 @@ impl<'a> Search<'a> {
             stages.push(("mirrored", 1.0));
             findings.accepted.clear();
         }
-        let pattern = self.pattern(findings.log.effort.stands.share_left());
-        let answer = self.answer((findings.accepted, &findings.others), pattern, stages);
+        let answer = self.answer(findings, stages);
         // Where no pair is probable enough to be reported, there is nothing to answer with.
         if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
     }

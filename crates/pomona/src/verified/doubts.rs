@@ -3,7 +3,7 @@
 use super::case::{Finding, Findings, Search};
 use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
-use super::hypothesis::{Hypothesis, Model, STEPS, refined};
+use super::hypothesis::{GATE, Hypothesis, Model, STEPS, refined};
 use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::{Landing, Moments, Placement};
@@ -16,14 +16,8 @@ pub(super) const RIVAL_CANDIDATES: usize = 24;
 /// No other pose may have this share of the best evidence.
 const RIVAL: f64 = 0.5;
 
-/// A pose that puts more than this share of the overlap elsewhere is another.
-const MOST: f64 = 0.5;
-
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
 const BENT: f64 = 0.05;
-
-/// Fruits within this many standard deviations of one line fix no turn about it.
-const FLAT: f64 = 3.0;
 
 /// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
 const MIRRORED: f64 = 1.3;
@@ -31,8 +25,8 @@ const MIRRORED: f64 = 1.3;
 /// A pose that explains this share of the query is no accident of a flat crown.
 const WHOLE: f64 = 0.7;
 
-/// Turns about each axis that a polish tries, radians: 7 degrees either way.
-const POLISH_TURNS: [f64; 2] = [-0.13, 0.13];
+/// Turn about each axis that a polish tries either way, radians: 7 degrees.
+const POLISH_TURN_RAD: f64 = 0.13;
 
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
@@ -73,7 +67,7 @@ impl<'a> Search<'a> {
         moments
     }
 
-    /// Whether the fruits of the overlap leave the line: on a line the turn about it, and its direction, stay open.
+    /// Whether the fruits of the overlap leave the line by more than noise does: on a line the turn about it, and its direction, stay open.
     pub(super) fn turns_are_fixed(&self, finding: &Finding) -> bool {
         let moments = self.overlap_moments(finding);
         if moments.weight <= 0.0 {
@@ -82,7 +76,7 @@ impl<'a> Search<'a> {
         let mut spread = moments.spread().symmetric_eigenvalues();
         spread.as_mut_slice().sort_by(f64::total_cmp);
         let noise = finding.overlap.sigma / finding.overlap.pose.scale;
-        spread[1] > FLAT * FLAT * noise * noise
+        spread[1] > (GATE * noise).powi(2)
     }
 
     /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does.
@@ -116,7 +110,7 @@ impl<'a> Search<'a> {
     pub(super) fn polish(&self, finding: &mut Finding<'a>) {
         let Overlap { pose, middle, sigma, .. } = finding.overlap;
         let model = Model { sigma, ..self.model };
-        let turned = std::iter::once(pose).chain(pose.turned_by_each(&middle, &POLISH_TURNS));
+        let turned = std::iter::once(pose).chain(pose.turned_either_way(&middle, POLISH_TURN_RAD));
         let starts: Vec<_> = turned.map(|start| (start, middle)).collect();
         let reach = REACH * self.query.spacing;
         let Some(&seed) = refined([self.query, self.map], &model, STEPS, reach, &starts).first() else { return };
@@ -131,12 +125,12 @@ impl<'a> Search<'a> {
     /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere.
     pub(super) fn rivals(&self, best: &Overlap, other: &Overlap, pattern: f64) -> bool {
         let elsewhere = self.elsewhere(best, other);
-        elsewhere > MOST && elsewhere * other.log_odds > pattern.max(RIVAL * best.log_odds)
+        is_most(elsewhere) && elsewhere * other.log_odds > pattern.max(RIVAL * best.log_odds)
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.
     pub(super) fn apart(&self, best: &Overlap, other: &Overlap) -> bool {
-        self.elsewhere(best, other) > MOST
+        is_most(self.elsewhere(best, other))
     }
 
     /// Share of the fruits of the overlap that another optimum puts elsewhere.
@@ -148,4 +142,8 @@ impl<'a> Search<'a> {
         let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
         apart.iter().filter(|&&apart| apart).count() as f64 / apart.len().max(1) as f64
     }
+}
+
+fn is_most(share: f64) -> bool {
+    share > 0.5
 }

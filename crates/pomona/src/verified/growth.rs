@@ -14,9 +14,6 @@ use super::search::REACH;
 use super::sight::unseen;
 use rayon::prelude::*;
 
-/// Growth ends at the latest after this many steps from cell to cell beyond the extent of the cloud.
-const EXTRA_ROUNDS: usize = 6;
-
 /// The first rounds look further than the noise.
 const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
 
@@ -48,7 +45,8 @@ pub(crate) struct Growth<'a> {
 pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = Growth::new(query, map, seed, model);
     let extent = growth.patches.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
-    let most = (extent / growth.patches.cut.edge) as usize * 2 + EXTRA_ROUNDS;
+    // Two steps for each cell of the way.
+    let most = (extent / growth.patches.cut.edge) as usize * 2 + RIGID_ROUNDS;
     let mut settled = 0;
     for round in 0..most {
         let rigid = round < RIGID_ROUNDS;

@@ -53,7 +53,8 @@ impl Model {
     /// Noise per axis of pairs whose squared residuals sum up to `squares` under a pose that was fitted to them.
     pub(crate) fn noise(&self, squares: f64, weight: f64) -> f64 {
         let mean = squares / (3.0 * weight - 6.0).max(weight);
-        ((PRIOR_FREEDOMS * self.sigma * self.sigma + 3.0 * weight * mean) / (PRIOR_FREEDOMS + 3.0 * weight)).sqrt()
+        // The noise that is expected is worth one degree of freedom: it keeps few pairs from shrinking the noise to their own fit.
+        ((self.sigma * self.sigma + 3.0 * weight * mean) / (1.0 + 3.0 * weight)).sqrt()
     }
 
     /// Likelihood ratio of a fruit without a partner at a place of `support`; of a fruit of either visit.
@@ -254,6 +255,3 @@ impl<'a> Refiner<'a> {
         due + missing.log_odds()
     }
 }
-
-/// Degrees of freedom of the noise that is expected: they keep few pairs from shrinking the noise to their own fit.
-pub(crate) const PRIOR_FREEDOMS: f64 = 1.0;

@@ -62,7 +62,7 @@ pub(super) fn hypotheses(
     // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.
     for seed in found.iter_mut().take(COMPARED) {
         for _ in 0..TILTINGS {
-            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &[-STEP_RAD, STEP_RAD]).collect();
+            let tilted = seed.pose.turned_either_way(&Vector3::zeros(), STEP_RAD);
             match refined(&tilted, &model, STEPS).first() {
                 Some(better) if better.log_odds > seed.log_odds => *seed = *better,
                 _ => break,

@@ -6,7 +6,7 @@
 //! neighbourhood, in the measure in which neighbours move together. What patches leave over is carried on from fruit to
 //! fruit ([`super::displacement`]).
 
-use super::cut::{Cell, Cut, key_of, surroundings, total};
+use super::cut::{Cell, Cut, surroundings, total};
 use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
@@ -15,6 +15,7 @@ use super::nearest::SHARE_OF_ROWS;
 use super::placement::{FIXING, Landing, Moments, Placement};
 use super::sight::is_among;
 use crate::geometry::Scale;
+use crate::neighbours::cells::cell_of;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -201,7 +202,7 @@ impl<'a> Patchwork<'a> {
             return 0.0;
         }
         let place = self.pose.apply_inverse(&self.map.points[row]);
-        let cell = self.cut.index.get(&key_of(&place, self.cut.edge));
+        let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
         if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
     }
 }

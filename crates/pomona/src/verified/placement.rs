@@ -39,16 +39,10 @@ impl Placement {
         Self { rotation, translation: self.apply(middle) - rotation * middle * self.scale, scale: self.scale }
     }
 
-    /// The pose turned about `middle` by each of the angles about each axis of the map.
-    pub(crate) fn turned_by_each(
-        &self,
-        middle: &Vector3<f64>,
-        angles_rad: &'static [f64],
-    ) -> impl Iterator<Item = Self> + use<> {
-        let (pose, middle) = (*self, *middle);
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let turns = angles_rad.iter().flat_map(move |angle| axes.map(|axis| Rotation3::new(axis * *angle)));
-        turns.map(move |turn| pose.turned(&middle, &turn))
+    /// The pose turned about `middle` by an angle either way about each axis of the map.
+    pub(crate) fn turned_either_way(&self, middle: &Vector3<f64>, angle_rad: f64) -> [Self; 6] {
+        let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * angle_rad);
+        [-x, -y, -z, x, y, z].map(|turn| self.turned(middle, &Rotation3::new(turn)))
     }
 
     /// Angle of the rotation between two poses, radians.

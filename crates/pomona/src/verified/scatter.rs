@@ -46,15 +46,14 @@ const STEADY: f64 = 200.0;
 /// Rounds of expectation and maximisation of the share.
 const ROUNDS: usize = 20;
 
-/// Noise that is tried, each an eighth of an octave above the last: from half a bin to 15, 5 mm to 16 cm in an orchard.
-const TRIED: usize = 40;
-
 /// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
 pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
     let counts = Counts::new(laid);
-    let tried: Vec<(f64, f64)> = (0..TRIED)
-        .map(|step| {
-            let sigma = 0.5 * counts.bin * 2f64.powf(step as f64 / 8.0);
+    // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
+    let tried: Vec<(f64, f64)> = (0..)
+        .map(|step| 0.5 * counts.bin * 2f64.powf(f64::from(step) / 8.0))
+        .take_while(|&sigma| sigma < 0.5 * counts.bin * BINS as f64)
+        .map(|sigma| {
             let off = (sigma / expected.sigma).ln() / expected.width;
             // Cauchy's prior lets go of a noise that the counts contradict; a normal one would not.
             (counts.likelihood(sigma) - (off * off).ln_1p(), sigma)

@@ -17,11 +17,11 @@ use rayon::prelude::*;
 /// Steps of a refinement: a turned start is at its end then.
 const STEPS: usize = 5;
 
-/// Turns about each axis of the starts beside the own one, radians.
+/// Turn either way about each axis of the starts beside the own one, radians.
 ///
 /// The noise of four fruits turns a seed by 5 degrees on average and by 15 at times. Fruits a metre away then meet
 /// their neighbours' partners, and the refinement can stay there.
-const TURNS: [f64; 2] = [-0.2, 0.2];
+const TURN_RAD: f64 = 0.2;
 
 /// One in so many, the best, is started turned too.
 const TURNED: usize = 4;
@@ -46,7 +46,7 @@ pub(super) fn closer<M: Terrain + Sync>(
     let mut closer: Vec<Contender> = contenders.par_iter().with_min_len(SHARE).filter_map(straight).collect();
     closer.sort_unstable_by(by_evidence);
     let turned = |one: &mut Contender| {
-        let more = from(one, &mut one.pose.turned_by_each(&one.place, &TURNS));
+        let more = from(one, &mut one.pose.turned_either_way(&one.place, TURN_RAD).into_iter());
         *one = more.filter(|more| more.log_odds > one.log_odds).unwrap_or(*one);
     };
     let best = contenders.len().div_ceil(TURNED).min(closer.len());
