@@ -38,9 +38,8 @@ const TELLING: usize = 12;
 const REACH: f64 = 1.5;
 
 /// The pairs that were met are those that moved least, the more so the more neighbours move together beside the noise: the
-/// others are taken to move with more of the variance that these share, up to so many times as much.
+/// others are taken to move with more of the variance that these share, by so many times its share in the noise.
 const FARTHER: f64 = 10.0;
-const FARTHEST: f64 = 8.0;
 
 /// What a Gaussian process makes of the neighbours' residuals at a fruit, the fruit itself left out; and the variance left.
 ///
@@ -56,7 +55,7 @@ pub(super) fn carried_on(
     if shared <= 0.0 {
         return (Vector3::zeros(), 0.0);
     }
-    let variance = shared * (1.0 + FARTHER * shared / noise).min(FARTHEST);
+    let variance = shared * (1.0 + FARTHER * shared / noise);
     let known = query.neighbours(row).iter().filter_map(|&other| Some((other, residuals[other as usize]?)));
     let told: Vec<(u32, (Vector3<f64>, f64))> = known.take(TELLING).collect();
     let precision = -0.5 / (REACH * query.spacing).powi(2);
@@ -106,7 +105,7 @@ mod tests {
     fn nothing_is_told_where_nobody_is_near_or_nothing_is_shared() {
         let query = Landscape::new(&visits(0.02).0);
         let (mean, left) = carried_on(&query, 0, (1e-3, 1e-4), &vec![None; query.len()]);
-        assert!(mean.norm() < 1e-12 && (left - FARTHEST * 1e-3).abs() < 1e-12);
+        assert!(mean.norm() < 1e-12 && (left - (1.0 + FARTHER * 10.0) * 1e-3).abs() < 1e-12);
         let all = vec![Some((Vector3::x(), 1.0)); query.len()];
         assert_eq!(carried_on(&query, 0, (0.0, 1e-4), &all), (Vector3::zeros(), 0.0));
     }
