@@ -50,7 +50,7 @@ const ROUNDS: usize = 20;
 pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
     let counts = Counts::new(laid);
     // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
-    let tried: Vec<(f64, f64)> = (0..)
+    let tried: Vec<(f64, f64)> = (0..8 * BINS as i32)
         .map(|step| 0.5 * counts.bin * 2f64.powf(f64::from(step) / 8.0))
         .take_while(|&sigma| sigma < 0.5 * counts.bin * BINS as f64)
         .map(|sigma| {

@@ -22,7 +22,9 @@ impl Support {
                 *cells.entry(cell).or_default() += 0.5f32.powi(steps);
             }
         }
-        cells.values_mut().for_each(|count| *count = 1.0 - (-*count / 2.0).exp());
+        for count in cells.values_mut() {
+            *count = 1.0 - (-*count / 2.0).exp();
+        }
         Self { inverse_cell, cells }
     }
 

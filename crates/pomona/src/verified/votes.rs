@@ -185,8 +185,7 @@ impl Rows {
             smooth(&mut votes, stride, count);
         }
         let cells = BLOCK.iter().product::<usize>() as f64;
-        votes.iter_mut().for_each(|sum| *sum /= cells);
-        votes
+        votes.into_iter().map(|sum| sum / cells).collect()
     }
 }
 
