@@ -418,6 +418,19 @@ def test_verticals_alone_level_a_way() -> None:
     np.testing.assert_allclose(way.session_from_camera[:, 2, :3], true[:, 2, :3], atol=0.01)
 
 
+def test_numbers_that_are_none_are_told_with_their_names() -> None:
+    nowhere, spread = np.array([[0.0, 0.0, 0.0], [np.nan, 0.0, 0.0]]), np.tile(np.eye(3), (2, 1, 1))
+    with pytest.raises(PomonaError, match=r"anchors.positions: row 1: found a number that is not finite"):
+        Anchors.of_places(np.arange(2), nowhere, spread)
+    with pytest.raises(PomonaError, match=r"anchors.ups_in_camera: row 1: found a number that is not finite"):
+        Anchors.of_verticals(np.arange(2), nowhere)
+    with pytest.raises(PomonaError, match=r"motions.first: found 0.5, expected whole numbers"):
+        Motions(np.array([0.5]), np.array([1.0]), np.eye(4)[None], np.eye(6)[None]).checked(2)
+    nothing = FruitCloud(np.zeros((0, 3)), covariances=np.zeros((0, 3, 3)))
+    with pytest.raises(PomonaError, match=r"moved: found a masked array, expected one whose values are all known"):
+        FruitSlam().add(nothing, np.ma.masked_array(np.eye(4), np.eye(4) > 0), np.eye(6))
+
+
 def test_anchors_of_a_wrong_shape_are_told() -> None:
     with pytest.raises(PomonaError, match="anchors: found 3 positions and 0 verticals, expected 2 and 0"):
         Anchors.of_places(np.arange(2), np.zeros((3, 3)), np.tile(np.eye(3), (2, 1, 1)))
