@@ -434,3 +434,11 @@ def test_what_is_no_index_is_not_replaced(row, tmp_path):
     with pytest.raises(PomonaError, match="is not the index of a map"):
         Localizer(row.map, index=other)
     assert other.read_text(encoding="utf-8") == "x,y,z\n1,2,3\n"
+
+
+def test_a_setting_that_is_no_number_and_an_index_that_is_no_path_are_told() -> None:
+    fruits = np.random.default_rng(1).uniform(0, 3, (50, 3))
+    with pytest.raises(PomonaError, match=r"config.localization.own_m: found nan, expected a finite number"):
+        Localizer(fruits, config={"localization": {"own_m": float("nan")}})
+    with pytest.raises(PomonaError, match="index: found int, expected the path of a file"):
+        Localizer(fruits, index=3)

@@ -23,6 +23,8 @@ def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, .
     try:
         if isinstance(values, np.ndarray) and np.iscomplexobj(values):
             raise TypeError  # NumPy leaves the imaginary part out, with a warning
+        if np.ma.is_masked(values):
+            raise PomonaError(f"{name}: found a masked array, expected one whose values are all known")
         array = np.ascontiguousarray(values, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
         raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None
@@ -33,6 +35,8 @@ def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, .
         wanted = ", ".join("N" if want is None else str(want) for want in shape)
         found = ", ".join(map(str, array.shape))
         raise PomonaError(f"{name}: found shape ({found}), expected ({wanted})")
+    if array.dtype.kind == "i" and (given := np.asarray(values)).dtype.kind == "f" and (given != array).any():
+        raise PomonaError(f"{name}: found {given[given != array][0]:g}, expected whole numbers")
     return array
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,7 +26,17 @@ def core_settings(config: Mapping[str, Any] | None) -> str:
     if not isinstance(config, Mapping):
         found = shown(config) if isinstance(config, str) else f"a {type(config).__name__}"
         raise PomonaError(f"config: found {found}, expected tables, as `tomllib.load` gives them of a file")
+    if (wrong := _not_finite("config", config)) is not None:
+        raise PomonaError(f"{wrong}, expected a finite number")
     try:
         return json.dumps(dict(config))
     except (TypeError, ValueError) as error:
         raise PomonaError(f"config: {error}") from None
+
+
+def _not_finite(name: str, value: Any) -> str | None:
+    """Name the first number that JSON does not know."""
+    if isinstance(value, Mapping):
+        wrong = (_not_finite(f"{name}.{key}", below) for key, below in value.items())
+        return next((one for one in wrong if one is not None), None)
+    return f"{name}: found {value}" if isinstance(value, float) and not math.isfinite(value) else None

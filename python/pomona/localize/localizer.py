@@ -108,6 +108,8 @@ class Localizer:
         threads: int | Threads | None = None,
         index: str | Path | None = None,
     ) -> None:
+        if index is not None and not isinstance(index, str | Path):
+            raise PomonaError(f"index: found {type(index).__name__}, expected the path of a file")
         cloud = as_cloud(map)
         self._rows = hanging_rows(cloud)
         hanging, settings, most = cloud.select(self._rows), core_settings(config), core_threads(threads)

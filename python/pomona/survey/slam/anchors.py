@@ -59,6 +59,7 @@ class Anchors:
             object.__setattr__(self, name, checked_array(f"anchors.{name}", getattr(self, name), np.int64, (None,)))
         for name in ("positions", "ups_in_camera"):
             object.__setattr__(self, name, checked_array(f"anchors.{name}", getattr(self, name), np.float64, (None, 3)))
+            _require_finite(f"anchors.{name}", getattr(self, name))
         n, n_ups = len(self.frames), len(self.upright_frames)
         covariances = definite_matrices("anchors.covariances", self.covariances, (n, 3, 3))
         object.__setattr__(self, "covariances", covariances)
@@ -93,6 +94,12 @@ class Anchors:
             self.ups_in_camera[ups >= 0],
             self.up_sigma_rad,
         )
+
+
+def _require_finite(name: str, values: Array) -> None:
+    wrong = ~np.isfinite(values).all(axis=1)
+    if wrong.any():
+        raise PomonaError(f"{name}: row {int(np.argmax(wrong))}: found a number that is not finite")
 
 
 def anchored(poses: Array, sightings: SeenFruits, motions: Motions, anchors: Anchors) -> Refined:

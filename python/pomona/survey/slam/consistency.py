@@ -21,6 +21,9 @@ __all__ = ["BELIEVED2", "NO_FRUITS", "explained", "explains"]
 BELIEVED2 = 22.5
 """Squared distance up to which a link or a loop is believed: one of a thousand true ones is farther off."""
 
+CAUCHY2 = 6.0
+"""Squared distance from which on Cauchy's loss lets a motion go, as the core's adjustment has it."""
+
 NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
 
 
@@ -41,7 +44,7 @@ def explained(poses: NDArray[np.float64], motions: Motions, found: Sequence[Loop
     poses : (F, 4, 4) float64
         To begin with.
     motions : Motions
-        What is trusted.
+        What is known.
     found : sequence of Loop
         What may be wrong.
 
@@ -56,7 +59,13 @@ def explained(poses: NDArray[np.float64], motions: Motions, found: Sequence[Loop
     for row in sorted(range(len(found)), key=lambda row: (-len(found[row].pairs), row)):
         closed = motions.and_those(motions_of([found[row]]).trusted())
         then = refine(now.session_from_camera, NO_FRUITS, closed)
-        if then.motion_squared_errors.sum() - now.motion_squared_errors.sum() <= BELIEVED2:
+        if _cost(then, closed) - _cost(now, motions) <= BELIEVED2:
             motions, now = closed, then
             believed.append(row)
     return sorted(believed), now
+
+
+def _cost(adjusted: Refined, motions: Motions) -> float:
+    """Give what was minimised: of a motion that may be wrong a larger error costs hardly more."""
+    errors2, doubtful = adjusted.motion_squared_errors, motions.which_are_doubtful()
+    return float(errors2[~doubtful].sum() + CAUCHY2 * np.log1p(errors2[doubtful] / CAUCHY2).sum())

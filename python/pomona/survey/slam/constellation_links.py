@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 from pomona.core_threads import core_threads
-from pomona.localize import Localizer
+from pomona.localize import Localization, Localizer
+from pomona.matching import Verdict
 from pomona.survey.refinement import Motions
 
 __all__ = ["ConstellationLink", "Constellations", "chained", "linked", "motions_of", "once"]
@@ -101,19 +102,14 @@ class Constellations:
         config = _over(NEIGHBOURS if neighbours else SAME_VISIT, self._config)
         return Localizer(cloud, config=config, threads=self._threads)
 
-    def between(self, first: int, second: int) -> ConstellationLink | None:
-        """Look for a frame in another one; None where it is not found."""
+    def looked_for(self, second: int, first: int) -> Localization | None:
+        """Look for a frame in another one; None where they have too few fruits."""
         if min(len(self._clouds[first]), len(self._clouds[second])) < LEAST_FRUITS:
             return None
         if first not in self._ready:
             self._ready = {row: ready for row, ready in self._ready.items() if abs(row - first) <= REACH}
             self._ready[first] = self.of(self._clouds[first], neighbours=True)
-        found = self._ready[first].locate(self._clouds[second])
-        if not found or found.map_from_camera is None:
-            return None
-        information = np.asarray(np.linalg.inv(found.covariance), np.float64)
-        pairs = found.pairs[:, ::-1]
-        return ConstellationLink(first, second, found.map_from_camera, information, pairs, found.probabilities)
+        return self._ready[first].locate(self._clouds[second])
 
 
 def chained(constellations: Constellations) -> list[ConstellationLink]:
@@ -122,14 +118,26 @@ def chained(constellations: Constellations) -> list[ConstellationLink]:
 
 
 def linked(constellations: Constellations, second: int) -> Iterator[ConstellationLink]:
-    """Look for one frame in those just before it."""
+    """Look for one frame in those just before it.
+
+    Where several poses are as good, as by trees that are copies of each other, it is not looked for farther back: there
+    the right one may be out of sight, and a wrong one would stand alone.
+    """
     found = False
     for first in range(second - 1, max(second - 1 - REACH, -1), -1):
         if found and second - first > NEAR:
             return
-        if (link := constellations.between(first, second)) is not None:
+        there = constellations.looked_for(second, first)
+        if there is not None and there.status is Verdict.AMBIGUOUS:
+            return
+        if there is not None and there.map_from_camera is not None:
             found = True
-            yield link
+            yield _link(first, second, there.map_from_camera, there)
+
+
+def _link(first: int, second: int, first_from_second: NDArray[np.float64], found: Localization) -> ConstellationLink:
+    information = np.asarray(np.linalg.inv(found.covariance), np.float64)
+    return ConstellationLink(first, second, first_from_second, information, found.pairs[:, ::-1], found.probabilities)
 
 
 class _Related(Protocol):

@@ -1,8 +1,8 @@
 """The way while it is gone: each frame has its place as it comes, and loops close where they are found.
 
-A frame takes its place by the surest of what ties it to frames before. Every few frames the last ones are adjusted
-together with their fruits, and what they saw is looked for in all that went out of sight before, in parts that broke
-off too. What that moves is adjusted at once; all else waits for `FruitSlam.way`.
+A frame takes its place by the surest of what ties it to frames before, of those that agree. Every few frames the last
+ones are adjusted together with their fruits, and what they saw is looked for in all that went out of sight before, in
+parts that broke off too. What that moves is adjusted at once; all else waits for `FruitSlam.way`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from pomona.survey.slam.fruit_graph import sightings_of
 from pomona.survey.slam.fruit_way import FruitWay, Known, adjusted_way, require_anchors, require_clouds
 from pomona.survey.slam.identities_of_links import joined_fruits, pairs_of
 from pomona.survey.slam.loops import TOGETHER, Loop, SeenMap, loop_at, recognised
+from pomona.survey.slam.odometry_errors import OdometryErrors, learnt_errors
+from pomona.survey.slam.placing import placings
 
 __all__ = ["FruitSlam", "PlacedFrame"]
 
@@ -42,7 +44,8 @@ class PlacedFrame:
     Attributes
     ----------
     part : int
-        Number of the part that the frame is in; a frame that hangs together with none before begins one.
+        Number of the part that the frame is in; a frame that hangs together with none before begins one, and so does
+        one of which as many ties say one thing as say another.
     session_from_camera : (4, 4) float64
         In the frame of reference of the part.
     closed : bool
@@ -67,7 +70,8 @@ class FruitSlam:
 
     def __init__(self, *, config: Mapping[str, Any] | None = None, threads: int | None = None) -> None:
         self._constellations = Constellations((), config=config, threads=threads)
-        self._motions = Motions.none()
+        self._told = Motions.none()
+        self._errors = OdometryErrors()
         self._links: list[ConstellationLink] = []
         self._believed: list[ConstellationLink] = []
         self._loops: list[Loop] = []
@@ -112,9 +116,9 @@ class FruitSlam:
         information : (6, 6) float64
             Inverse covariance of `moved`, of a step (translation, rotation) in the frame of this camera.
         doubtful : bool
-            Whether `moved` may be wrong altogether, as of wheels that slip: where all is adjusted, in `way` and when a
-            loop closes, links outvote such a motion; until then frames are placed by it. Else it is trusted as far as
-            its information says.
+            Whether `moved` may be wrong, altogether, as of wheels that slip, or steadily, as of wheels of another size
+            than is thought: links outvote such a motion, and how far motions are off is learnt from them. Else it is
+            trusted as far as its information says.
 
         Raises
         ------
@@ -130,7 +134,7 @@ class FruitSlam:
         self._links += links
         ties = motions_of(links)
         if row:
-            self._motions, ties = self._motions.and_those(motion), motion.and_those(ties)
+            self._told, ties = self._told.and_those(motion), self._errors.mended(motion).and_those(ties)
         united = self._place(ties)
         self._begins = np.append(self._begins, self._begins[-1] + len(cloud))
         self._fruits = np.append(self._fruits, self._fruits.max(initial=-1) + 1 + np.arange(len(cloud)))
@@ -140,25 +144,16 @@ class FruitSlam:
     def way(self, anchors: Anchors | None = None) -> FruitWay:
         """Adjust all frames so far to each other, and to what is known from outside."""
         require_anchors(anchors, len(self))
-        return adjusted_way(self._known(anchors))
-
-    def _known(self, anchors: Anchors | None = None) -> Known:
-        return Known(self._constellations, self._motions, anchors, self._links, [])
+        return adjusted_way(Known(self._constellations, self._told, anchors, self._links, []))
 
     def _place(self, ties: Motions) -> bool:
-        """Put the frame where the surest tie has it; parts that it ties together are one from now on: say whether."""
-        poses = self._poses[ties.first] @ ties.first_from_second
-        parts = self._parts[ties.first]
-        surest = np.argsort(np.trace(np.linalg.inv(ties.information), axis1=1, axis2=2), kind="stable")
-        begun = self._parts.max(initial=-1) + 1
-        part, pose = (parts[surest[0]], poses[surest[0]]) if len(surest) else (begun, np.eye(4))
+        """Put the frame where its ties agree; parts that they tie together are one from now on: say whether."""
+        here = placings(self._parts, self._poses, ties)
+        part, pose = here[0] if here else (self._parts.max(initial=-1) + 1, np.eye(4))
         self._parts, self._poses = np.append(self._parts, part), np.concatenate([self._poses, pose[None]])
-        united = False
-        for tie in surest:
-            if self._parts[ties.first[tie]] != self._parts[-1]:
-                self._unite(int(self._parts[ties.first[tie]]), poses[tie], len(self) - 1)
-                united = True
-        return united
+        for other in here[1:]:
+            self._unite(other.part, other.pose, len(self) - 1)
+        return len(here) > 1
 
     def _unite(self, part: int, in_part: Array, row: int) -> None:
         """Say that a frame of another part has a pose in this one; the later part goes on in the earlier."""
@@ -173,9 +168,11 @@ class FruitSlam:
     def _settle(self) -> bool:
         """Adjust the last frames, say who is who in them, and look whether they were here before."""
         begin, self._settled = self._settled, len(self)
+        self._errors = learnt_errors(self._told, self._links)
+        known = Known(self._constellations, self._errors.mended(self._told), None, self._links, [])
         for part in np.unique(self._parts[begin:]).tolist():
             rows = self._rows_of(part)[-LAST:]
-            graph, _ = self._known().graph(rows, self._poses)
+            graph, _ = known.graph(rows, self._poses)
             self._poses[rows] = graph.poses
             links = [link for link in (link.renamed(rows) for link in graph.links) if link.second >= begin]
             self._believed += links
@@ -233,7 +230,7 @@ class FruitSlam:
         row_of[rows] = np.arange(len(rows))
         links = [link.renamed(row_of) for link in self._believed if row_of[link.second] >= 0]
         closed = [loop.renamed(row_of) for loop in self._loops if row_of[loop.second] >= 0]
-        known = self._motions.inside(row_of).and_those(once(links, len(rows)).trusted())
+        known = self._errors.mended(self._told.inside(row_of)).and_those(once(links, len(rows)).trusted())
         return known.and_those(motions_of(closed).trusted())
 
     def _seen(self, rows: Rows) -> SeenMap:

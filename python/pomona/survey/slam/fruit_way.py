@@ -17,6 +17,7 @@ from pomona.survey.slam.anchors import Anchors
 from pomona.survey.slam.constellation_links import ConstellationLink, Constellations, chained, motions_of
 from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.loops import TOGETHER, Loop, SeenMap, joined, loops, recognised
+from pomona.survey.slam.odometry_errors import learnt_errors
 from pomona.survey.slam.spanning import spanned_poses
 
 __all__ = ["FruitWay", "Known", "adjusted_way", "require_anchors", "require_clouds", "way_by_fruits"]
@@ -101,6 +102,7 @@ def way_by_fruits(
 
 def adjusted_way(known: Known) -> FruitWay:
     """Lay out what is known of the frames, join parts, close loops, and adjust it all."""
+    known = replace(known, motions=learnt_errors(known.motions, known.links).mended(known.motions))
     parts, start = known.laid_out()
     if joins := list(_joins(known, parts, start)):
         known = replace(known, joins=joins)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.matching import Verdict
 from pomona.survey.slam.constellation_links import LEAST_FRUITS, Constellations
 
 __all__ = ["TOGETHER", "Loop", "SeenMap", "joined", "loop_at", "loops", "recognised"]
@@ -113,7 +115,8 @@ def loop_at(seen: SeenMap, constellations: Constellations, begin: int) -> Loop |
     end = min(begin + TOGETHER, len(seen.poses))
     # What never left the sight is no place come back to.
     before = np.setdiff1d(seen.seen_in(0, begin - TOGETHER), seen.seen_in(begin - TOGETHER, end))
-    return _Known(seen, before, constellations).stretch(seen, begin)
+    loop = _Known(seen, before, constellations).stretch(seen, begin)
+    return loop if isinstance(loop, Loop) else None
 
 
 def recognised(there: SeenMap, seen: SeenMap, begins: Iterable[int], constellations: Constellations) -> Loop | None:
@@ -122,33 +125,67 @@ def recognised(there: SeenMap, seen: SeenMap, begins: Iterable[int], constellati
     Stretches begin with the frames given; the first that is found counts.
     """
     known = _Known(there, np.arange(len(there.centres)), constellations)
-    return next((loop for begin in begins if (loop := known.stretch(seen, begin)) is not None), None)
+    for begin in begins:
+        found = known.stretch(seen, begin)
+        if found is not None:
+            # Where one stretch fits in several ways, another that does not may have the right way out of sight.
+            return found if isinstance(found, Loop) else None
+    return None
 
 
 class _Known:
     """Some of the fruits of a part, in which stretches are looked for."""
 
     def __init__(self, there: SeenMap, fruits: Rows, constellations: Constellations) -> None:
+        self._constellations = constellations
         self._there, self._fruits = there, there.often(fruits)
         enough = len(self._fruits) >= LEAST_FRUITS
         self._map = constellations.of(there.cloud(self._fruits, np.eye(4))) if enough else None
 
-    def stretch(self, seen: SeenMap, begin: int) -> Loop | None:
-        """Look for the fruits of a stretch, as its middle frame sees them."""
+    def stretch(self, seen: SeenMap, begin: int) -> Loop | Literal[Verdict.AMBIGUOUS] | None:
+        """Look for the fruits of a stretch, as its middle frame sees them; say so where they fit in several ways."""
         end = min(begin + TOGETHER, len(seen.poses))
         here, second = seen.often(seen.seen_in(begin, end)), (begin + end) // 2
         if self._map is None or len(here) < LEAST_FRUITS:
             return None
         found = self._map.locate(seen.cloud(here, seen.poses[second]))
-        if not found or found.map_from_camera is None:
-            return None
+        if found.map_from_camera is None:
+            return Verdict.AMBIGUOUS if found.status is Verdict.AMBIGUOUS else None
         there, known = self._there, self._fruits[found.pairs[:, 1]]
+        if there is not seen and (
+            repeats(there, known, self._constellations) or repeats(seen, here[found.pairs[:, 0]], self._constellations)
+        ):
+            return Verdict.AMBIGUOUS
         # Of the earlier frames, the one that saw the most of them holds the loop.
         saw = np.isin(there.fruits, known) & ((there.frames < second) | (there is not seen))
         first = int(np.bincount(there.frames[saw]).argmax())
         step = np.linalg.inv(there.poses[first]) @ found.map_from_camera
         pairs = np.stack((there.sightings_of(known), seen.sightings_of(here[found.pairs[:, 0]])), axis=1)
         return Loop(first, second, step, np.asarray(np.linalg.inv(found.covariance), np.float64), pairs)
+
+
+def repeats(seen: SeenMap, fruits: Rows, constellations: Constellations) -> bool:
+    """Say whether some fruits of a part, or a half of them, look like what stands elsewhere in it.
+
+    Halves, because fruits of two trees that are copies of each other stand nowhere else together.
+    """
+    return any(_elsewhere(seen, piece, constellations) for piece in (fruits, *_halves(seen.centres, fruits)))
+
+
+def _halves(centres: Array, fruits: Rows) -> tuple[Rows, Rows]:
+    """Cut some fruits in two where they reach farthest."""
+    from_middle = centres[fruits] - centres[fruits].mean(axis=0)
+    along = from_middle @ np.linalg.svd(from_middle, full_matrices=False)[2][0]
+    order = np.argsort(along, kind="stable")
+    return fruits[order[: len(fruits) // 2]], fruits[order[len(fruits) // 2 :]]
+
+
+def _elsewhere(seen: SeenMap, fruits: Rows, constellations: Constellations) -> bool:
+    others = np.setdiff1d(np.arange(len(seen.centres)), fruits)
+    if min(len(others), len(fruits)) < LEAST_FRUITS:
+        return False
+    found = constellations.of(seen.cloud(others, np.eye(4))).locate(seen.cloud(fruits, np.eye(4)))
+    return found.status in (Verdict.FOUND, Verdict.AMBIGUOUS)
 
 
 def joined(before: SeenMap, after: SeenMap, constellations: Constellations) -> Loop | None:
@@ -166,6 +203,9 @@ def joined(before: SeenMap, after: SeenMap, constellations: Constellations) -> L
     map = constellations.of(before.cloud(there, before.poses[last]), neighbours=True)
     found = map.locate(after.cloud(here, after.poses[0]))
     if not found or found.map_from_camera is None:
+        return None
+    same = there[found.pairs[:, 1]], here[found.pairs[:, 0]]
+    if any(repeats(part, fruits, constellations) for part, fruits in zip((before, after), same, strict=True)):
         return None
     pairs = np.stack(
         (before.sightings_of(there[found.pairs[:, 1]]), after.sightings_of(here[found.pairs[:, 0]])), axis=1
