@@ -9,6 +9,7 @@ use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
+use super::outlier::{KEPT, KEPT_LAID};
 use super::placement::Placement;
 use super::proposal::Effort;
 use super::search::of_some_fruits;
@@ -47,7 +48,7 @@ const FEW_SEEDS: u64 = 1500;
 const GROWN: usize = 6;
 
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
-const LEAST_LAID: f64 = 16.0;
+const LEAST_LAID: f64 = 10.0;
 
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
 pub(super) const SURE: f64 = 6.0;
@@ -139,7 +140,7 @@ impl<'a> Search<'a> {
         }
         if findings.accepted.is_empty() {
             findings.others.extend(self.upside_down_poses());
-            findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, &mut log));
+            findings.accepted.extend(self.single_out(&mut findings.others, f64::NEG_INFINITY, KEPT, &mut log));
         }
         findings.accepted.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         findings.pattern = self.pattern(log.effort.stands.share_left());
@@ -172,7 +173,7 @@ impl<'a> Search<'a> {
         }
         self.sift(&mut findings, &mut log);
         if findings.accepted.is_empty() {
-            findings.accepted.extend(self.single_out(&mut findings.others, self.least(), &mut log));
+            findings.accepted.extend(self.single_out(&mut findings.others, self.least(), KEPT, &mut log));
         } else {
             self.doubt(&mut findings, &[], &mut log);
         }
@@ -322,7 +323,7 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len() as u32;
         laid.retain(|finding| self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding));
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, log);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT_LAID, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             findings.accepted.push(answer);
             findings.others.extend(laid);

@@ -130,8 +130,8 @@ pub(crate) struct Refiner<'a> {
 
 const NOBODY: u32 = u32::MAX;
 
-/// Steps of a refinement: with four, two of 30 rows are lost that have few fruits in common.
-pub(super) const STEPS: usize = 6;
+/// Steps of a refinement, the last of which only weighs: with four, two of 30 rows are lost that have few fruits in common.
+const STEPS: usize = 6;
 
 /// Turns of every loop that ends when nothing new is learnt: pairs and patches, pairs and the share that is seen again. The
 /// noise stands after the first, patches after the second; then what a branch shows near its stem leads on to its tip, a
@@ -146,17 +146,6 @@ impl<'a> Refiner<'a> {
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
     pub(crate) fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
-        self.refine_in(STEPS, start, place, reach)
-    }
-
-    /// The same in fewer steps of pairing, of which the last only weighs.
-    pub(super) fn refine_in(
-        &mut self,
-        steps: usize,
-        start: &Placement,
-        place: &Vector3<f64>,
-        reach: f64,
-    ) -> Option<Hypothesis> {
         self.region.clear();
         self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
         self.region.sort_unstable();
@@ -164,17 +153,17 @@ impl<'a> Refiner<'a> {
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
         let mut answer = None;
-        for step in 1..=steps {
+        for step in 1..=STEPS {
             self.pair_up(&pose, |p| sigma * sigma * (1.0 + footing.looseness(p)));
             let (moments, residual, mut log_odds) = self.weigh(&pose);
             if moments.weight < FIXING {
                 return answer;
             }
-            if step == steps {
+            if step == STEPS {
                 log_odds += self.other_side(&pose, place, reach);
             }
             answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
-            if step == steps {
+            if step == STEPS {
                 break;
             }
             pose = model.step(&moments, &pose, sigma)?;

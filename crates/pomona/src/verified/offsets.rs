@@ -6,11 +6,11 @@
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is refined on all fruits at once, under the share that
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
-use super::hypothesis::{Hypothesis, Model, Refiner, STEPS};
+use super::hypothesis::{Hypothesis, Model, Refiner};
 use super::landscape::Landscape;
-use super::outlier::COMPARED;
 use super::placement::Placement;
-use super::votes::{Rows, STEP_RAD};
+use super::soft;
+use super::votes::Rows;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -18,23 +18,18 @@ use rayon::prelude::*;
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
 
-/// Poses that are refined at the width of a cell, and how many of them at that of the noise: of 24 some 13 lie apart, which
-/// [`super::outlier`] asks for.
-const LOOKED_AT: usize = 256;
+/// Peaks that are looked at, and how many of them go on: of 24 some 13 lie apart, which [`super::outlier`] asks for.
+const LOOKED_AT: usize = 1024;
 const REFINED: usize = 24;
 
-/// Steps at the width of a cell: one fit, and one look at what it gives. Six find no more.
-const LOOKS: usize = 2;
+/// Widths, in spacings, at which fruits pull a peak into place, and then those that go on: from half a cell down to what rows
+/// bend.
+const FIRST_PULL: [f64; 1] = [0.25];
+const PULLS: [f64; 4] = [0.2, 0.2, 0.16, 0.16];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: f64 = 0.5;
 const SAME_TURN_RAD: f64 = 0.06;
-
-/// Noise of a peak, in that of a pair: its cell is wider than the noise.
-const WIDE: f64 = 2.5;
-
-/// Times that tilted starts are tried.
-const TILTINGS: usize = 3;
 
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(
@@ -48,30 +43,20 @@ pub(super) fn hypotheses(
         return Vec::new();
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
-    let wide = Model { sigma: WIDE * model.sigma, ..model };
-    let refined = |poses: &[Placement], model: &Model, steps: usize| -> Vec<Hypothesis> {
-        let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-        let refiner = || Refiner::new(query, map, model);
-        let from = |refiner: &mut Refiner, pose: &Placement| refiner.refine_in(steps, pose, &Vector3::zeros(), reach);
-        let mut found: Vec<Hypothesis> = poses.par_iter().map_init(refiner, from).flatten_iter().collect();
-        found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-        found
-    };
     let mut peaks = rows.peaks(admits);
     peaks.sort_by(|a, b| b.height.total_cmp(&a.height));
-    let looks = refined(&distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing), &wide, LOOKS);
-    let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
-    let mut found = refined(&best, &model, STEPS);
-    // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.
-    for seed in found.iter_mut().take(COMPARED) {
-        for _ in 0..TILTINGS {
-            let tilted: Vec<Placement> = seed.pose.turned_by_each(&Vector3::zeros(), &[-STEP_RAD, STEP_RAD]).collect();
-            match refined(&tilted, &model, STEPS).first() {
-                Some(better) if better.log_odds > seed.log_odds => *seed = *better,
-                _ => break,
-            }
-        }
-    }
+    let pulled = |poses: &[Placement], widths: &[f64]| -> Vec<Placement> {
+        let mut found: Vec<_> = poses.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
+        found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        found.into_iter().map(|(pose, _)| pose).collect()
+    };
+    let looked_at = distinct(peaks.iter().map(|peak| peak.pose), LOOKED_AT, map.spacing);
+    let best = distinct(pulled(&looked_at, &FIRST_PULL).into_iter(), REFINED, map.spacing);
+    let best = distinct(pulled(&best, &PULLS).into_iter(), REFINED, map.spacing);
+    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+    let refiner = || Refiner::new(query, map, &model);
+    let refined = |refiner: &mut Refiner, pose: &Placement| refiner.refine(pose, &Vector3::zeros(), reach);
+    let mut found: Vec<Hypothesis> = best.par_iter().map_init(refiner, refined).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }
