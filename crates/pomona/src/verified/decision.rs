@@ -331,7 +331,7 @@ impl<'a> Search<'a> {
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = extent::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
+        let seed = extent::hypothesis(self.query, self.map, &self.model, &|pose| self.admits(pose))?;
         let model = Model { sigma: seed.sigma, ..self.model };
         let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);

@@ -53,3 +53,29 @@ fn pulls(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement, si
     }
     (pulls, evidence.log_odds())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Scale;
+    use crate::verified::fixture::visits;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn a_pose_that_is_off_by_the_width_of_a_gap_is_pulled_into_place() {
+        let (query, map) = visits(0.02);
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None };
+        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
+        let moved = Placement { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
+        let start = moved.turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.02, -0.03, 0.03)));
+        let off = |pose: &Placement| {
+            query.points.iter().map(|p| (pose.apply(p) - truth.apply(p)).norm()).fold(0.0, f64::max)
+        };
+        let widths = [0.3, 0.2, 0.15, 0.15];
+        let (pose, nats) = pulled(&query, &map, &model, &start, &widths);
+        let (_, before) = pulled(&query, &map, &model, &start, &[]);
+        assert!(off(&start) > 0.1 && off(&pose) < 0.03, "{} {}", off(&start), off(&pose));
+        assert!(before == 0.0 && nats > pulls(&query, &map, &model, &start, 0.15 * map.spacing).1 + 50.0, "{nats}");
+    }
+}
