@@ -69,9 +69,8 @@ mod tests {
         let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
         let moved = Placement { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
         let start = moved.turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.02, -0.03, 0.03)));
-        let off = |pose: &Placement| {
-            query.points.iter().map(|p| (pose.apply(p) - truth.apply(p)).norm()).fold(0.0, f64::max)
-        };
+        let off =
+            |pose: &Placement| query.points.iter().map(|p| (pose.apply(p) - truth.apply(p)).norm()).fold(0.0, f64::max);
         let widths = [0.3, 0.2, 0.15, 0.15];
         let (pose, nats) = pulled(&query, &map, &model, &start, &widths);
         let (_, before) = pulled(&query, &map, &model, &start, &[]);
