@@ -9,6 +9,7 @@ use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
+use super::outlier::{KEPT, KEPT_LAID};
 use super::placement::Placement;
 use super::proposal::Effort;
 use super::search::of_some_fruits;
@@ -47,7 +48,7 @@ const FEW_SEEDS: u64 = 1500;
 const GROWN: usize = 6;
 
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
-const LEAST_LAID: f64 = 16.0;
+const LEAST_LAID: f64 = 10.0;
 
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
 pub(super) const SURE: f64 = 6.0;
@@ -173,7 +174,7 @@ impl<'a> Search<'a> {
 
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
     fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
-        accepted.extend(self.single_out(others, least, log));
+        accepted.extend(self.single_out(others, least, KEPT, log));
     }
 
     /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
@@ -303,7 +304,7 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, log);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT_LAID, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             accepted.push(answer);
             others.extend(laid);
@@ -311,7 +312,7 @@ impl<'a> Search<'a> {
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = extent::hypothesis(self.query, self.map, self.model.scale, &|pose| self.admits(pose))?;
+        let seed = extent::hypothesis(self.query, self.map, &self.model, &|pose| self.admits(pose))?;
         let model = Model { sigma: seed.sigma, ..self.model };
         let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);

@@ -3,7 +3,7 @@
 use super::case::{Finding, Findings, Search};
 use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
-use super::hypothesis::{GATE, Hypothesis, Model, STEPS, refined};
+use super::hypothesis::{GATE, Hypothesis, Model, refined};
 use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::{Landing, Moments, Placement};
@@ -113,7 +113,7 @@ impl<'a> Search<'a> {
         let turned = std::iter::once(pose).chain(pose.turned_either_way(&middle, POLISH_TURN_RAD));
         let starts: Vec<_> = turned.map(|start| (start, middle)).collect();
         let reach = REACH * self.query.spacing;
-        let Some(&seed) = refined([self.query, self.map], &model, STEPS, reach, &starts).first() else { return };
+        let Some(&seed) = refined([self.query, self.map], &model, reach, &starts).first() else { return };
         let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
         if better.overlap.log_odds > finding.overlap.log_odds && self.admits(&better.overlap.pose) {
             *finding = better;

@@ -5,9 +5,10 @@
 //! the width of a branch down to the noise, decides between them.
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
-use super::hypothesis::{DETECTION, Hypothesis, gaussian};
+use super::hypothesis::{DETECTION, Hypothesis, Model, gaussian};
 use super::landscape::Landscape;
-use super::placement::{Moments, Placement};
+use super::placement::Placement;
+use super::soft::pulled;
 use crate::geometry::Scale;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -20,14 +21,14 @@ const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0
 pub(crate) fn hypothesis(
     query: &Landscape,
     map: &Landscape,
-    scale: Scale,
+    model: &Model,
     admits: &(impl Fn(&Placement) -> bool + Sync),
 ) -> Option<Hypothesis> {
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
     }
     let ((axes_query, extents_query), (axes_map, extents_map)) = (axes_of(query)?, axes_of(map)?);
-    let ratio = match scale {
+    let ratio = match model.scale {
         Scale::Metric => 1.0,
         Scale::Free => extents_map.norm() / extents_query.norm(),
     };
@@ -35,7 +36,8 @@ pub(crate) fn hypothesis(
     let annealed = |signs: [f64; 3]| {
         let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
         let rotation = turned * axes_query.transpose();
-        let pose = anneal(query, map, Placement { rotation, translation: Vector3::zeros(), scale: ratio }, scale);
+        let start = Placement { rotation, translation: Vector3::zeros(), scale: ratio };
+        let (pose, _) = pulled(query, map, model, &start, &ANNEALING);
         admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
     };
     let found: Vec<_> = HALF_TURNS.into_par_iter().filter_map(annealed).collect();
@@ -81,31 +83,6 @@ pub(crate) fn threshold(query: &Landscape) -> f64 {
 /// The pose is the best nearby, so that it stands out by chance too: by up to 4.5 per square root of fruits over
 /// disjoint rows of a dozen kinds of planting, where this asks for 5.5; heavy noise leaves 6.5 and more of true poses.
 const OUTSTANDING: f64 = 0.85;
-
-fn anneal(query: &Landscape, map: &Landscape, start: Placement, scale: Scale) -> Placement {
-    let mut pose = start;
-    for width in ANNEALING {
-        let sigma = width * map.spacing;
-        let precision = -0.5 / (sigma * sigma);
-        let mut moments = Moments::default();
-        for p in &query.points {
-            let place = pose.apply(p);
-            // The mean of the fruits nearby, weighted by their likelihood, as in the E step of coherent point drift.
-            let (mut mean, mut total) = (Vector3::zeros(), 0.0);
-            map.near(&place, 2.0 * sigma, |row| {
-                let partner = map.points[row as usize];
-                let weight = (precision * (partner - place).norm_squared()).exp();
-                mean += partner * weight;
-                total += weight;
-            });
-            if total > 0.05 {
-                moments.add(p, &(mean / total), total / (total + 0.5));
-            }
-        }
-        pose = moments.step(&pose, scale, 0.0).unwrap_or(pose);
-    }
-    pose
-}
 
 /// The noise under which the fine structure speaks most for the pose, and what it says, nats.
 fn sharpest(query: &Landscape, map: &Landscape, pose: &Placement) -> (f64, f64) {

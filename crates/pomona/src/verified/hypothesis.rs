@@ -115,18 +115,15 @@ pub(crate) struct Hypothesis {
     pub(crate) sigma: f64,
 }
 
-/// Improves poses, each on the fruits within `reach` of a place, in so many steps of pairing, of which the last only weighs; most
-/// evidence first. Poses that no pairs fix are left out.
+/// Improves poses, each on the fruits within `reach` of a place; most evidence first. Poses that no pairs fix are left out.
 pub(super) fn refined(
     [query, map]: [&Landscape; 2],
     model: &Model,
-    steps: usize,
     reach: f64,
     starts: &[(Placement, Vector3<f64>)],
 ) -> Vec<Hypothesis> {
     let refiner = || Refiner::new(query, map, model);
-    let from =
-        |refiner: &mut Refiner, (start, place): &(Placement, Vector3<f64>)| refiner.refine(steps, start, place, reach);
+    let from = |refiner: &mut Refiner, (start, place): &(Placement, Vector3<f64>)| refiner.refine(start, place, reach);
     let mut found: Vec<Hypothesis> = starts.par_iter().map_init(refiner, from).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
@@ -149,8 +146,8 @@ struct Refiner<'a> {
 
 const NOBODY: u32 = u32::MAX;
 
-/// Steps of a refinement: with four, two of 30 rows are lost that have few fruits in common.
-pub(super) const STEPS: usize = 6;
+/// Steps of a refinement, the last of which only weighs: with four, two of 30 rows are lost that have few fruits in common.
+const STEPS: usize = 6;
 
 /// Turns of every loop that ends when nothing new is learnt: pairs and patches, pairs and the share that is seen again. The
 /// noise stands after the first, patches after the second; then what a branch shows near its stem leads on to its tip, a
@@ -164,7 +161,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
-    fn refine(&mut self, steps: usize, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
+    fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
         self.region.clear();
         self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
         self.region.sort_unstable();
@@ -172,17 +169,17 @@ impl<'a> Refiner<'a> {
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
         let mut answer = None;
-        for step in 1..=steps {
+        for step in 1..=STEPS {
             self.pair_up(&pose, |p| sigma * sigma * (1.0 + footing.looseness(p)));
             let (moments, residual, mut log_odds) = self.weigh(&pose);
             if moments.weight < FIXING {
                 return answer;
             }
-            if step == steps {
+            if step == STEPS {
                 log_odds += self.other_side(&pose, place, reach);
             }
             answer = Some(Hypothesis { pose, log_odds, place: *place, sigma });
-            if step == steps {
+            if step == STEPS {
                 break;
             }
             pose = model.step(&moments, &pose, sigma)?;

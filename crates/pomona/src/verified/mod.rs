@@ -52,6 +52,7 @@ mod seeds;
 mod settlement;
 mod sight;
 mod size;
+mod soft;
 mod support;
 mod vertical;
 mod votes;

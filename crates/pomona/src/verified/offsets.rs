@@ -7,34 +7,30 @@
 //! is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
 
 use super::contender::first_of_each;
-use super::hypothesis::{Hypothesis, Model, STEPS, refined};
+use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
-use super::outlier::COMPARED;
 use super::placement::Placement;
-use super::votes::{Rows, STEP_RAD};
+use super::soft;
+use super::votes::Rows;
 use crate::geometry::Scale;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
 
-/// Poses that are refined at the width of a cell, and how many of them at that of the noise: of 24 some 13 lie apart, which
-/// [`super::outlier`] asks for.
-const LOOKED_AT: usize = 256;
+/// Peaks that are looked at, and how many of them go on: of 24 some 13 lie apart, which [`super::outlier`] asks for.
+const LOOKED_AT: usize = 1024;
 const REFINED: usize = 24;
 
-/// Steps at the width of a cell: one fit, and one look at what it gives. Six find no more.
-const LOOKS: usize = 2;
+/// Widths, in spacings, at which fruits pull a peak into place, and then those that go on: from half a cell down to what rows
+/// bend.
+const FIRST_PULL: [f64; 1] = [0.25];
+const PULLS: [f64; 4] = [0.2, 0.2, 0.16, 0.16];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: f64 = 0.5;
 const SAME_TURN_RAD: f64 = 0.06;
-
-/// Noise of a peak, in that of a pair: its cell is wider than the noise.
-const WIDE: f64 = 2.5;
-
-/// Times that tilted starts are tried.
-const TILTINGS: usize = 3;
 
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(
@@ -48,29 +44,19 @@ pub(super) fn hypotheses(
         return Vec::new();
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
-    let wide = Model { sigma: WIDE * model.sigma, ..model };
-    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-    let refined = |poses: &[Placement], model: &Model, steps: usize| {
-        let starts: Vec<_> = poses.iter().map(|&pose| (pose, Vector3::zeros())).collect();
-        refined([query, map], model, steps, reach, &starts)
-    };
     let mut peaks = rows.peaks(admits);
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let looks = refined(&distinct(peaks.iter().map(|peak| peak.1), LOOKED_AT, map.spacing), &wide, LOOKS);
-    let best = distinct(looks.iter().map(|look| look.pose), REFINED, map.spacing);
-    let mut found = refined(&best, &model, STEPS);
-    // Half a step between turns, at the ends of a row, is as far as fruits hang from each other.
-    for seed in found.iter_mut().take(COMPARED) {
-        for _ in 0..TILTINGS {
-            let tilted = seed.pose.turned_either_way(&Vector3::zeros(), STEP_RAD);
-            match refined(&tilted, &model, STEPS).first() {
-                Some(better) if better.log_odds > seed.log_odds => *seed = *better,
-                _ => break,
-            }
-        }
-    }
-    found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-    found
+    let pulled = |poses: &[Placement], widths: &[f64]| -> Vec<Placement> {
+        let mut found: Vec<_> = poses.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
+        found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        found.into_iter().map(|(pose, _)| pose).collect()
+    };
+    let looked_at = distinct(peaks.iter().map(|peak| peak.1), LOOKED_AT, map.spacing);
+    let best = distinct(pulled(&looked_at, &FIRST_PULL).into_iter(), REFINED, map.spacing);
+    let best = distinct(pulled(&best, &PULLS).into_iter(), REFINED, map.spacing);
+    let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
+    let starts: Vec<_> = best.into_iter().map(|pose| (pose, Vector3::zeros())).collect();
+    refined([query, map], &model, reach, &starts)
 }
 
 /// The first poses, one of those that are the same.

@@ -13,15 +13,26 @@ use super::contender::first_of_each;
 const REACHED: f64 = 12.0;
 
 /// Poses that are polished before they are compared: the best and what may come to be second.
-pub(super) const COMPARED: usize = 3;
+const COMPARED: usize = 3;
 
 /// Share of the evidence needed that must be left when every fruit is predicted without its own partner: what true poses
 /// keep. Poses on wires that have far more than all others keep 0.5 to 0.75.
-const KEPT: f64 = 0.9;
+pub(super) const KEPT: f64 = 0.9;
+
+/// The same of rows laid along rows, whose fruits in common are few: on wires wrong poses with as much evidence keep half of
+/// what is needed and less.
+pub(super) const KEPT_LAID: f64 = 0.7;
 
 impl<'a> Search<'a> {
-    /// Takes the best pose out of those that were not accepted, where it stands out of the others and has the `least` evidence.
-    pub(super) fn single_out(&self, others: &mut Vec<Finding<'a>>, least: f64, log: &mut Log) -> Option<Finding<'a>> {
+    /// Takes the best pose out of those that were not accepted, where it stands out of the others, has the `least` evidence and
+    /// keeps the share `kept` of what is asked for.
+    pub(super) fn single_out(
+        &self,
+        others: &mut Vec<Finding<'a>>,
+        least: f64,
+        kept: f64,
+        log: &mut Log,
+    ) -> Option<Finding<'a>> {
         best_first(others);
         let distinct = self.distinct(others);
         distinct.first().filter(|&&best| self.admits(&others[best].overlap.pose))?;
@@ -34,7 +45,7 @@ impl<'a> Search<'a> {
         let second = self.second(others, &distinct);
         log.best = log.best.max(evidence(others, distinct[0]));
         log.threshold = outlying(rate, second).max(least);
-        self.holds(&mut others[distinct[0]], KEPT, log).then(|| others.swap_remove(distinct[0]))
+        self.holds(&mut others[distinct[0]], kept, log).then(|| others.swap_remove(distinct[0]))
     }
 
     /// Most evidence of those after the best, each by the share that it puts elsewhere: a row turned a little, about its middle

@@ -2,7 +2,7 @@
 
 use super::case::Search;
 use super::contender::{Contender, by_evidence, distinct};
-use super::hypothesis::{Hypothesis, STEPS, refined};
+use super::hypothesis::{Hypothesis, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
 use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, shuffled, without_scale};
@@ -79,7 +79,7 @@ impl Search<'_> {
     /// Candidates refined around their places, most evidence first.
     pub(super) fn refined(&self, candidates: &[Contender]) -> Vec<Hypothesis> {
         let starts: Vec<_> = candidates.iter().map(|one| (one.pose, one.place)).collect();
-        refined([self.query, self.map], &self.model, STEPS, REACH * self.query.spacing, &starts)
+        refined([self.query, self.map], &self.model, REACH * self.query.spacing, &starts)
     }
 }
 

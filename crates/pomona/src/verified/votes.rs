@@ -26,7 +26,7 @@ const ALIKE: f64 = 3.0;
 
 /// Radians between turns that are tried, 3 degrees, and steps either way about the axis across the row and about the one along
 /// it: the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
-pub(super) const STEP_RAD: f64 = 0.05;
+const STEP_RAD: f64 = 0.05;
 const ACROSS: i32 = 5;
 const ALONG: i32 = 1;
 
@@ -45,7 +45,7 @@ const BLOCK: [usize; 3] = [4, 4, 2];
 
 /// Standard deviations by which a cell exceeds its surroundings at the least: of a row that is not there some hundred do, of one
 /// that is thousands.
-const OUTSTANDING: f64 = 5.7;
+const OUTSTANDING: f64 = 5.2;
 
 /// Votes of a cell count four times, and those of the six next to it once.
 const WEIGHTS: f64 = 10.0;

@@ -1,0 +1,80 @@
+//! Soft registration: every fruit pulled by all fruits that hang about it, each as likely as it is the same one.
+//!
+//! The nearest fruit is a stranger where few are seen again. The likelihood of all of them together has a wide basin, and one
+//! step of expectation and maximisation climbs most of it (coherent point drift, Myronenko and Song 2010, with a rigid pose).
+
+use super::hypothesis::{Evidence, Model, gaussian};
+use super::landscape::Landscape;
+use super::placement::{Moments, Placement};
+use nalgebra::Vector3;
+
+/// Standard deviations beyond which a fruit pulls no more.
+const REACH: f64 = 2.5;
+
+/// A pose after a step at each of the `widths`, in spacings of the map, and its log-likelihood ratio against strangers at the
+/// last of them, nats.
+pub(super) fn pulled(
+    query: &Landscape,
+    map: &Landscape,
+    model: &Model,
+    start: &Placement,
+    widths: &[f64],
+) -> (Placement, f64) {
+    let mut pose = *start;
+    let mut nats = 0.0;
+    for (step, width) in (0..).zip(widths.iter().chain(widths.last())) {
+        let sigma = width * map.spacing;
+        let (pulls, likelihood) = pulls(query, map, model, &pose, sigma);
+        if step < widths.len() {
+            pose = model.step(&pulls, &pose, sigma).unwrap_or(pose);
+        }
+        nats = likelihood;
+    }
+    (pose, nats)
+}
+
+/// Where the fruits of the query are pulled when a pair has the noise `sigma`, and what they say for the pose, nats.
+fn pulls(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement, sigma: f64) -> (Moments, f64) {
+    let (mut pulls, mut evidence) = (Moments::default(), Evidence::default());
+    for p in &query.points {
+        let place = pose.apply(p);
+        let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+        map.near(&place, REACH * sigma, |row| {
+            let partner = map.points[row as usize];
+            let ratio = gaussian((partner - place).norm_squared(), sigma * sigma) / map.density[row as usize];
+            sum += partner * ratio;
+            total += ratio;
+        });
+        let likelihood = 1.0 - model.detection + model.detection * total;
+        evidence.multiply(likelihood);
+        if total > 0.0 {
+            pulls.add(p, &(sum / total), model.detection * total / likelihood);
+        }
+    }
+    (pulls, evidence.log_odds())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Scale;
+    use crate::verified::fixture::visits;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn a_pose_that_is_off_by_the_width_of_a_gap_is_pulled_into_place() {
+        let (query, map) = visits(0.02);
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None };
+        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
+        let moved = Placement { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
+        let start = moved.turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.02, -0.03, 0.03)));
+        let off =
+            |pose: &Placement| query.points.iter().map(|p| (pose.apply(p) - truth.apply(p)).norm()).fold(0.0, f64::max);
+        let widths = [0.3, 0.2, 0.15, 0.15];
+        let (pose, nats) = pulled(&query, &map, &model, &start, &widths);
+        let (_, before) = pulled(&query, &map, &model, &start, &[]);
+        assert!(off(&start) > 0.1 && off(&pose) < 0.03, "{} {}", off(&start), off(&pose));
+        assert!(before == 0.0 && nats > pulls(&query, &map, &model, &start, 0.15 * map.spacing).1 + 50.0, "{nats}");
+    }
+}
