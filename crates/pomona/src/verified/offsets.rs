@@ -25,7 +25,7 @@ const REFINED: usize = 24;
 
 /// Widths, in spacings, at which fruits pull a peak into place, and then those that go on: from half a cell down to what rows
 /// bend.
-const FIRST_PULL: [f64; 1] = [0.25];
+const FIRST_PULLS: [f64; 2] = [0.25, 0.25];
 const PULLS: [f64; 4] = [0.2, 0.2, 0.16, 0.16];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
@@ -52,7 +52,7 @@ pub(super) fn hypotheses(
         found.into_iter().map(|(pose, _)| pose).collect()
     };
     let looked_at = distinct(peaks.iter().map(|peak| peak.1), LOOKED_AT, map.spacing);
-    let best = distinct(pulled(&looked_at, &FIRST_PULL).into_iter(), REFINED, map.spacing);
+    let best = distinct(pulled(&looked_at, &FIRST_PULLS).into_iter(), REFINED, map.spacing);
     let best = distinct(pulled(&best, &PULLS).into_iter(), REFINED, map.spacing);
     let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
     let starts: Vec<_> = best.into_iter().map(|pose| (pose, Vector3::zeros())).collect();
