@@ -10,7 +10,7 @@
 //!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`axes`, `extent`).
 //!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
-//!    what only one visit sees is left out (`sight`).
+//!    what only one visit sees is left out (`sight`). All fruits at once pull both into place (`soft`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
 //!
