@@ -4,7 +4,8 @@
 //! neighbours hardly ever all, and no seed survives. But rows lie along rows. Their principal axes give the turn up to
 //! half-turns and some degrees, and under the right turn every fruit in common has the same offset from its partner. So the
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is pulled into place by all fruits at once
-//! ([`super::soft`]) and refined, under the share that is seen again where ordinary shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
+//! ([`super::soft`]) and refined, under the share that is seen again where ordinary shares have found nothing. Most of it is
+//! wrong, and shows what the right pose must stand out of.
 
 use super::contender::first_of_each;
 use super::hypothesis::{Hypothesis, Model, refined};
