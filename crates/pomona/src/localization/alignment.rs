@@ -70,6 +70,8 @@ pub(super) struct Say {
     pub slopes: SMatrix<f64, 3, UNKNOWNS>,
     /// The fruit with the largest weight.
     pub best: Option<usize>,
+    /// That weight.
+    pub best_weight: f64,
     /// Its pull: the sum of weighted inverse covariances times residuals.
     pub pull: Vector3<f64>,
     /// Sum of the weighted squared Mahalanobis distances.
@@ -96,8 +98,17 @@ pub(super) struct Aligned {
     pub links: Vec<Link>,
     /// Evidence against chance, nats.
     pub log_odds: f64,
-    /// The part of it that the newest frame has, each of its fruits for itself.
-    pub own_nats: f64,
+    /// Part of the sightings that are in the map.
+    share: f64,
+}
+
+impl Aligned {
+    /// What the fruits of the newest frame say, each for itself, of a pose and a slip that are not known better than
+    /// `doubt`, nats.
+    pub fn own_nats(&self, sightings: &[Sighting], map: &KnownFruits, doubt: &Joint) -> f64 {
+        let own = sightings.iter().filter(|seen| seen.age == 0);
+        own.map(|seen| say(seen, map, &self.pose, &self.slip, doubt, self.share, None).evidence(self.share)).sum()
+    }
 }
 
 /// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
@@ -130,15 +141,16 @@ fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, sha
         .collect();
     let (information, _) = normal(&says, slip);
     let (share, log_odds) = best_share(&says);
-    let own_nats = says.iter().filter(|say| say.age == 0).map(|say| say.evidence(share)).sum();
-    Aligned { pose, slip: *slip, information, says, links, log_odds, own_nats }
+    Aligned { pose, slip: *slip, information, says, links, log_odds, share }
 }
 
-/// What a frame says of a pose that is expected, by its fruits as they lie, nats.
-pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> f64 {
+/// What a frame says of a pose that is expected, by its fruits as they lie, nats, and which they may be.
+pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> (f64, Vec<Link>) {
     let (slip, doubt) = (Slip::none(), Slip::none().doubt(&expected.covariance));
-    let says = |seen| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, None);
-    best_share(&frame.iter().map(says).collect::<Vec<_>>()).1
+    let mut links = Vec::new();
+    let says = |(row, seen)| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, Some((row, &mut links)));
+    let nats = best_share(&frame.iter().enumerate().map(says).collect::<Vec<_>>()).1;
+    (nats, links)
 }
 
 fn say(
@@ -170,19 +182,19 @@ fn say(
         information: Matrix3::zeros(),
         slopes,
         best: None,
+        best_weight: 0.0,
         pull: Vector3::zeros(),
         squared: 0.0,
         ratio: total / density,
     };
-    let mut most = 0.0;
     for one in &near {
         let weight = share * one.height / whole;
         says.weight += weight;
         says.information += one.inverse * weight;
         says.pull += one.inverse * one.error * weight;
         says.squared += weight * one.squared;
-        if one.height > most {
-            (most, says.best) = (one.height, Some(one.row));
+        if weight > says.best_weight {
+            (says.best_weight, says.best) = (weight, Some(one.row));
         }
     }
     if let Some((sighting, links)) = links {
