@@ -29,7 +29,7 @@ pub(super) type Joint = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 const TURNS: usize = 20;
 
 /// By how much the doubt of the pose shrinks in a turn: a quarter of its variance is left.
-const SHRINKING: f64 = 0.25;
+pub(super) const SHRINKING: f64 = 0.25;
 
 /// Turns before which nothing is settled: the doubt is still wider than a fruit.
 const WIDE_TURNS: usize = 4;
@@ -82,7 +82,7 @@ pub(super) struct Say {
 
 impl Say {
     /// Evidence against chance where a `share` of the sightings is in the map, nats.
-    fn evidence(&self, share: f64) -> f64 {
+    pub fn evidence(&self, share: f64) -> f64 {
         (1.0 - share + share * self.ratio).ln()
     }
 }
@@ -99,15 +99,13 @@ pub(super) struct Aligned {
     /// Evidence against chance, nats.
     pub log_odds: f64,
     /// Part of the sightings that are in the map.
-    share: f64,
+    pub share: f64,
 }
 
 impl Aligned {
-    /// What the fruits of the newest frame say, each for itself, of a pose and a slip that are not known better than
-    /// `doubt`, nats.
-    pub fn own_nats(&self, sightings: &[Sighting], map: &KnownFruits, doubt: &Joint) -> f64 {
-        let own = sightings.iter().filter(|seen| seen.age == 0);
-        own.map(|seen| say(seen, map, &self.pose, &self.slip, doubt, self.share, None).evidence(self.share)).sum()
+    /// What the fruits of the newest frame say of it, each for itself, nats.
+    pub fn own_nats(&self) -> f64 {
+        self.says.iter().filter(|say| say.age == 0).map(|say| say.evidence(self.share)).sum()
     }
 }
 
@@ -153,7 +151,7 @@ pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFrui
     (nats, links)
 }
 
-fn say(
+pub(super) fn say(
     seen: &Sighting,
     map: &KnownFruits,
     pose: &Pose,

@@ -6,6 +6,7 @@ use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
 use super::doubt::Doubt;
 use super::known::KnownFruits;
+use super::own::own_nats;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
 use super::slip::{Slip, lost_by_fit};
@@ -128,7 +129,7 @@ impl Localizer {
     ) -> Result<Localization> {
         seen.validate()?;
         told.map_or(Ok(()), ToldMotion::validate)?;
-        let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
+        let step = self.motions.next(told, &mut self.window);
         let measured = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
         let motion = measured.or_else(|| self.belief.map(|belief| Motion::repeated(belief.motion)));
         let predicted = self.belief.zip(motion).map(|(belief, motion)| belief.after(&motion));
@@ -188,8 +189,11 @@ impl Localizer {
         // What few fruits leave open, the motion tells.
         let expected = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
         // A motion that nobody told is fitted to the newest frame: what is not known of it counts below.
-        let doubt = if untold.is_some() { Joint::zeros() } else { joint };
-        let mut own_nats = settled.aligned.own_nats(&settled.sightings, &self.map, &doubt);
+        let frame = self.window.newest();
+        let mut own_nats = match untold {
+            Some(_) => settled.aligned.own_nats(),
+            None => own_nats(&expected, frame, &self.map, settled.aligned.share),
+        };
         if let (Some(_), Some(window)) = (untold, &mut settled.window) {
             window.learn(&joint.fixed_view::<6, 6>(6, 6).into_owned());
             if !self.window.newest().is_empty() {
@@ -252,9 +256,7 @@ impl Localizer {
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let start = Belief { pose: start, covariance: doubt, motion: None };
         let aligned = align(sightings, &self.map, &start, &Slip::none());
-        let believed = self
-            .believed(&aligned, up, SEARCHED_NATS)
-            .filter(|_| aligned.own_nats(sightings, &self.map, &Joint::zeros()) >= 0.0);
+        let believed = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0);
         let Some(joint) = believed else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };

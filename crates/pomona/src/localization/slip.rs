@@ -43,9 +43,9 @@ impl Slip {
         Self { since, covariance: unnoticed(), ..Self::none() }
     }
 
-    /// Of the last motion alone, which was not told but expected with this covariance.
-    pub fn unknown(covariance: &Matrix6<f64>) -> Self {
-        Self { since: 1, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
+    /// Of the last motions, by chance: together they err with this covariance.
+    pub fn by_chance(since: usize, covariance: &Matrix6<f64>) -> Self {
+        Self { since, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
     }
 
     /// What is not known of it once it is taken off: a slip of the next motion.
