@@ -184,6 +184,13 @@ def test_covariances_count_what_motions_err_by(fruits):
     assert 3 < np.nanmean(nees) < 9
 
 
+@pytest.mark.parametrize("lie", [(0.0, 0.02, 0.0), (0.05, 0.0, 0.0), (0.0, 0.0, 0.5)])
+def test_a_lie_that_was_noticed_does_not_lose_the_camera(lie):
+    drives = [drive(Case(3, 1.0, lie), seed) for seed in range(3)]
+    assert np.mean(np.isfinite(np.concatenate([one.off_m for one in drives]))) > 0.93
+    assert np.nanmean(np.concatenate([one.nees for one in drives])) < 9.0
+
+
 def test_a_lie_that_ends_is_noticed_too(row, fresh):
     before = None
     for number, x_m in enumerate(np.arange(1.5, 6.5, 0.1)):
@@ -299,6 +306,12 @@ def test_strangers_are_no_match(localizer):
     assert found.map_from_camera is None
     assert np.isnan(found.position_m).all()
     assert len(found.pairs) == 0
+
+
+@pytest.mark.parametrize("smaller", [30, 1000])
+def test_fruits_that_all_hang_within_the_noise_give_no_pose(row, smaller):
+    localizer = Localizer(row.on_map / smaller)
+    assert not localizer.locate(seen_from(row, pose_at(4.0), 1).positions / smaller)
 
 
 def test_fruits_that_are_gone_are_not_looked_for(row):

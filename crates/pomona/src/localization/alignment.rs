@@ -29,7 +29,7 @@ pub(super) type Joint = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 const TURNS: usize = 20;
 
 /// By how much the doubt of the pose shrinks in a turn: a quarter of its variance is left.
-const SHRINKING: f64 = 0.25;
+pub(super) const SHRINKING: f64 = 0.25;
 
 /// Turns before which nothing is settled: the doubt is still wider than a fruit.
 const WIDE_TURNS: usize = 4;
@@ -70,6 +70,8 @@ pub(super) struct Say {
     pub slopes: SMatrix<f64, 3, UNKNOWNS>,
     /// The fruit with the largest weight.
     pub best: Option<usize>,
+    /// That weight.
+    pub best_weight: f64,
     /// Its pull: the sum of weighted inverse covariances times residuals.
     pub pull: Vector3<f64>,
     /// Sum of the weighted squared Mahalanobis distances.
@@ -80,7 +82,7 @@ pub(super) struct Say {
 
 impl Say {
     /// Evidence against chance where a `share` of the sightings is in the map, nats.
-    fn evidence(&self, share: f64) -> f64 {
+    pub fn evidence(&self, share: f64) -> f64 {
         (1.0 - share + share * self.ratio).ln()
     }
 }
@@ -96,8 +98,15 @@ pub(super) struct Aligned {
     pub links: Vec<Link>,
     /// Evidence against chance, nats.
     pub log_odds: f64,
-    /// The part of it that the newest frame has, each of its fruits for itself.
-    pub own_nats: f64,
+    /// Part of the sightings that are in the map.
+    pub share: f64,
+}
+
+impl Aligned {
+    /// What the fruits of the newest frame say of it, each for itself, nats.
+    pub fn own_nats(&self) -> f64 {
+        self.says.iter().filter(|say| say.age == 0).map(|say| say.evidence(self.share)).sum()
+    }
 }
 
 /// Settles a pose that is expected at `told` if the motions have not slipped, and by how much they have.
@@ -130,18 +139,19 @@ fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, sha
         .collect();
     let (information, _) = normal(&says, slip);
     let (share, log_odds) = best_share(&says);
-    let own_nats = says.iter().filter(|say| say.age == 0).map(|say| say.evidence(share)).sum();
-    Aligned { pose, slip: *slip, information, says, links, log_odds, own_nats }
+    Aligned { pose, slip: *slip, information, says, links, log_odds, share }
 }
 
-/// What a frame says of a pose that is expected, by its fruits as they lie, nats.
-pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> f64 {
+/// What a frame says of a pose that is expected, by its fruits as they lie, nats, and which they may be.
+pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> (f64, Vec<Link>) {
     let (slip, doubt) = (Slip::none(), Slip::none().doubt(&expected.covariance));
-    let says = |seen| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, None);
-    best_share(&frame.iter().map(says).collect::<Vec<_>>()).1
+    let mut links = Vec::new();
+    let says = |(row, seen)| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, Some((row, &mut links)));
+    let nats = best_share(&frame.iter().enumerate().map(says).collect::<Vec<_>>()).1;
+    (nats, links)
 }
 
-fn say(
+pub(super) fn say(
     seen: &Sighting,
     map: &KnownFruits,
     pose: &Pose,
@@ -170,19 +180,19 @@ fn say(
         information: Matrix3::zeros(),
         slopes,
         best: None,
+        best_weight: 0.0,
         pull: Vector3::zeros(),
         squared: 0.0,
         ratio: total / density,
     };
-    let mut most = 0.0;
     for one in &near {
         let weight = share * one.height / whole;
         says.weight += weight;
         says.information += one.inverse * weight;
         says.pull += one.inverse * one.error * weight;
         says.squared += weight * one.squared;
-        if one.height > most {
-            (most, says.best) = (one.height, Some(one.row));
+        if weight > says.best_weight {
+            (says.best_weight, says.best) = (weight, Some(one.row));
         }
     }
     if let Some((sighting, links)) = links {

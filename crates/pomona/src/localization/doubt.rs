@@ -2,7 +2,9 @@
 //!
 //! Frames that are joined have their evidence together, and the newest one may have no part of it: a motion that was told
 //! wrong lays the frames before where they were, and the newest fruits beside. So what these say for themselves has to
-//! be above chance. What they say against a pose adds up from frame to frame, until they have said as much for it.
+//! be above chance, under what is not known of the pose (`own`). What they say against a pose adds up from frame to frame,
+//! until they have said as much for it. Until then the pose is not told, but kept, with what was learned of the motions, as
+//! long as fruits can be looked for around it.
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Doubt {

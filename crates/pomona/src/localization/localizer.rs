@@ -6,6 +6,7 @@ use super::belief::{Belief, Motion};
 use super::config::LocalizationConfig;
 use super::doubt::Doubt;
 use super::known::KnownFruits;
+use super::own::own_nats;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
 use super::slip::{Slip, lost_by_fit};
@@ -21,9 +22,13 @@ use crate::matching::{MapIndex, Method};
 use crate::pose::Pose;
 use crate::verified::compact::Bytes;
 use nalgebra::{Matrix6, Vector3, Vector6};
+use std::collections::BTreeSet;
 
 /// Fruits in the map below which a pose has no redundancy: three fix it.
 const MIN_PAIRED: f64 = 4.0;
+
+/// Fruits of the map below which sightings fix no pose: any may be any where all hang within the noise.
+const MIN_APART: usize = 3;
 
 /// Standard deviations of a pose that the matcher found: metres, radians.
 const MATCHED: (f64, f64) = (0.02, 0.02);
@@ -33,6 +38,12 @@ const LOST_M: f64 = 0.1;
 
 /// The same of a direction that motion alone tells, radians: false are those beyond 5 degrees.
 const LOST_RAD: f64 = 0.03;
+
+/// A pose that is not told may still be one to look around, as long as fruits are looked for that far, metres.
+const KEPT_M: f64 = 0.25;
+
+/// The same of its direction, radians: so far it lays fruits at 2 m.
+const KEPT_RAD: f64 = 0.125;
 
 /// Least probability of a reported pair; a wrong pair costs a third of what a right one is worth.
 const MIN_PROBABILITY: f64 = 0.25;
@@ -118,7 +129,7 @@ impl Localizer {
     ) -> Result<Localization> {
         seen.validate()?;
         told.map_or(Ok(()), ToldMotion::validate)?;
-        let step = self.motions.next(told.map(|told| &told.previous_from_camera), &mut self.window);
+        let step = self.motions.next(told, &mut self.window);
         let measured = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
         let motion = measured.or_else(|| self.belief.map(|belief| Motion::repeated(belief.motion)));
         let predicted = self.belief.zip(motion).map(|(belief, motion)| belief.after(&motion));
@@ -141,11 +152,11 @@ impl Localizer {
             }
             self.found_again(guess.as_ref(), up)?
         };
-        if !found.tracked {
+        self.learn(&found, step.as_ref(), guess.as_ref());
+        if !found.tracked && (found.pose.is_some() || self.belief.is_none()) {
             // Whatever the camera lost itself by may be what was learned.
             self.motions = ToldMotions::default();
         }
-        self.learn(&found, step.as_ref(), guess.as_ref());
         Ok(found)
     }
 
@@ -168,14 +179,21 @@ impl Localizer {
         };
         let Some(joint) = self.believed(&settled.aligned, up, 0.0) else {
             let expected = self.motions.ahead(told);
-            let own_nats = evidence_at(&expected, self.window.newest(), &self.map);
-            return Guess { expected, followed: None, doubt: self.doubt.after(own_nats) };
+            let frame = self.window.newest();
+            let (own_nats, links) = evidence_at(&expected, frame, &self.map);
+            let pairs = pairs(&links, frame);
+            return Guess { expected, followed: None, pairs, doubt: self.doubt.after(own_nats) };
         };
-        let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
+        let covariance = joint.fixed_view::<6, 6>(0, 0) + settled.spread;
         let found = Belief { pose: settled.aligned.pose, covariance, motion: told.motion };
         // What few fruits leave open, the motion tells.
         let expected = settled.predicted.map_or(found, |predicted| found.joined(&predicted));
-        let mut own_nats = settled.aligned.own_nats;
+        // A motion that nobody told is fitted to the newest frame: what is not known of it counts below.
+        let frame = self.window.newest();
+        let mut own_nats = match untold {
+            Some(_) => settled.aligned.own_nats(),
+            None => own_nats(&expected, frame, &self.map, settled.aligned.share),
+        };
         if let (Some(_), Some(window)) = (untold, &mut settled.window) {
             window.learn(&joint.fixed_view::<6, 6>(6, 6).into_owned());
             if !self.window.newest().is_empty() {
@@ -183,7 +201,7 @@ impl Localizer {
             }
         }
         let doubt = self.doubt.after(own_nats);
-        Guess { expected, followed: Some(Followed { settled, joint }), doubt }
+        Guess { expected, followed: Some(Followed { settled, joint }), pairs: Vec::new(), doubt }
     }
 
     /// Takes up a pose that the fruits agree with.
@@ -200,12 +218,14 @@ impl Localizer {
     fn found_again(&mut self, guess: Option<&Guess>, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
         let found = self.search_anew(up)?;
         let poor = self.window.newest().len() < self.config.enough_fruits && found.verdict != Verdict::Found;
-        let carried =
-            guess.filter(|guess| poor && guess.followed.is_none() && guess.doubt.is_none() && guess.is_sharp());
+        let carried = guess.filter(|guess| {
+            poor && guess.followed.is_none() && guess.doubt.is_none() && guess.is_within(LOST_M, LOST_RAD)
+        });
         Ok(carried.map_or(found, |guess| Localization {
             verdict: Verdict::Found,
             pose: Some(guess.expected.pose),
             covariance: guess.expected.covariance,
+            pairs: guess.pairs.clone(),
             tracked: true,
             ..Localization::without_pose(Verdict::TooFew)
         }))
@@ -236,7 +256,7 @@ impl Localizer {
         let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
         let start = Belief { pose: start, covariance: doubt, motion: None };
         let aligned = align(sightings, &self.map, &start, &Slip::none());
-        let believed = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats >= 0.0);
+        let believed = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0);
         let Some(joint) = believed else {
             return Ok(Localization::without_pose(Verdict::NoMatch));
         };
@@ -250,7 +270,7 @@ impl Localizer {
     fn believed(&self, aligned: &Aligned, up: Option<[Vector3<f64>; 2]>, chosen_nats: f64) -> Option<Joint> {
         let paired: f64 = aligned.says.iter().map(|say| say.voice * say.weight).sum();
         let needed = FITTED_NATS + chosen_nats - self.config.false_alarm_rate.ln();
-        let enough = paired >= MIN_PAIRED && aligned.log_odds >= needed;
+        let enough = paired >= MIN_PAIRED && told_apart(aligned) >= MIN_APART && aligned.log_odds >= needed;
         let sag = Sag::new(&self.config, up.map(|[_, of_map]| of_map));
         enough.then(|| covariance(aligned, &self.map, &self.window.way(), &sag)).flatten()
     }
@@ -273,11 +293,11 @@ impl Localizer {
         if let Some(pose) = found.pose {
             let motion = previous_from_camera.copied().or_else(|| before.map(|before| pose.seen_from(&before)));
             self.belief = Some(Belief { pose, covariance: found.covariance, motion });
-        } else if let Some(guess) = guess.filter(|guess| !guess.doubt.is_none()) {
+        } else if let Some(guess) = guess {
             if guess.doubt.is_sure(self.config.false_alarm_rate) {
                 // What lies before may lie elsewhere.
                 self.window.keep(guess.doubt.frames());
-            } else if guess.is_sharp() {
+            } else if guess.is_within(KEPT_M, KEPT_RAD) {
                 (self.belief, self.doubt) = (Some(guess.expected), guess.doubt);
             }
         }
@@ -289,6 +309,8 @@ struct Guess {
     /// By motion, and by fruits where they agree.
     expected: Belief,
     followed: Option<Followed>,
+    /// Fruits of the newest frame where motion alone tells where it is.
+    pairs: Vec<MapPair>,
     /// Whether the newest frame is against it.
     doubt: Doubt,
 }
@@ -300,9 +322,9 @@ impl Guess {
         Some((self.expected, followed))
     }
 
-    /// Whether it is known well enough to be a pose.
-    fn is_sharp(&self) -> bool {
-        self.expected.sigma_m() < LOST_M && self.expected.sigma_rad() < LOST_RAD
+    /// Whether place and direction are known as well as this, metres and radians.
+    fn is_within(&self, place_m: f64, turn_rad: f64) -> bool {
+        self.expected.sigma_m() < place_m && self.expected.sigma_rad() < turn_rad
     }
 }
 
@@ -311,6 +333,12 @@ struct Followed {
     settled: Settled,
     /// Covariance of the pose and its slip.
     joint: Joint,
+}
+
+/// Fruits of the map that sightings show rather than others.
+fn told_apart(aligned: &Aligned) -> usize {
+    let shown = aligned.says.iter().filter(|say| say.best_weight >= MIN_PROBABILITY).filter_map(|say| say.best);
+    shown.collect::<BTreeSet<_>>().len()
 }
 
 /// One to one, of the newest frame.

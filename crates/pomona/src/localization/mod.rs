@@ -9,7 +9,7 @@
 //! 4. A frame with few fruits is joined by the frames before it (`window`); where there are none at all, the motion
 //!    alone carries the pose as long as it is sure (`belief`).
 //! 5. Motions that are told and fall short alike are noticed and put right (`told_motions`, `slip`).
-//! 6. A pose that the fruits of the newest frame contradict is lost, and looked for from nothing (`doubt`).
+//! 6. A pose that the fruits of the newest frame contradict is lost, and looked for from nothing (`own`, `doubt`).
 //!
 //! Equations, assumptions and limits: `docs/localization.md`.
 
@@ -20,6 +20,7 @@ mod config;
 mod doubt;
 mod known;
 mod localizer;
+mod own;
 mod residuals;
 mod shared;
 mod sightings;

@@ -43,9 +43,16 @@ impl Slip {
         Self { since, covariance: unnoticed(), ..Self::none() }
     }
 
-    /// Of the last motion alone, which was not told but expected with this covariance.
-    pub fn unknown(covariance: &Matrix6<f64>) -> Self {
-        Self { since: 1, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
+    /// Of the last motions, by chance: together they err with this covariance.
+    pub fn by_chance(since: usize, covariance: &Matrix6<f64>) -> Self {
+        Self { since, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
+    }
+
+    /// What is not known of it once it is taken off: a slip of the next motion.
+    pub fn left(&self) -> Self {
+        let part = self.part(1);
+        let covariance = self.covariance * (part * part);
+        Self { since: 1, total: Vector6::zeros(), covariance, expected: covariance }
     }
 
     /// The same, one motion later.
@@ -78,12 +85,13 @@ impl Slip {
         self.total * self.part(1)
     }
 
-    /// Where the camera is expected that `told` has elsewhere.
+    /// Where the camera is expected that `told` has elsewhere. What is not known of the slip errs alike in all its motions:
+    /// n of them are off by n^2 times the variance of one, to which the last adds 2 n - 1.
     pub fn ahead(&self, told: &Belief) -> Belief {
         let part = self.part(1);
         Belief {
             pose: moved(&told.pose, &self.of_a_motion()),
-            covariance: told.covariance + self.covariance * (part * part),
+            covariance: told.covariance + self.covariance * (part * (2.0 - part)),
             motion: told.motion,
         }
     }
@@ -119,7 +127,7 @@ impl Slip {
 
     /// What is expected of the slip: its information, and the pull back to none.
     pub fn expected(&self) -> (Matrix6<f64>, Vector6<f64>) {
-        let information = Matrix6::from_diagonal(&self.expected.diagonal().map(f64::recip));
+        let information = self.expected.try_inverse().unwrap_or_else(Matrix6::zeros);
         (information, -(information * self.total))
     }
 
@@ -133,7 +141,7 @@ pub(super) fn evidence(aligned: &Aligned) -> f64 {
     let (expected, back) = aligned.slip.expected();
     let Some(factor) = aligned.information.cholesky() else { return f64::NEG_INFINITY };
     let volume: f64 = factor.l_dirty().diagonal().iter().map(|side| side.ln()).sum();
-    let before: f64 = expected.diagonal().iter().map(|information| 0.5 * information.ln()).sum();
+    let before = 0.5 * expected.determinant().ln();
     aligned.log_odds + 0.5 * aligned.slip.total.dot(&back) - volume + before
 }
 

@@ -75,6 +75,11 @@ impl Window {
         self.motions.iter().copied().collect()
     }
 
+    /// Covariance of the last motions together.
+    pub fn erred(&self, motions: usize) -> Matrix6<f64> {
+        self.motions.iter().take(motions).sum()
+    }
+
     /// Sightings of the newest frame.
     pub fn newest(&self) -> &[Sighting] {
         self.frames.front().map_or(&[], |(_, seen)| seen)
