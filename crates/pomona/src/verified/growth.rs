@@ -26,6 +26,9 @@ const WHOLE_ROUNDS: usize = 2;
 /// A patch, and its surroundings, may differ from the pose that they had as if this many pairs held them to it.
 pub(super) const HOLD: f64 = 2.0;
 
+/// Evidence in nats of a cell and its neighbours that lets growth go on from there.
+const CONVINCING: f64 = 2.0;
+
 /// A pose that grows over the cells of the query.
 #[derive(Debug)]
 pub(crate) struct Growth<'a> {
@@ -192,7 +195,7 @@ impl<'a> Growth<'a> {
     pub(super) fn convincing(&self, i: usize) -> bool {
         let cell = &self.patches.cells[i];
         let around = || cell.around.iter().map(|&(other, closeness)| closeness * self.log_odds[other as usize]);
-        self.whole || cell.reached && around().sum::<f64>() > 0.0
+        self.whole || cell.reached && around().sum::<f64>() > CONVINCING
     }
 
     /// Looks once at the cells that growth did not reach: a crown may be cut off by a gap without fruits.
