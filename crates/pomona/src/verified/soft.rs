@@ -42,7 +42,8 @@ fn pulls_at(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement,
             sum += partner * ratio;
             total += ratio;
         });
-        let likelihood = 1.0 - model.detection + model.detection * total;
+        // Where the map shows nothing a fruit says nothing.
+        let likelihood = model.missed(map.support.at(&place)) + model.detection * total;
         evidence.multiply(likelihood);
         if total > 0.0 {
             pulls.add(p, &(sum / total), model.detection * total / likelihood);
