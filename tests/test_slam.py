@@ -1,65 +1,26 @@
 """Ways by fruits alone: drawn graphs and rows whose truth is known."""
 
 import gc
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.drawn_drives import SIGMAS, drawn_drive, drawn_row, exp, facing, log, measured, neighbours, seen, wobbling
 
 from pomona import FruitCloud
 from pomona.errors import PomonaError
 from pomona.survey.refinement import Motions, SeenFruits, refine
-from pomona.survey.slam import Anchors, Constellations, FruitSlam, FruitWay, PlacedFrame, chained, way_by_fruits
+from pomona.survey.slam import Anchors, Constellations, FruitSlam, FruitWay, chained, way_by_fruits
 from pomona.survey.slam.consistency import explained
-from pomona.survey.slam.constellation_links import ConstellationLink
 from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.identities_of_links import joined_fruits
 from pomona.survey.slam.loops import Loop, joined
-from pomona.survey.slam.odometry_errors import OdometryErrors, VectorErrors, learnt_errors
-from pomona.survey.slam.placing import placings
 from pomona.survey.slam.spanning import spanned_poses
 
 NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
-NO_PAIRS = np.zeros((0, 2), np.int64)
-SIGMAS = np.array([0.02, 0.02, 0.03, 0.004, 0.004, 0.004])
-
-
-def exp(step: np.ndarray) -> np.ndarray:
-    moved = np.eye(4)
-    moved[:3, :3], moved[:3, 3] = Rotation.from_rotvec(step[3:]).as_matrix(), step[:3]
-    return moved
-
-
-def log(pose: np.ndarray) -> np.ndarray:
-    return np.concatenate([pose[:3, 3], Rotation.from_matrix(pose[:3, :3]).as_rotvec()])
-
-
-def drawn_drive(rng: np.random.Generator, n: int) -> np.ndarray:
-    """A camera that goes round in a circle and wobbles."""
-    turn = exp(np.array([0.3, 0.0, 0.05, 0.0, 2 * np.pi / n, 0.0]))
-    poses = [np.eye(4)]
-    for _ in range(n - 1):
-        poses.append(poses[-1] @ turn @ exp(rng.normal(0, 0.01, 6)))
-    return np.array(poses)
-
-
-def measured(rng: np.random.Generator, true: np.ndarray, pairs: list[tuple[int, int]], doubtful: bool) -> Motions:
-    first, second = np.array(pairs, np.int64).T
-    noise = [exp(SIGMAS * rng.normal(size=6)) for _ in pairs]
-    return Motions(
-        first=first,
-        second=second,
-        first_from_second=np.linalg.inv(true[first]) @ true[second] @ np.array(noise),
-        information=np.tile(np.diag(SIGMAS**-2.0), (len(pairs), 1, 1)),
-        doubtful=np.full(len(pairs), doubtful),
-    )
-
-
-def neighbours(n: int) -> list[tuple[int, int]]:
-    return [(row, row + 1) for row in range(n - 1)]
+NAN, MIRROR = np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 def test_covariances_of_a_graph_are_those_of_its_errors() -> None:
@@ -105,38 +66,6 @@ def test_false_loops_are_refused_and_true_ones_kept(seed: int) -> None:
     drift, left = (log(np.linalg.inv(poses[-1]) @ true[-1]) for poses in (start, adjusted.session_from_camera))
     assert np.linalg.norm(left[:3]) < 0.15
     assert np.linalg.norm(left[:3]) < np.linalg.norm(drift[:3])
-
-
-def drawn_row(rng: np.random.Generator, length_m: float) -> np.ndarray:
-    """Fruits in clusters of up to three: x along the row, y down, z into it."""
-    spurs = rng.uniform([-1.0, -0.8, -0.25], [length_m + 1, 0.8, 0.25], (int(28 * length_m), 3))
-    fruits = np.repeat(spurs, rng.integers(1, 4, len(spurs)), axis=0)
-    return fruits + rng.normal(0, 0.05, fruits.shape)
-
-
-def seen(rng: np.random.Generator, fruits: np.ndarray, pose: np.ndarray) -> FruitCloud:
-    """What a camera sees of them: a part is hidden, and depth is poorer than direction."""
-    places = (fruits - pose[:3, 3]) @ pose[:3, :3]
-    inside = (
-        (places[:, 2] > 0.5) & (np.abs(places[:, 0]) < 0.7 * places[:, 2]) & (np.abs(places[:, 1]) < 0.5 * places[:, 2])
-    )
-    places = places[inside & (rng.uniform(size=len(places)) < 0.8)]
-    sigmas = np.array([0.003, 0.003, 0.008])
-    covariances = np.tile(np.diag(sigmas**2), (len(places), 1, 1))
-    return FruitCloud(positions=places + sigmas * rng.normal(size=places.shape), covariances=covariances)
-
-
-def facing(x_m: float, beyond: bool = False) -> np.ndarray:
-    """A camera 1.5 m from the row; beyond it, it looks back."""
-    pose = np.eye(4)
-    pose[:3, 3] = [x_m, 0.0, 1.5 if beyond else -1.5]
-    if beyond:
-        pose[:3, :3] = np.diag([-1.0, 1.0, -1.0])
-    return pose
-
-
-def wobbling(rng: np.random.Generator, poses: list[np.ndarray]) -> np.ndarray:
-    return np.array([pose @ exp(np.array([0.02] * 3 + [0.01] * 3) * rng.normal(size=6)) for pose in poses])
 
 
 def walked(seed: int, true: list[np.ndarray], length_m: float) -> tuple[FruitWay, np.ndarray]:
@@ -296,9 +225,6 @@ def test_a_frame_is_kept_in_some_kilobytes() -> None:
         bytes_used.append(int(Path("/proc/self/statm").read_text().split()[1]) * 4096)
     kept = (bytes_used[-1] - bytes_used[23]) / 24
     assert kept < 100 * 1024, f"{kept / 1024:.0f} kB a frame"
-
-
-NAN, MIRROR = np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -465,123 +391,3 @@ def test_a_fruit_is_once_in_a_frame() -> None:
     fruits = joined_fruits(np.arange(4), frames, [(0, 2), (2, 3), (1, 3)])
     # The last pair would make both fruits of frame 0 one.
     assert fruits.tolist() == [0, 1, 0, 0]
-
-
-def told_drive(
-    seed: int, lie: Callable[[int, np.ndarray], np.ndarray]
-) -> tuple[FruitSlam, list[PlacedFrame], np.ndarray]:
-    """There and back with told motions that claim 3 mm and 2 mrad; where frames were as they came, and are."""
-    rng = np.random.default_rng(seed)
-    fruits, there = drawn_row(rng, 2.5), [0.15 * step for step in range(14)]
-    true = wobbling(rng, [facing(x_m) for x_m in (*there, *there[::-1])])
-    slam, claimed, placed = FruitSlam(threads=1), np.array([0.003] * 3 + [0.002] * 3), []
-    for row, pose in enumerate(true):
-        cloud = seen(rng, fruits, pose)
-        if row:
-            moved = lie(row, np.linalg.inv(true[row - 1]) @ pose) @ exp(claimed * rng.normal(size=6))
-            placed.append(slam.add(cloud, moved, np.diag(claimed**-2.0)))
-        else:
-            placed.append(slam.add(cloud))
-    return slam, placed, np.linalg.inv(true[0]) @ true
-
-
-def far_off_m(placed: list[PlacedFrame], true: np.ndarray) -> float:
-    """How far off the worst frame of the first part was when it came."""
-    here = zip(placed, true, strict=True)
-    return max(
-        float(np.linalg.norm((frame.session_from_camera - pose)[:3, 3])) for frame, pose in here if not frame.part
-    )
-
-
-def test_wheels_that_are_steadily_too_large_close_their_loops() -> None:
-    def too_far(row: int, moved: np.ndarray) -> np.ndarray:
-        del row
-        return np.concatenate([np.concatenate([moved[:3, :3], 1.1 * moved[:3, 3:]], axis=1), moved[3:]])
-
-    slam, placed, true = told_drive(4, too_far)
-    way = slam.way()
-    assert way.loops
-    assert way.refused_loops == 0
-    assert np.linalg.norm((way.session_from_camera - true)[:, :3, 3], axis=1).max() < 0.04
-    # The first frames have but one link each, beside a motion that contradicts it: nobody knows which is right.
-    assert [frame.part for frame in placed[7:]] == [0] * 21
-    assert far_off_m(placed, true) < 0.1
-
-
-def test_a_frame_is_placed_by_its_fruits_where_its_motion_lies() -> None:
-    def lie(row: int, moved: np.ndarray) -> np.ndarray:
-        return moved @ exp(np.array([0.5, 0, 0, 0, 0, 0])) if row == 9 else moved
-
-    _, placed, true = told_drive(4, lie)
-    assert {frame.part for frame in placed} == {0}
-    assert far_off_m(placed, true) < 0.06
-
-
-@pytest.mark.parametrize(
-    ("scale", "offset", "factor"),
-    [(1.0, (0, 0, 0), 1.0), (0.9, (0, 0, 0), 1.0), (1.0, (0, 0.03, 0), 1), (1.0, (0, 0, 0), 64)],
-)
-@pytest.mark.parametrize("seed", range(3))
-def test_what_odometry_errs_by_is_learnt(seed: int, scale: float, offset: tuple[float, ...], factor: float) -> None:
-    """Of ways; turns are told rightly. Some motions slip besides."""
-    rng = np.random.default_rng(seed)
-    true, sigmas = drawn_drive(rng, 60), np.array([0.003] * 3 + [0.002] * 3)
-    told, links = [], []
-    for row in range(59):
-        moved = np.linalg.inv(true[row]) @ true[row + 1]
-        link = moved @ exp(2 * sigmas * rng.normal(size=6))
-        links.append(ConstellationLink(row, row + 1, link, np.diag((2 * sigmas) ** -2.0), NO_PAIRS, np.zeros(0)))
-        moved[:3, 3] = (moved[:3, 3] - moved[:3, :3] @ offset) / scale
-        spread = np.repeat([factor**0.5, 1.0], 3) * sigmas
-        told.append(moved @ exp(spread * rng.normal(size=6) + (row % 15 == 7) * np.array([0.5, 0, 0, 0, 0, 0])))
-    rows = np.arange(59)
-    motions = Motions(rows, rows + 1, np.array(told), np.tile(np.diag(sigmas**-2.0), (59, 1, 1)), np.ones(59, bool))
-    learnt = learnt_errors(motions, links)
-    assert learnt.way.scale == pytest.approx(scale, abs=0.01)
-    assert learnt.way.offset == pytest.approx(offset, abs=0.004)
-    assert factor / 4 <= learnt.way.factor <= factor * 4
-    assert learnt.turn == VectorErrors()
-    if (scale, offset, factor) == (1.0, (0, 0, 0), 1.0):
-        assert learnt == OdometryErrors(), "a claim that holds is not mended"
-    trusted = motions.trusted()
-    assert learnt.mended(trusted) is trusted
-
-
-def test_a_frame_whose_ties_contradict_each_other_begins_a_part_unless_one_side_has_more() -> None:
-    """Ties of 5 mm from the two frames before: they agree, they do not, and two agree against one."""
-    ahead = np.tile(np.eye(4), (3, 1, 1))
-    ahead[:, 0, 3] = [0.2, 0.2, 0.7]
-    parts, poses = np.zeros(1, np.int64), np.eye(4)[None]
-
-    def placed(*rows: int) -> list[float]:
-        n = len(rows)
-        ties = Motions(
-            np.zeros(n, np.int64), np.ones(n, np.int64), ahead[list(rows)], np.tile(4e4 * np.eye(6), (n, 1, 1))
-        )
-        return [float(placing.pose[0, 3]) for placing in placings(parts, poses, ties)]
-
-    assert placed(0) == [0.2]
-    assert placed(0, 1) == [0.2]
-    assert placed(0, 2) == []
-    assert placed(2, 0, 1) == [0.2]
-    assert placed() == []
-
-
-def copied_trees(rng: np.random.Generator) -> np.ndarray:
-    """Three trees that are copies of each other to 5 mm, 1.2 m apart."""
-    tree = rng.uniform([-0.6, -0.7, -0.25], [0.6, 0.7, 0.25], (45, 3))
-    return np.concatenate([tree + np.array([1.2 * row, 0, 0]) + rng.normal(0, 0.005, tree.shape) for row in range(3)])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_no_link_jumps_a_tree_where_trees_are_copies(seed: int) -> None:
-    """The way past them may break; what hangs together lies right."""
-    rng = np.random.default_rng(seed)
-    fruits = copied_trees(rng)
-    true = wobbling(rng, [facing(0.15 * step - 0.2) for step in range(18)])
-    links = chained(Constellations([seen(rng, fruits, pose) for pose in true], threads=1))
-    assert len(links) > 18
-    left = [
-        np.linalg.inv(np.linalg.inv(true[link.first]) @ true[link.second]) @ link.first_from_second for link in links
-    ]
-    assert max(np.linalg.norm(pose[:3, 3]) for pose in left) < 0.1
