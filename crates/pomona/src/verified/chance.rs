@@ -109,46 +109,63 @@ pub(super) fn crowding(points: &[Vector3<f64>], neighbours: &Neighbours, spacing
     counts.iter().map(|n| (1.0 + inverse_shape * n) / (1.0 + inverse_shape * mean)).collect()
 }
 
-/// The radial density of fruits around a fruit, from the cloud's own pairs.
+/// The fruits around a fruit by their distance, from the cloud's own pairs.
 ///
 /// Fruits of a cluster keep their distance and crowd beyond it: there is no companion at 3 cm and many at 8 cm. What
 /// one visit shows around its own fruits is what chance shows around the fruits of another visit with the same noise.
 #[derive(Debug, Clone)]
 pub(super) struct Companions {
-    inverse_bin: f64,
-    densities: Vec<f64>,
+    bin: f64,
+    /// Mean number of fruits within a bin, two bins and so on of a fruit.
+    within: Vec<f64>,
 }
 
 impl Companions {
-    /// Bins of an eighth of the spacing: 3 cm in an orchard.
-    const BINS: usize = 12;
-    const BIN: f64 = 0.125;
+    /// Width of a bin in spacings: 1.1 cm in an orchard; counted up to 1.5 spacings.
+    const BIN: f64 = 1.0 / 24.0;
+    const BINS: usize = 36;
+
+    /// Half the width of what a density is the mean of, in bins: a shell of 3 cm in an orchard.
+    const HALF: f64 = 1.5;
 
     pub(super) fn new(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Self {
-        let inverse_bin = 1.0 / (Self::BIN * spacing);
-        let mut densities = vec![0.0; Self::BINS];
+        let bin = Self::BIN * spacing;
+        let mut within = vec![0.0; Self::BINS + 1];
         for (row, p) in points.iter().enumerate() {
             for &other in neighbours.of(row) {
-                let bin = ((points[other as usize] - p).norm() * inverse_bin) as usize;
-                if bin < Self::BINS {
-                    densities[bin] += 1.0;
+                let at = ((points[other as usize] - p).norm() / bin) as usize;
+                if at < Self::BINS {
+                    within[at + 1] += 1.0 / points.len() as f64;
                 }
             }
         }
-        let shell = 4.0 / 3.0 * std::f64::consts::PI / inverse_bin.powi(3) * points.len().max(1) as f64;
-        for (bin, density) in densities.iter_mut().enumerate() {
-            let (inner, outer) = (bin as f64, bin as f64 + 1.0);
-            *density /= shell * (outer.powi(3) - inner.powi(3));
-        }
-        Self { inverse_bin, densities }
+        (0..Self::BINS).for_each(|at| within[at + 1] += within[at]);
+        Self { bin, within }
     }
 
-    /// Linear between the middles of the bins.
-    pub(super) fn at(&self, distance: f64) -> f64 {
-        let place = (distance * self.inverse_bin - 0.5).clamp(0.0, Self::BINS as f64 - 1.001);
-        let (bin, rest) = (place as usize, place.fract());
-        self.densities[bin] * (1.0 - rest) + self.densities[bin + 1] * rest
+    /// Mean number of fruits between two distances from a fruit.
+    pub(super) fn between(&self, inner: f64, outer: f64) -> f64 {
+        self.up_to(outer) - self.up_to(inner)
     }
+
+    /// Fruits per volume at a distance from a fruit.
+    pub(super) fn density(&self, distance: f64) -> f64 {
+        let half = Self::HALF * self.bin;
+        let middle = distance.min(Self::BINS as f64 * self.bin - half);
+        let (inner, outer) = ((middle - half).max(0.0), middle + half);
+        self.between(inner, outer) / shell(inner, outer)
+    }
+
+    fn up_to(&self, distance: f64) -> f64 {
+        let place = (distance / self.bin).min(Self::BINS as f64 - 0.001);
+        let (at, rest) = (place as usize, place.fract());
+        self.within[at] * (1.0 - rest) + self.within[at + 1] * rest
+    }
+}
+
+/// Volume between two distances from a place.
+pub(super) fn shell(inner: f64, outer: f64) -> f64 {
+    4.0 / 3.0 * std::f64::consts::PI * (outer.powi(3) - inner.powi(3))
 }
 
 /// Gaussian of the distance of every neighbour, as wide as the spacing: a branch's reach.
@@ -165,6 +182,7 @@ pub(super) fn kinship(points: &[Vector3<f64>], neighbours: &Neighbours, spacing:
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::cloud::FruitCloud;
     use crate::verified::fixture::Dice;
     use crate::verified::landscape::{Landscape, median};
@@ -184,6 +202,19 @@ mod tests {
         for (found, least) in found.into_iter().zip([0.7, 0.6, 0.42]) {
             assert!((least..1.25).contains(&found), "{found}, expected {least} at least");
         }
+    }
+
+    #[test]
+    fn companions_are_counted_where_they_hang_and_in_full() {
+        // Twos, 9 cm apart, half a metre from the next: the sixth neighbour is the spacing, half a metre, a bin 2 cm.
+        let fruit = |i: i32| [0.5 * f64::from(i / 2), 0.5 * f64::from(i % 2), 0.0];
+        let fruits = (0..40).flat_map(|i| [0.0, 0.09].map(|off| [fruit(i)[0], fruit(i)[1], off].into())).collect();
+        let row = Landscape::new(&FruitCloud::from_positions(fruits));
+        assert!((0.5..0.52).contains(&row.spacing), "{}", row.spacing);
+        assert!((row.companions.between(0.06, 0.11) - 1.0).abs() < 1e-9);
+        assert!(row.companions.between(0.0, 0.06) == 0.0 && row.companions.between(0.11, 0.45) == 0.0);
+        assert!((row.companions.density(0.09) * shell(0.06, 0.12) - 1.0).abs() < 0.1);
+        assert!(row.companions.density(0.3) == 0.0);
     }
 
     #[test]

@@ -93,7 +93,8 @@ impl Laid<'_> {
     /// their own.
     pub(super) fn companions(&self, distance: f64) -> f64 {
         let scale = self.pose.scale;
-        let both = self.query.companions.at(distance / scale) / scale.powi(3) + self.map.companions.at(distance);
+        let both =
+            self.query.companions.density(distance / scale) / scale.powi(3) + self.map.companions.density(distance);
         (0.5 * both).max(self.map.floor)
     }
 

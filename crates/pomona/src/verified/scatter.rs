@@ -8,6 +8,7 @@
 //! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
 //! true one where fruits crowd, so that the noise comes out small.
 
+use super::chance::shell;
 use super::hypothesis::SHARES;
 use super::nearest::{SHARE_OF_ROWS, single};
 use super::pairing::Laid;
@@ -71,7 +72,7 @@ pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
 
 impl Counts {
     fn new(laid: &Laid) -> Self {
-        let &Laid { query, map, predictions, .. } = laid;
+        let &Laid { query, map, predictions, pose } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], 0.0);
@@ -89,9 +90,12 @@ impl Counts {
             (0..query.len()).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
         let across = std::array::from_fn(|i| parts.iter().map(|part| part.0[i]).sum());
         let due: f64 = parts.iter().map(|part| part.1).sum();
-        let ball = |radius: usize| 4.0 / 3.0 * std::f64::consts::PI * (radius as f64 * bin).powi(3);
-        let companions =
-            std::array::from_fn(|i| due * laid.companions((i as f64 + 0.5) * bin) * (ball(i + 1) - ball(i)));
+        let companions = std::array::from_fn(|i| {
+            let (inner, outer) = (i as f64 * bin, (i + 1) as f64 * bin);
+            let seen = query.companions.between(inner / pose.scale, outer / pose.scale);
+            let both = 0.5 * (seen + map.companions.between(inner, outer));
+            due * both.max(map.floor * shell(inner, outer))
+        });
         Self { bin, across, companions, due }
     }
 
