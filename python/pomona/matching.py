@@ -426,6 +426,8 @@ def core_vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
     """Return the vertical in the query and in the map as the core reads it; one direction holds for both."""
     if up is None:
         return None
+    if np.ma.is_masked(up):
+        raise PomonaError("up: found a masked array, expected one whose values are all known")
     try:
         vectors = np.asarray(up, np.float64)
     except (TypeError, ValueError, OverflowError):

@@ -228,16 +228,24 @@ fn too_many(found: usize, most: usize) -> Error {
     Error::TooManyFruits { found, most }
 }
 
+/// That verticals are directions.
+///
+/// # Errors
+/// One is zero or not finite.
+pub(crate) fn require_directions(up: Option<[Vector3<f64>; 2]>) -> Result<()> {
+    if up.iter().flatten().all(|up| up.norm().is_normal()) {
+        return Ok(());
+    }
+    Err(Error::Request { name: "up", reason: "expected a finite vector that is not zero".to_owned() })
+}
+
 impl Request {
     fn validate(&self) -> Result<()> {
         if let Some(noise) = self.noise_m.filter(|noise| !(noise.is_finite() && *noise > 0.0)) {
             let reason = format!("found {noise}, expected a length above 0 m");
             return Err(Error::Request { name: "noise_m", reason });
         }
-        if self.up.iter().flatten().any(|up| !(up.norm().is_finite() && up.norm() > 0.0)) {
-            let reason = "expected a finite vector that is not zero".to_owned();
-            return Err(Error::Request { name: "up", reason });
-        }
+        require_directions(self.up)?;
         if self.per_frame && self.method != Method::Paper {
             // The verified method bends with the row by itself.
             let reason = "expected the paper's method".to_owned();

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.localize import Localization
-from pomona.ros.pose_covariance import body_covariance, fixed_axes_covariance
+from pomona.ros.pose_covariance import fixed_axes_covariance
+from pomona.step_covariance import carried_covariance
 
 __all__ = ["BODY_FROM_OPTICAL", "RobotFrames", "RobotPose", "levelling"]
 
@@ -76,7 +77,7 @@ class RobotFrames:
         if found.map_from_camera is None:
             raise PomonaError(f"localization: found {found.status}, expected Found")
         pose = self.map_from_fruits @ found.map_from_camera @ np.linalg.inv(self.base_from_camera)
-        return RobotPose(stamp_ns, pose, body_covariance(self.base_from_camera, found.covariance))
+        return RobotPose(stamp_ns, pose, carried_covariance(self.base_from_camera, found.covariance))
 
 
 def levelling(up: Array) -> Array:

@@ -16,6 +16,9 @@ pub struct MapPair {
     pub probability: f64,
 }
 
+/// No camera goes farther between two frames, metres; squares of what is 1e160 times as far are no numbers.
+const FAR_M: f64 = 1e6;
+
 /// How the camera moved, as odometry tells it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToldMotion {
@@ -32,11 +35,18 @@ impl From<Pose> for ToldMotion {
 }
 
 impl ToldMotion {
-    /// Checks the covariance.
+    /// Checks the way and its covariance.
     ///
     /// # Errors
-    /// It is not symmetric positive definite.
+    /// The way, or the standard deviation of one, is beyond all ways; the covariance is not symmetric positive definite.
     pub fn validate(&self) -> Result<()> {
+        let reason = "found one beyond 1,000 km, expected metres between two frames".to_owned();
+        if self.previous_from_camera.translation.norm() > FAR_M {
+            return Err(Error::Request { name: "moved", reason });
+        }
+        if self.covariance.is_some_and(|matrix| matrix.amax() > FAR_M * FAR_M) {
+            return Err(Error::Request { name: "motion covariance", reason });
+        }
         let is_one = |matrix: &Matrix6<f64>| *matrix == matrix.transpose() && matrix.cholesky().is_some();
         if self.covariance.as_ref().is_none_or(is_one) {
             return Ok(());

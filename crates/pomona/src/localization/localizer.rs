@@ -18,7 +18,7 @@ use crate::cloud::FruitCloud;
 use crate::config::Config;
 use crate::error::Result;
 use crate::geometry::Scale;
-use crate::matching::{MapIndex, Method};
+use crate::matching::{MapIndex, Method, require_directions};
 use crate::pose::Pose;
 use crate::verified::compact::Bytes;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -120,7 +120,7 @@ impl Localizer {
     /// Where the camera is now, `told` being how it moved since the last call where that is known.
     ///
     /// # Errors
-    /// As [`Self::locate`], and a covariance that is wrong.
+    /// As [`Self::locate`], and a motion or its covariance that is wrong.
     pub fn update(
         &mut self,
         seen: &FruitCloud,
@@ -128,6 +128,7 @@ impl Localizer {
         up: Option<[Vector3<f64>; 2]>,
     ) -> Result<Localization> {
         seen.validate()?;
+        require_directions(up)?;
         told.map_or(Ok(()), ToldMotion::validate)?;
         let step = self.motions.next(told, &mut self.window);
         let measured = step.map(|step| Motion::measured(step, told.and_then(|told| told.covariance.as_ref())));
@@ -234,6 +235,10 @@ impl Localizer {
     /// The newest frame alone, for the way from those before may be what was wrong; else with these.
     fn search_anew(&mut self, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
         let frame = self.window.newest();
+        if frame.is_empty() {
+            // Those before were looked for when they came.
+            return Ok(Localization::without_pose(Verdict::TooFew));
+        }
         let found = self.search(frame, &cloud_of(frame), up)?;
         if found.verdict == Verdict::Found {
             self.window.keep(1);

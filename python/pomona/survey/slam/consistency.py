@@ -16,7 +16,9 @@ from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
 from pomona.survey.slam.constellation_links import motions_of
 from pomona.survey.slam.loops import Loop
 
-__all__ = ["BELIEVED2", "NO_FRUITS", "explained", "explains"]
+__all__ = ["BELIEVED2", "NO_FRUITS", "explained", "explains", "squared_distances"]
+
+Array = NDArray[np.float64]
 
 BELIEVED2 = 22.5
 """Squared distance up to which a link or a loop is believed: one of a thousand true ones is farther off."""
@@ -29,11 +31,18 @@ NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0
 
 def explains(poses: NDArray[np.float64], loop: Loop) -> bool:
     """Say whether poses lie as a loop has them, by what it does not know alone."""
+    here = np.linalg.inv(poses[loop.first]) @ poses[loop.second]
+    spread = np.asarray(np.linalg.inv(loop.information), np.float64)
+    return bool(squared_distances(loop.first_from_second[None], here[None], spread[None])[0] <= BELIEVED2)
+
+
+def squared_distances(poses: Array, others: Array, spreads: Array) -> Array:
+    """Measure how far other poses lie from some, (N, 4, 4) both, by the covariances of the steps between them."""
     from scipy.spatial.transform import Rotation
 
-    left = np.linalg.inv(loop.first_from_second) @ np.linalg.inv(poses[loop.first]) @ poses[loop.second]
-    error = np.concatenate([left[:3, 3], Rotation.from_matrix(left[:3, :3]).as_rotvec()])
-    return bool(error @ loop.information @ error <= BELIEVED2)
+    left = np.linalg.inv(poses) @ others
+    errors = np.concatenate([left[:, :3, 3], Rotation.from_matrix(left[:, :3, :3]).as_rotvec()], axis=1)
+    return np.asarray(np.einsum("ni,ni->n", errors, np.linalg.solve(spreads, errors[..., None])[..., 0]), np.float64)
 
 
 def explained(poses: NDArray[np.float64], motions: Motions, found: Sequence[Loop]) -> tuple[list[int], Refined]:

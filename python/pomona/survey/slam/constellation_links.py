@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -84,14 +85,23 @@ class Constellations:
     ) -> None:
         self._clouds, self._threads = list(clouds), core_threads(threads)
         self._config = config or {}
+        # What is wrong with the settings is told before there are frames.
+        self.of(FruitCloud(np.eye(3)))
         self._ready: dict[int, Localizer] = {}
 
     def __len__(self) -> int:
         return len(self._clouds)
 
-    def add(self, cloud: FruitCloud) -> None:
-        """Take what the next frame saw."""
+    @contextmanager
+    def adding(self, cloud: FruitCloud) -> Iterator[None]:
+        """Take what the next frame saw, unless what is done with it fails."""
         self._clouds.append(cloud)
+        try:
+            yield
+        except BaseException:
+            self._ready.pop(len(self) - 1, None)
+            self._clouds.pop()
+            raise
 
     def cloud(self, row: int) -> FruitCloud:
         """Give what a frame saw."""

@@ -123,14 +123,14 @@ class FruitSlam:
         Raises
         ------
         PomonaError
-            The cloud has no covariances, `moved` is not rigid or `information` not positive definite, or only one of
-            them is given. The frame is not counted then.
+            The cloud has no covariances or some that are beyond numbers, `moved` is not rigid or `information` not
+            positive definite, or only one of them is given. The frame is not counted then.
         """
         require_clouds([cloud])
         motion = _checked_motion(len(self), moved, information, doubtful=doubtful)
         row = len(self)
-        self._constellations.add(cloud)
-        links = list(linked(self._constellations, row))
+        with self._constellations.adding(cloud):
+            links = list(linked(self._constellations, row))
         self._links += links
         ties = motions_of(links)
         if row:
@@ -258,6 +258,8 @@ def _checked_motion(row: int, moved: Array | None, information: Array | None, *,
         return Motions.none()
     if moved is None or information is None:
         raise PomonaError("moved, information: found one of them, expected both or none")
+    if not isinstance(doubtful, bool | np.bool_):
+        raise PomonaError(f"doubtful: found {type(doubtful).__name__}, expected True or False")
     return Motions(
         np.array([row - 1]),
         np.array([row]),

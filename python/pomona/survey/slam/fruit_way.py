@@ -92,6 +92,10 @@ def way_by_fruits(
         A cloud is none or has no covariances, a motion or an anchor is of no frame, or a setting is wrong. Frames that
         hang together with no other are parts of one frame.
     """
+    if isinstance(clouds, FruitCloud) or not isinstance(clouds, Iterable):
+        raise PomonaError(f"clouds: found {type(clouds).__name__}, expected a FruitCloud of each frame")
+    if not isinstance(motions, Motions | None):
+        raise PomonaError(f"motions: found {type(motions).__name__}, expected Motions")
     clouds = list(clouds)
     require_clouds(clouds)
     motions = Motions.none() if motions is None else motions.checked(len(clouds))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.survey.refinement import Motions
-from pomona.survey.slam.consistency import BELIEVED2
+from pomona.survey.slam.consistency import BELIEVED2, squared_distances
 
 __all__ = ["Placing", "placings"]
 
@@ -53,11 +53,7 @@ def placings(parts: Rows, poses: Array, ties: Motions) -> list[Placing]:
 
 def _agreeing(poses: Array, spreads: Array) -> NDArray[np.bool_]:
     """Say which of some poses of one frame lie as far from each other as chance has them, (T, T)."""
-    from scipy.spatial.transform import Rotation
-
     n = len(poses)
-    left = (np.linalg.inv(poses)[:, None] @ poses[None]).reshape(-1, 4, 4)
-    errors = np.concatenate([left[:, :3, 3], Rotation.from_matrix(left[:, :3, :3]).as_rotvec()], axis=1)
     both = (spreads[:, None] + spreads[None]).reshape(-1, 6, 6)
-    squared = np.einsum("ni,ni->n", errors, np.linalg.solve(both, errors[..., None])[..., 0])
+    squared = squared_distances(np.repeat(poses, n, axis=0), np.tile(poses, (n, 1, 1)), both)
     return np.asarray(squared.reshape(n, n) <= BELIEVED2)
