@@ -360,12 +360,29 @@ def test_one_tree_is_a_map(row):
         (lambda here: here.locate(EMPTY, up=[[1.0], [1.0, 2.0]]), "up"),
         (lambda here: here.locate(np.full((6, 3), np.nan)), "positions"),
         (lambda here: here.locate(EMPTY, up=[1.0, 2.0]), "up"),
+        *[
+            (lambda here, up=up: here.update(EMPTY, up=up), "up")
+            for up in ([0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], np.ma.array([0.0, 0.0, 1.0], mask=[True, False, False]))
+        ],
+        (lambda here: here.update(EMPTY, np.eye(4) + np.pad([[1e200]], ((0, 3), (3, 0)))), "moved: found one beyond"),
+        (lambda here: here.update(EMPTY, np.eye(4), covariance=1e300 * np.eye(6)), "motion covariance"),
     ],
 )
 def test_wrong_input_is_refused_in_one_line(fresh, give, expected):
     with pytest.raises(PomonaError, match=expected) as refused:
         give(fresh)
     assert "\n" not in str(refused.value)
+
+
+def test_a_lost_camera_that_sees_nothing_is_not_looked_for(row, fresh):
+    """What the frames before saw was looked for when they came: it took half a second, frame after frame."""
+    other = drawn_row(5)
+    for step in range(3):
+        assert not fresh.update(seen_from(other, pose_at(4.0 + 0.1 * step), 1))
+    found = fresh.update(EMPTY)
+    assert (found.status, found.map_from_camera) == (Verdict.TOO_FEW, None)
+    assert np.isnan(found.log_odds)
+    assert_near(fresh.update(seen_from(row, pose_at(4.0), 1)), pose_at(4.0))
 
 
 def test_two_threads_at_once_are_refused_in_one_line(row, fresh):

@@ -1,6 +1,7 @@
 """Ways by fruits alone: drawn graphs and rows whose truth is known."""
 
 import gc
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -255,6 +256,40 @@ def test_a_motion_that_is_none_leaves_a_way_as_it_was(
         slam.add(cloud)
     at_once = way_by_fruits((cloud for cloud in clouds), threads=1)
     assert np.array_equal(slam.way().session_from_camera, at_once.session_from_camera)
+
+
+def test_a_frame_that_cannot_be_looked_for_leaves_a_way_as_it_was() -> None:
+    rng = np.random.default_rng(9)
+    fruits, slam = drawn_row(rng, 2.5), FruitSlam(threads=1)
+    clouds = [seen(rng, fruits, facing(0.2 * step)) for step in range(4)]
+    slam.add(clouds[0])
+    beyond = FruitCloud(clouds[1].positions, covariances=1e160 * clouds[1].covariances)
+    with pytest.raises(PomonaError, match="covariances"):
+        slam.add(beyond)
+    for cloud in clouds[1:]:
+        assert slam.add(cloud).part == 0
+    at_once = way_by_fruits(clouds, threads=1)
+    assert np.array_equal(slam.way().session_from_camera, at_once.session_from_camera)
+
+
+@pytest.mark.parametrize(
+    ("call", "complaint"),
+    [
+        (lambda: FruitSlam(config={"localization": {"own_n": 1.0}}), "own_n"),
+        (lambda: FruitSlam(config={"localization": 3}), "localization"),
+        (lambda: FruitSlam(config=[1]), "config: found a list, expected tables"),  # type: ignore[arg-type]
+        (lambda: way_by_fruits(FruitCloud(np.eye(3))), "clouds: found FruitCloud, expected a FruitCloud of each frame"),
+        (lambda: way_by_fruits(3), "clouds: found int, expected a FruitCloud of each frame"),  # type: ignore[arg-type]
+        (lambda: way_by_fruits([], [np.eye(4)]), "motions: found list, expected Motions"),  # type: ignore[arg-type]
+        (
+            lambda: FruitSlam().add(FruitCloud(np.zeros((0, 3))), np.eye(4), np.eye(6), doubtful="no"),  # type: ignore[arg-type]
+            "doubtful: found str, expected True or False",
+        ),
+    ],
+)
+def test_what_is_no_frame_motion_or_setting_is_told_at_once(call: Callable[[], object], complaint: str) -> None:
+    with pytest.raises(PomonaError, match=complaint):
+        call()
 
 
 def test_wrong_frames_of_motions_and_anchors_are_told() -> None:

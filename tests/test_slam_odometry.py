@@ -56,6 +56,19 @@ def test_wheels_that_are_steadily_too_large_close_their_loops() -> None:
     assert far_off_m(placed, true) < 0.1
 
 
+@pytest.mark.parametrize("glitch_m", [8.0, 30.0])
+def test_a_way_is_not_laid_out_by_one_wild_motion(glitch_m: float) -> None:
+    """It claims to be the surest, and poses that begin 8 m off are nearer to it than to the links beside it."""
+
+    def glitch(row: int, moved: np.ndarray) -> np.ndarray:
+        return exp([glitch_m if row == 7 else 0.0, 0, 0, 0, 0, 0]) @ moved
+
+    slam, _, true = told_drive(4, glitch)
+    way = slam.way()
+    assert (way.refused, way.refused_loops) == (0, 0)
+    assert np.linalg.norm((way.session_from_camera - true)[:, :3, 3], axis=1).max() < 0.04
+
+
 def test_a_frame_is_placed_by_its_fruits_where_its_motion_lies() -> None:
     def lie(row: int, moved: np.ndarray) -> np.ndarray:
         return moved @ exp(np.array([0.5, 0, 0, 0, 0, 0])) if row == 9 else moved

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.core_settings import core_settings
 from pomona.core_threads import core_threads
 from pomona.localize import Localization, Localizer
 from pomona.matching import Verdict
@@ -84,8 +85,9 @@ class Constellations:
         self, clouds: Sequence[FruitCloud], *, config: Mapping[str, Any] | None = None, threads: int | None = None
     ) -> None:
         self._clouds, self._threads = list(clouds), core_threads(threads)
-        self._config = config or {}
         # What is wrong with the settings is told before there are frames.
+        core_settings(config)
+        self._config = config or {}
         self.of(FruitCloud(np.eye(3)))
         self._ready: dict[int, Localizer] = {}
 
@@ -182,5 +184,6 @@ def once(links: Sequence[ConstellationLink], n_frames: int) -> Motions:
 
 
 def _over(ours: Mapping[str, Mapping[str, float]], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of settings; what the user gives counts."""
-    return {**given, **{name: {**table, **given.get(name, {})} for name, table in ours.items()}}
+    """Tables of settings; what the user gives counts, and the core refuses what is no table."""
+    tables = {name: given.get(name, {}) for name in ours}
+    return {**given, **{name: {**ours[name], **own} for name, own in tables.items() if isinstance(own, Mapping)}}

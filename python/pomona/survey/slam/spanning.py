@@ -71,7 +71,7 @@ def _ways(motions: Motions) -> dict[int, list[_Way]]:
     rows = zip(motions.first.tolist(), motions.second.tolist(), motions.first_from_second, spreads, strict=True)
     for motion, (first, second, step, spread) in enumerate(rows):
         ways[first].append(_Way(motion, second, step, spread))
-        ways[second].append(_Way(motion, first, np.linalg.inv(step), carried_covariance(step, spread)))
+        ways[second].append(_Way(motion, first, _inverse(step), carried_covariance(step, spread)))
     return ways
 
 
@@ -96,5 +96,9 @@ def _witnesses(ways: dict[int, list[_Way]], first: int, way: _Way) -> Iterator[_
             continue
         for end in ways[begin.other]:
             if end.other == way.other and end.motion != way.motion:
-                spread = carried_covariance(np.linalg.inv(end.step), begin.spread) + end.spread
+                spread = carried_covariance(_inverse(end.step), begin.spread) + end.spread
                 yield _Way(end.motion, end.other, begin.step @ end.step, spread)
+
+
+def _inverse(pose: Array) -> Array:
+    return np.asarray(np.linalg.inv(pose), np.float64)
