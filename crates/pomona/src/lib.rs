@@ -65,6 +65,7 @@
 
 pub mod answer;
 pub mod assignment;
+mod beliefs;
 pub mod bundle;
 pub mod camera;
 pub mod cloud;
@@ -84,6 +85,7 @@ pub mod paper;
 pub mod pose;
 mod random;
 pub mod row_search;
+mod statistics;
 pub mod stereo;
 pub mod tracking;
 pub mod verified;

@@ -9,9 +9,10 @@ use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
 use crate::error::Result;
 use crate::geometry::{Scale, Similarity, fit};
-use crate::neighbours::tree::Tree;
+use crate::neighbours::tree::{Tree, single};
+use crate::random::shuffled;
 use crate::verified::{
-    COMPANIONS, Landscape, Quad, SEED_SIGMA, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled, single,
+    COMPANIONS, Landscape, Quad, SEED_SIGMA, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties,
 };
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;

@@ -190,8 +190,8 @@ impl<'a> Search<'a> {
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where there is none.
     fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
-        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), WORTH_IT);
-        pairs.iter().map(|pair| pair.probability).sum::<f64>() / pairs.len().max(1) as f64
+        let pairs = settled.beliefs.chosen(self.query.len(), self.map.len(), WORTH_IT);
+        pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64
     }
 
     /// Looks closely at a finding, over all that it reaches; returns its evidence.

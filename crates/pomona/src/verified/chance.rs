@@ -1,6 +1,6 @@
 //! What chance puts at each place of a cloud: the density of strangers, near a fruit and at a distance from one.
 
-use super::nearest::{Neighbours, SHARE_OF_ROWS};
+use crate::neighbours::others::{Neighbours, SHARE_OF_ROWS};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -166,15 +166,16 @@ pub(super) fn kinship(points: &[Vector3<f64>], neighbours: &Neighbours, spacing:
 #[cfg(test)]
 mod tests {
     use crate::cloud::FruitCloud;
+    use crate::statistics::upper_median;
     use crate::verified::fixture::Dice;
-    use crate::verified::landscape::{Landscape, median};
+    use crate::verified::landscape::Landscape;
 
     /// Median density of fruits spread evenly in a box, over the true one.
     fn seen(count: usize, size: [f64; 3]) -> f64 {
         let mut dice = Dice(3);
         let fruits = (0..count).map(|_| size.map(|length| length * dice.uniform()).into()).collect();
         let mut density = Landscape::new(&FruitCloud::from_positions(fruits)).density;
-        median(&mut density) * size.iter().product::<f64>() / count as f64
+        upper_median(&mut density) * size.iter().product::<f64>() / count as f64
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::case::{Finding, Findings, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
+use crate::beliefs::{Beliefs, Edge};
 
 impl Search<'_> {
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
@@ -17,7 +18,7 @@ impl Search<'_> {
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
         let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap, pattern);
-        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        let pairs = self.pairs(&settled.beliefs, &overlap);
         let outdone = others.iter().any(rivals);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
@@ -29,18 +30,27 @@ impl Search<'_> {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),
             alternatives: rivals,
-            pairs: self.in_rows(pairs),
+            pairs,
             noise_m: overlap.sigma,
             stages,
         }
     }
 
-    /// Pairs in the rows of the clouds, in the order of the query.
-    fn in_rows(&self, mut pairs: Vec<Pair>) -> Vec<Pair> {
-        for pair in &mut pairs {
-            pair.query = self.query.rows[pair.query] as usize;
-            pair.map = self.map.rows[pair.map] as usize;
-        }
+    /// One-to-one pairs in the rows of the clouds, in the order of the query.
+    fn pairs(&self, beliefs: &Beliefs, overlap: &Overlap) -> Vec<Pair> {
+        let (query, map) = (self.query, self.map);
+        let pair = |(edge, probability): (Edge, f64)| {
+            let at = overlap.predictions[edge.query as usize]?.place;
+            Some(Pair {
+                query: query.rows[edge.query as usize] as usize,
+                map: map.rows[edge.map as usize] as usize,
+                probability,
+                distance_m: (map.points[edge.map as usize] - at).norm(),
+                support: edge.ratio.ln(),
+            })
+        };
+        let chosen = beliefs.chosen(query.len(), map.len(), self.config.min_probability);
+        let mut pairs: Vec<Pair> = chosen.into_iter().filter_map(pair).collect();
         pairs.sort_unstable_by_key(|pair| pair.query);
         pairs
     }

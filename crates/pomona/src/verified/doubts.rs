@@ -4,10 +4,10 @@ use super::case::{Finding, Findings, Search};
 use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
-use super::nearest::single;
 use super::overlap::Overlap;
 use super::placement::{Landing, Moments, Placement};
 use super::search::REACH;
+use crate::neighbours::tree::single;
 use nalgebra::{Matrix3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.

@@ -12,9 +12,9 @@
 //! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
 //! when it grew, below zero where nothing was selected.
 
-use super::beliefs::Beliefs;
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::pairing::{Laid, Meeting};
+use crate::beliefs::Beliefs;
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
 /// misses: of rows with 15 % in common 4 of 100 were no longer found.

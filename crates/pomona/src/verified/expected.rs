@@ -9,7 +9,6 @@ use super::acceptance::VerifiedConfig;
 use super::case::{Search, VerifiedMap};
 use super::contender::{Contender, by_evidence, distinct};
 use super::decision::{MIN_FRUITS, SURE};
-use super::nearest::single;
 use super::placement::Placement;
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
@@ -18,6 +17,7 @@ use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
+use crate::neighbours::tree::single;
 use nalgebra::Vector3;
 
 /// Fruits whose seeds are laid on the map, at the most; and poses that are refined.

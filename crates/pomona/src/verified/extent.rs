@@ -5,11 +5,12 @@
 //! the width of a branch down to the noise, decides between them.
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
-use super::hypothesis::{DETECTION, Hypothesis, Model, gaussian};
+use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::soft::pulled;
 use crate::geometry::Scale;
+use crate::statistics::gaussian;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 

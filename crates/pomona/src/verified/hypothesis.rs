@@ -2,10 +2,11 @@
 
 use super::footing::Footing;
 use super::landscape::Landscape;
-use super::nearest::single;
 use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
 use crate::geometry::Scale;
+use crate::neighbours::tree::single;
+use crate::statistics::{Evidence, gaussian};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -61,42 +62,6 @@ impl Model {
     #[inline]
     pub(crate) fn missed(&self, support: f64) -> f64 {
         1.0 - self.detection * support
-    }
-}
-
-/// Density of an isotropic normal distribution in space at squared distance `d2`, per cubic metre.
-#[inline]
-pub(crate) fn gaussian(d2: f64, variance: f64) -> f64 {
-    const NORM: f64 = 0.063_493_635_934_240_97; // (2 pi)^(-3/2)
-    NORM / (variance * variance.sqrt()) * (-0.5 * d2 / variance).exp()
-}
-
-/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of
-/// every factor.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Evidence {
-    product: f64,
-    nats: f64,
-}
-
-impl Default for Evidence {
-    fn default() -> Self {
-        Self { product: 1.0, nats: 0.0 }
-    }
-}
-
-impl Evidence {
-    #[inline]
-    pub(crate) fn multiply(&mut self, ratio: f64) {
-        self.product *= ratio;
-        if !(1e-200..1e200).contains(&self.product) {
-            *self = Self { product: 1.0, nats: self.log_odds() };
-        }
-    }
-
-    #[inline]
-    pub(crate) fn log_odds(&self) -> f64 {
-        self.nats + self.product.ln()
     }
 }
 

@@ -2,12 +2,13 @@
 
 use super::chance::{Companions, crowding, kinship, local_density};
 use super::cut::{Cut, EDGE};
-use super::nearest::{Neighbours, single};
 use super::support::Support;
 use crate::cloud::FruitCloud;
 use crate::neighbours::grid::Grid;
-use crate::neighbours::tree::Tree;
+use crate::neighbours::others::Neighbours;
+use crate::neighbours::tree::{Tree, single};
 use crate::neighbours::vicinity::Vicinity;
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::OnceLock;
 
@@ -172,7 +173,7 @@ pub(super) fn spacing_of(points: &[Vector3<f64>], neighbours: &Neighbours) -> f6
         .collect();
     // Fruits on one spot have no spacing; cells must not become finer than the coordinates.
     let extent = points.iter().fold(0.0f64, |far, p| far.max(p.amax()));
-    median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE)
+    upper_median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE)
 }
 
 /// Fruits per cubic metre that chance puts anywhere, at the least.
@@ -180,14 +181,6 @@ pub(super) fn floor_of(spacing: f64) -> f64 {
     // Six neighbours within the spacing: their density, were fruits spread evenly.
     let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
     0.1 * typical
-}
-
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

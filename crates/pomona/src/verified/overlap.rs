@@ -2,8 +2,8 @@
 
 use super::evidence::likeliest_share;
 use super::growth::Growth;
-use super::hypothesis::gaussian;
 use super::placement::{Landing, Placement};
+use crate::statistics::gaussian;
 use nalgebra::Vector3;
 
 /// The overlap that a hypothesis explains.

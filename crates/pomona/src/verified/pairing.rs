@@ -1,11 +1,9 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::beliefs::{Beliefs, Edge};
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
 use super::placement::{Landing, Placement};
-use crate::answer::Pair;
-use crate::assignment::assign;
+use crate::beliefs::{Beliefs, Edge};
+use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -39,24 +37,6 @@ impl Beliefs {
         };
         Self::new(laid.meetings(edge), query.len(), map.len())
     }
-
-    /// The one-to-one pairs that gain most expected right answers, in rows of the landscapes.
-    pub(super) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Pair> {
-        let gain = |(edge, p): (&Edge, f64)| (edge.query as usize, edge.map as usize, p - min_probability);
-        let partners = assign(n_query, n_map, &self.links().map(gain).collect::<Vec<_>>());
-        let pair = |(edge, probability): (&Edge, f64)| Pair {
-            query: edge.query as usize,
-            map: edge.map as usize,
-            probability,
-            distance_m: edge.distance,
-            support: edge.ratio.ln(),
-        };
-        let is_best = |pair: &Pair| partners[pair.query] == Some(pair.map);
-        let mut pairs: Vec<Pair> = self.links().map(pair).filter(is_best).collect();
-        pairs.sort_unstable_by_key(|pair| (pair.query, pair.map));
-        pairs.dedup_by_key(|pair| (pair.query, pair.map));
-        pairs
-    }
 }
 
 /// A fruit of the map near the place where one of the query is expected.
@@ -74,8 +54,7 @@ pub(super) struct Meeting {
 impl Meeting {
     /// The pair with its likelihood ratio, where that is worth being looked at.
     pub(super) fn edge(&self, ratio: f64) -> Option<Edge> {
-        let Self { query, map, distance, .. } = *self;
-        (ratio > LEAST_RATIO).then_some(Edge { query, map, ratio, distance })
+        (ratio > LEAST_RATIO).then_some(Edge { query: self.query, map: self.map, ratio })
     }
 }
 

@@ -11,11 +11,11 @@ use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
 use super::placement::{FIXING, Landing, Moments, Placement};
 use super::sight::is_among;
 use crate::geometry::Scale;
 use crate::neighbours::cells::cell_of;
+use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 

@@ -9,8 +9,10 @@
 //! true one where fruits crowd, so that the noise comes out small.
 
 use super::hypothesis::SHARES;
-use super::nearest::{SHARE_OF_ROWS, single};
 use super::pairing::Laid;
+use crate::neighbours::others::SHARE_OF_ROWS;
+use crate::neighbours::tree::single;
+use crate::statistics::maxwell;
 use rayon::prelude::*;
 
 /// What is known of the noise beforehand.
@@ -124,19 +126,6 @@ impl Counts {
     }
 }
 
-/// Distribution of the length of a vector of three standard normal numbers.
-fn maxwell(x: f64) -> f64 {
-    erf(x / std::f64::consts::SQRT_2) - (2.0 / std::f64::consts::PI).sqrt() * x * (-0.5 * x * x).exp()
-}
-
-/// Error function of x >= 0 to 1.5e-7 (Abramowitz and Stegun 7.1.26).
-fn erf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let polynomial =
-        ((((1.061_405_429 * t - 1.453_152_027) * t + 1.421_413_741) * t - 0.284_496_736) * t + 0.254_829_592) * t;
-    1.0 - polynomial * (-x * x).exp()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,12 +148,5 @@ mod tests {
                 assert!((found / sigma - 1.0).abs() < off, "{found} for {sigma}, told {told}");
             }
         }
-    }
-
-    #[test]
-    fn the_distribution_of_lengths_is_that_of_maxwell() {
-        assert!(maxwell(0.0).abs() < 1e-6);
-        assert!((maxwell(1.538_17) - 0.5).abs() < 1e-4); // its median
-        assert!((maxwell(6.0) - 1.0).abs() < 1e-6);
     }
 }

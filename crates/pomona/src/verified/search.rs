@@ -5,8 +5,9 @@ use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::{Hypothesis, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
-use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, without_scale};
 use crate::geometry::Scale;
+use crate::random::shuffled;
 use rayon::prelude::*;
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.

@@ -10,7 +10,6 @@
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
-use super::beliefs::Beliefs;
 use super::cut::{Cell, surroundings};
 use super::evidence::evidence;
 use super::footing::Footing;
@@ -21,6 +20,7 @@ use super::pairing::Laid;
 use super::patches::{Patchwork, next_to};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, scatter};
 use super::size::Cue;
+use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
 
 /// A prediction loses at most this share of its fit when its own partner is left out.

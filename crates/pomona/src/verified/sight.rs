@@ -4,10 +4,10 @@
 //! have shown, and they say nothing against a pose. How far each sees is told by the pose itself: in a depth of the row
 //! where one visit shows many fruits and the other hardly any, the other does not see.
 
-use super::hypothesis::gaussian;
 use super::landscape::Landscape;
 use super::placement::Placement;
 use super::votes::row_axes;
+use crate::statistics::gaussian;
 use nalgebra::Vector3;
 
 /// A visit that shows less than this share of the other's fruits in a depth does not see there.

@@ -3,9 +3,10 @@
 //! The nearest fruit is a stranger where few are seen again. The likelihood of all of them together has a wide basin, and one
 //! step of expectation and maximisation climbs most of it (coherent point drift, Myronenko and Song 2010, with a rigid pose).
 
-use super::hypothesis::{Evidence, Model, gaussian};
+use super::hypothesis::Model;
 use super::landscape::Landscape;
 use super::placement::{Moments, Placement};
+use crate::statistics::{Evidence, gaussian};
 use nalgebra::Vector3;
 
 /// Standard deviations beyond which a fruit pulls no more.

@@ -6,7 +6,7 @@
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
 use super::landscape::Landscape;
 use super::placement::Placement;
-use super::seeds::shuffled;
+use crate::random::shuffled;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 

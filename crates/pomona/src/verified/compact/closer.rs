@@ -3,11 +3,12 @@
 //! It does what [`crate::verified::hypothesis::refine`] does, without the map's side of the evidence and without what only a
 //! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
 
+use crate::neighbours::tree::single;
+use crate::statistics::Evidence;
 use crate::verified::contender::{Contender, by_evidence};
 use crate::verified::footing::Footing;
-use crate::verified::hypothesis::{Evidence, GATE, Model};
+use crate::verified::hypothesis::{GATE, Model};
 use crate::verified::landscape::Landscape;
-use crate::verified::nearest::single;
 use crate::verified::placement::{FIXING, Moments, Placement};
 use crate::verified::proposal::Terrain;
 use crate::verified::search::REACH;

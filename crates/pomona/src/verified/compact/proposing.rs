@@ -5,12 +5,13 @@ use super::ground::Ground;
 use super::seed_blocks::Anchored;
 use super::shapes::{Scratch, Shape, Shapes, in_steps, rounded};
 use super::surroundings::Neighbourhood;
-use crate::verified::codes::Code;
+use crate::neighbours::code_grid::Code;
+use crate::random::shuffled;
 use crate::verified::contender::Contender;
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::proposal::{Effort, Proposer};
-use crate::verified::seeds::{Quad, SHORTEST, Seed, WITHIN, enumerate, near_ties, shuffled};
+use crate::verified::seeds::{Quad, SHORTEST, Seed, WITHIN, enumerate, near_ties};
 use rayon::prelude::*;
 
 /// Reach of the code search in standard deviations of one axis: a third less than where the map is small. It holds half of
