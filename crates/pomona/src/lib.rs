@@ -79,6 +79,7 @@ pub mod localization;
 pub mod look;
 pub mod matching;
 mod meanings;
+mod moments;
 pub mod neighbours;
 pub mod odometry;
 pub mod paper;

@@ -5,13 +5,12 @@ use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
-use super::placement::Placement;
 use super::proposal::Effort;
 use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
@@ -167,7 +166,7 @@ impl<'a> Search<'a> {
         reached(self.config.false_alarm_rate, poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
     }
 
-    pub(super) fn admits(&self, pose: &Placement) -> bool {
+    pub(super) fn admits(&self, pose: &Similarity) -> bool {
         self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 

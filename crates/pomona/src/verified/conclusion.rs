@@ -4,6 +4,7 @@ use super::case::{Finding, Findings, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
+use crate::geometry::Similarity;
 
 impl Search<'_> {
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
@@ -56,9 +57,9 @@ impl Search<'_> {
     }
 
     fn registration(&self, overlap: &Overlap) -> Registration {
-        Registration {
-            map_from_query: overlap.pose.to_similarity(&self.query.centre, &self.map.centre),
-            log_odds: overlap.log_odds,
-        }
+        let Similarity { mut rotation, translation, scale } = overlap.pose;
+        rotation.renormalize();
+        let translation = self.map.centre + translation - rotation * self.query.centre * scale;
+        Registration { map_from_query: Similarity { rotation, translation, scale }, log_odds: overlap.log_odds }
     }
 }

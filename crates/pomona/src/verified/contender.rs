@@ -1,14 +1,14 @@
 //! Poses that seeds propose, most evidence first and one of each.
 
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::seeds::Quad;
+use crate::geometry::Similarity;
 use nalgebra::Vector3;
 
 /// A seed of the query laid on a seed of the map.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contender {
-    pub(crate) pose: Placement,
+    pub(crate) pose: Similarity,
     pub(crate) log_odds: f64,
     pub(crate) place: Vector3<f64>,
     /// Rows of both seeds: an order for equal evidence.
@@ -26,7 +26,7 @@ pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Conten
     first_of_each(candidates.iter().copied(), keep, |candidate, other| {
         let place = candidate.place;
         (place - other.place).norm() < near
-            && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
+            && (candidate.pose.image(&place) - other.pose.image(&place)).norm() < same
             && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
     })
 }

@@ -1,6 +1,7 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
-use super::placement::{Moments, Placement};
+use crate::geometry::Similarity;
+use crate::moments::Moments;
 use crate::neighbours::cells::{self, CellKey, CellMap, around};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ pub(crate) struct Cell {
     pub(super) around: Arc<[(u32, f64)]>,
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
-    pub(super) pose: Placement,
+    pub(super) pose: Similarity,
     /// Whether growth has come here.
     pub(super) reached: bool,
 }
@@ -81,7 +82,7 @@ impl Cut {
                 rows: rows.into(),
                 around: neighbours(keys[i]).map(|other| (other as u32, closeness(i, other))).collect(),
                 moments: Moments::default(),
-                pose: Placement::identity(),
+                pose: Similarity::identity(),
                 reached: false,
             })
             .collect();

@@ -10,7 +10,6 @@ use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
 use super::outlier::{KEPT, KEPT_LAID};
-use super::placement::Placement;
 use super::proposal::Effort;
 use super::search::of_some_fruits;
 use super::seeds::{self, Seed};
@@ -80,7 +79,7 @@ pub(crate) fn pairs_under(
     if query.len() == 0 || search.map.len() < MIN_FRUITS {
         return Match::too_few();
     }
-    let pose = Placement::from_similarity(map_from_query, &query.centre, &search.map.centre);
+    let pose = map_from_query.about(&query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);

@@ -5,10 +5,12 @@ use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
 use super::overlap::Overlap;
-use super::placement::{Landing, Moments, Placement};
 use super::search::REACH;
+use crate::geometry::Similarity;
+use crate::moments::Moments;
 use crate::neighbours::tree::single;
-use nalgebra::{Matrix3, Vector3};
+use crate::verified::patches::Landing;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -38,7 +40,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
-    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Placement) -> bool {
+    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Similarity) -> bool {
         let reach = SAME_PLACE * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
@@ -48,9 +50,9 @@ impl<'a> Search<'a> {
                 let p = self.query.points[*row as usize];
                 let found = match finding.overlap.predictions[*row as usize] {
                     Some(prediction) => prediction.place,
-                    None => finding.seed.pose.apply(&p),
+                    None => finding.seed.pose.image(&p),
                 };
-                (found - pose.apply(&p)).norm() < reach * pose.scale
+                (found - pose.image(&p)).norm() < reach * pose.scale
             })
             .count();
         2 * same > near.len()
@@ -94,10 +96,16 @@ impl<'a> Search<'a> {
         let eigen = moments.spread().symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
         let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
-        let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
-        let translation = pose.apply(&middle) - rotation * middle * pose.scale;
-        let seed =
-            Hypothesis { pose: Placement { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
+        // No rotation but a reflection, which every step keeps as it is.
+        let reflection = Matrix3::identity() - normal * normal.transpose() * 2.0;
+        let rotation = pose.rotation * Rotation3::from_matrix_unchecked(reflection);
+        let translation = pose.image(&middle) - rotation * middle * pose.scale;
+        let seed = Hypothesis {
+            pose: Similarity { rotation, translation, scale: pose.scale },
+            place: middle,
+            sigma,
+            log_odds,
+        };
         let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
         self.polish(&mut mirrored);
         mirrored.overlap.log_odds > MIRRORED * log_odds
@@ -137,7 +145,7 @@ impl<'a> Search<'a> {
     pub(super) fn elsewhere(&self, best: &Overlap, other: &Overlap) -> f64 {
         let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
-            at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
+            at.map(|at| (other.pose.image(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
         };
         let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
         apart.iter().filter(|&&apart| apart).count() as f64 / apart.len().max(1) as f64

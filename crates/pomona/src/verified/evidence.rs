@@ -70,9 +70,10 @@ fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Similarity;
     use crate::verified::fixture::visits;
     use crate::verified::landscape::Landscape;
-    use crate::verified::placement::{Landing, Placement};
+    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]
@@ -99,10 +100,10 @@ mod tests {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
         let at = |shift: Vector3<f64>| {
-            let pose = Placement { translation: query.centre - map.centre + shift, ..Placement::identity() };
-            let land = |p: &Vector3<f64>| Some(Landing { place: pose.apply(p), variance: 0.02 * 0.02 });
+            let pose = Similarity { translation: query.centre - map.centre + shift, ..Similarity::identity() };
+            let land = |p: &Vector3<f64>| Some(Landing { place: pose.image(p), variance: 0.02 * 0.02 });
             let predictions: Vec<_> = query.points.iter().map(land).collect();
-            let there: Vec<f64> = map.points.iter().map(|p| query.support.at(&pose.apply_inverse(p))).collect();
+            let there: Vec<f64> = map.points.iter().map(|p| query.support.at(&pose.preimage(p))).collect();
             evidence(&Laid { query: &query, map: &map, predictions: &predictions, pose: &pose }, &there)
         };
         assert!(at(Vector3::zeros()) > 300.0);

@@ -8,10 +8,10 @@ use super::cut::{Cell, surroundings};
 use super::hypothesis::{GATE, Hypothesis, Model, TURNS};
 use super::landscape::Landscape;
 use super::patches::{NEXT, Patchwork};
-use super::placement::Landing;
 use super::search::REACH;
 use super::sight::unseen;
 use crate::neighbours::others::SHARE_OF_ROWS;
+use crate::verified::patches::Landing;
 use rayon::prelude::*;
 
 /// The first rounds look further than the noise.

@@ -2,9 +2,9 @@
 
 use super::footing::Footing;
 use super::landscape::Landscape;
-use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use crate::moments::{FIXING, Moments};
 use crate::neighbours::tree::single;
 use crate::statistics::{Evidence, gaussian};
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ impl Model {
     }
 
     /// One least-squares step from `start`, of pairs whose noise is `sigma` and of a vertical that is known.
-    pub(crate) fn step(&self, pairs: &Moments, start: &Placement, sigma: f64) -> Option<Placement> {
+    pub(crate) fn step(&self, pairs: &Moments, start: &Similarity, sigma: f64) -> Option<Similarity> {
         let pose = pairs.step(start, self.scale, 0.0)?;
         let Some(vertical) = self.vertical else { return Some(pose) };
         Some(vertical.upheld(&pose, &pairs.centroid(), &(pairs.inertia_under(&pose) / (sigma * sigma))))
@@ -71,7 +71,7 @@ pub(crate) const GATE: f64 = 3.0;
 /// A pose with the evidence around one place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hypothesis {
-    pub(crate) pose: Placement,
+    pub(crate) pose: Similarity,
     /// Evidence against chance within the place's reach, nats.
     pub(crate) log_odds: f64,
     /// Where the evidence lies, in the centred query.
@@ -85,10 +85,10 @@ pub(super) fn refined(
     [query, map]: [&Landscape; 2],
     model: &Model,
     reach: f64,
-    starts: &[(Placement, Vector3<f64>)],
+    starts: &[(Similarity, Vector3<f64>)],
 ) -> Vec<Hypothesis> {
     let refiner = || Refiner::new(query, map, model);
-    let from = |refiner: &mut Refiner, (start, place): &(Placement, Vector3<f64>)| refiner.refine(start, place, reach);
+    let from = |refiner: &mut Refiner, (start, place): &(Similarity, Vector3<f64>)| refiner.refine(start, place, reach);
     let mut found: Vec<Hypothesis> = starts.par_iter().map_init(refiner, from).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
@@ -126,7 +126,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
-    fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
+    fn refine(&mut self, start: &Similarity, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
         self.region.clear();
         self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
         self.region.sort_unstable();
@@ -157,13 +157,13 @@ impl<'a> Refiner<'a> {
     }
 
     /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
-    fn pair_up(&mut self, pose: &Placement, variance_at: impl Fn(&Vector3<f64>) -> f64) {
+    fn pair_up(&mut self, pose: &Similarity, variance_at: impl Fn(&Vector3<f64>) -> f64) {
         self.stamp += 1;
         self.partners.clear();
         for (at, &row) in self.region.iter().enumerate() {
             let p = self.query.points[row as usize];
             let variance = variance_at(&p);
-            let found = self.map.nearest(&pose.apply(&p), GATE * variance.sqrt());
+            let found = self.map.nearest(&pose.image(&p), GATE * variance.sqrt());
             let mut entry = found.map_or((NOBODY, 0.0, variance), |(partner, d2)| (partner, d2, variance));
             if let Some((partner, d2)) = found {
                 let owner = &mut self.owner[partner as usize];
@@ -182,12 +182,12 @@ impl<'a> Refiner<'a> {
     }
 
     /// Sums over the pairs, their weighted squared distances, and the evidence of the region's fruits.
-    fn weigh(&self, pose: &Placement) -> (Moments, f64, f64) {
+    fn weigh(&self, pose: &Similarity) -> (Moments, f64, f64) {
         let (mut moments, mut residual, mut evidence) = (Moments::default(), 0.0, Evidence::default());
         for (&row, &(partner, d2, variance)) in self.region.iter().zip(&self.partners) {
             let p = self.query.points[row as usize];
             if partner == NOBODY {
-                evidence.multiply(self.model.missed(self.map.support.at(&pose.apply(&p))));
+                evidence.multiply(self.model.missed(self.map.support.at(&pose.image(&p))));
                 continue;
             }
             let met = self.model.met(d2, variance, self.map.density[partner as usize]);
@@ -204,13 +204,13 @@ impl<'a> Refiner<'a> {
     /// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
     /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
     /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
-    fn other_side(&self, pose: &Placement, place: &Vector3<f64>, reach: f64) -> f64 {
-        let support = |&row: &u32| self.map.support.at(&pose.apply(&self.query.points[row as usize]));
+    fn other_side(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64) -> f64 {
+        let support = |&row: &u32| self.map.support.at(&pose.image(&self.query.points[row as usize]));
         let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
         let mut missing = Evidence::default();
-        self.map.tree.within(&single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
+        self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
             if self.owner[row as usize].0 != self.stamp {
-                let seen = self.query.support.at(&pose.apply_inverse(&self.map.points[row as usize]));
+                let seen = self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
                 missing.multiply(self.model.missed(seen));
             }
         });

@@ -41,7 +41,6 @@ mod outlier;
 mod overlap;
 mod pairing;
 mod patches;
-mod placement;
 mod proposal;
 mod scatter;
 mod search;

@@ -10,10 +10,9 @@
 use super::contender::first_of_each;
 use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::soft;
 use super::votes::Rows;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -38,7 +37,7 @@ pub(super) fn hypotheses(
     query: &Landscape,
     map: &Landscape,
     model: &Model,
-    admits: &(impl Fn(&Placement) -> bool + Sync),
+    admits: &(impl Fn(&Similarity) -> bool + Sync),
 ) -> Vec<Hypothesis> {
     let model = Model { detection: FEW_AGAIN, ..*model };
     if model.scale == Scale::Free {
@@ -47,7 +46,7 @@ pub(super) fn hypotheses(
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
     let mut peaks = rows.peaks(admits);
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let pulled = |poses: &[Placement], widths: &[f64]| -> Vec<Placement> {
+    let pulled = |poses: &[Similarity], widths: &[f64]| -> Vec<Similarity> {
         let mut found: Vec<_> = poses.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
         found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
         found.into_iter().map(|(pose, _)| pose).collect()
@@ -61,8 +60,8 @@ pub(super) fn hypotheses(
 }
 
 /// The first poses, one of those that are the same.
-fn distinct(poses: impl Iterator<Item = Placement>, most: usize, spacing: f64) -> Vec<Placement> {
-    let same = |one: &Placement, other: &Placement| {
+fn distinct(poses: impl Iterator<Item = Similarity>, most: usize, spacing: f64) -> Vec<Similarity> {
+    let same = |one: &Similarity, other: &Similarity| {
         (one.translation - other.translation).norm() < SAME * spacing && one.turn_to(other) < SAME_TURN_RAD
     };
     first_of_each(poses, most, same)
@@ -103,7 +102,7 @@ mod tests {
         let best = found.first().expect("something stands out").pose;
         for p in &query.points {
             let place = turn * (p + query.centre - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
-            assert!((best.apply(p) - place).norm() < 0.1);
+            assert!((best.image(p) - place).norm() < 0.1);
         }
         let free = Model { scale: Scale::Free, ..model };
         assert!(hypotheses(&query, &map, &free, &|_| true).is_empty());

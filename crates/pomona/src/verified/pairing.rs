@@ -1,9 +1,10 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
 use super::landscape::Landscape;
-use super::placement::{Landing, Placement};
 use crate::beliefs::{Beliefs, Edge};
+use crate::geometry::Similarity;
 use crate::neighbours::others::SHARE_OF_ROWS;
+use crate::verified::patches::Landing;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -64,7 +65,7 @@ pub(crate) struct Laid<'a> {
     pub(super) query: &'a Landscape,
     pub(super) map: &'a Landscape,
     pub(super) predictions: &'a [Option<Landing>],
-    pub(super) pose: &'a Placement,
+    pub(super) pose: &'a Similarity,
 }
 
 impl Laid<'_> {
@@ -89,7 +90,7 @@ impl Laid<'_> {
         let (map, pose) = (self.map, self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support.at(&place);
-        let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
+        let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));
         // No axis has more than the trace, three times the mean.
         let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { 1.0 };
         let reach = GATE * (widest * variance).sqrt();

@@ -11,9 +11,9 @@ use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::placement::{FIXING, Landing, Moments, Placement};
 use super::sight::is_among;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
 use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::Vector3;
@@ -24,6 +24,14 @@ pub(super) const NEXT: f64 = 0.3;
 
 /// Cells at the least that are worth a thread of their own.
 const SHARE_OF_CELLS: usize = 32;
+
+/// A fruit of the query where the grown pose puts it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Landing {
+    pub(crate) place: Vector3<f64>,
+    /// Variance per axis of the distance to the partner, square metres of the map.
+    pub(crate) variance: f64,
+}
 
 /// Partner of a fruit, or the mean of all that it may be, and the probability that it has one.
 pub(super) type Target = Option<(Vector3<f64>, f64)>;
@@ -37,7 +45,7 @@ pub(crate) struct Patchwork<'a> {
     pub(super) model: Model,
     pub(super) cells: Vec<Cell>,
     /// The common pose.
-    pub(super) pose: Placement,
+    pub(super) pose: Similarity,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     pub(super) sigma: f64,
     /// Variance that neighbours' residuals about the patches share, square metres.
@@ -52,7 +60,7 @@ pub(crate) struct Patchwork<'a> {
 
 impl<'a> Patchwork<'a> {
     /// All cells under one pose, none of them reached.
-    pub(super) fn new(query: &'a Landscape, map: &'a Landscape, pose: Placement, sigma: f64, model: &Model) -> Self {
+    pub(super) fn new(query: &'a Landscape, map: &'a Landscape, pose: Similarity, sigma: f64, model: &Model) -> Self {
         let cut = query.cut();
         let cells = cut.cells.iter().map(|cell| Cell { pose, ..cell.clone() }).collect();
         Self {
@@ -73,7 +81,7 @@ impl<'a> Patchwork<'a> {
 
     /// Where the patch puts a fruit.
     fn placed(&self, row: usize) -> Vector3<f64> {
-        self.cells[self.cut.cell_of[row] as usize].pose.apply(&self.query.points[row])
+        self.cells[self.cut.cell_of[row] as usize].pose.image(&self.query.points[row])
     }
 
     /// From where the patches put the fruits now to their partners.
@@ -189,10 +197,10 @@ impl<'a> Patchwork<'a> {
                 return cell.pose;
             }
             let mut moments = around(&self.cells, cell);
-            moments.add(&cell.centre, &cell.pose.apply(&cell.centre), hold);
+            moments.add(&cell.centre, &cell.pose.image(&cell.centre), hold);
             moments.step(&cell.pose, Scale::Metric, prior).unwrap_or(cell.pose)
         };
-        let poses: Vec<Placement> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
+        let poses: Vec<Similarity> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
         self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
     }
 
@@ -201,7 +209,7 @@ impl<'a> Patchwork<'a> {
         if is_among(&self.unseen[1], row) {
             return 0.0;
         }
-        let place = self.pose.apply_inverse(&self.map.points[row]);
+        let place = self.pose.preimage(&self.map.points[row]);
         let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
         if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
     }

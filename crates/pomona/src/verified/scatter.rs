@@ -129,9 +129,10 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Similarity;
     use crate::verified::fixture::visits;
     use crate::verified::landscape::Landscape;
-    use crate::verified::placement::{Landing, Placement};
+    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]
@@ -141,7 +142,7 @@ mod tests {
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
             let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
             let predictions: Vec<_> = query.points.iter().map(place).collect();
-            let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Placement::identity() };
+            let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Similarity::identity() };
             // A guess, and what a caller says and is wrong by a factor of two.
             for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
                 let found = scatter(&laid, KnownNoise { sigma: told, width });

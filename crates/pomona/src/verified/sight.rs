@@ -5,8 +5,8 @@
 //! where one visit shows many fruits and the other hardly any, the other does not see.
 
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::votes::row_axes;
+use crate::geometry::Similarity;
 use crate::statistics::gaussian;
 use nalgebra::Vector3;
 
@@ -22,14 +22,14 @@ pub(super) fn is_among(rows: &[bool], row: usize) -> bool {
 }
 
 /// Fruits of the query, and of the map, that hang where the other visit does not see; none where the map is no row.
-pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Placement) -> [Vec<bool>; 2] {
+pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Similarity) -> [Vec<bool>; 2] {
     let Some(axes) = row_axes(map) else { return [vec![false; query.len()], vec![false; map.len()]] };
     let depth = |place: &Vector3<f64>| place.dot(&axes.column(2));
-    let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.apply(p)).collect();
+    let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.image(p)).collect();
     // Trees that only one visit shows say nothing about how far the other sees.
     let both = [
         here.iter().filter(|place| map.support.at(place) > 0.0).map(depth).collect::<Vec<f64>>(),
-        map.points.iter().filter(|p| query.support.at(&pose.apply_inverse(p)) > 0.0).map(depth).collect(),
+        map.points.iter().filter(|p| query.support.at(&pose.preimage(p)) > 0.0).map(depth).collect(),
     ];
     let variance = (WIDTH * map.spacing).powi(2);
     let shown =

@@ -5,7 +5,7 @@
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
 use super::landscape::Landscape;
-use super::placement::Placement;
+use crate::geometry::Similarity;
 use crate::random::shuffled;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -95,7 +95,7 @@ impl Rows {
     }
 
     /// Poses whose cells stand out, with the standard deviations by which, turn by turn, of those that are admitted.
-    pub(super) fn peaks(&self, admits: &(impl Fn(&Placement) -> bool + Sync)) -> Vec<(f64, Placement)> {
+    pub(super) fn peaks(&self, admits: &(impl Fn(&Similarity) -> bool + Sync)) -> Vec<(f64, Similarity)> {
         let turns: Vec<Matrix3<f64>> =
             turns().filter(|turn| admits(&self.placement(turn, &Vector3::zeros()))).collect();
         turns
@@ -105,9 +105,9 @@ impl Rows {
             .collect()
     }
 
-    fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Placement {
+    fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Similarity {
         let [query, map] = &self.axes;
-        Placement { rotation: map * turn * query.transpose(), translation: map * offset, scale: 1.0 }
+        Similarity::rigid(Rotation3::from_matrix_unchecked(map * turn * query.transpose()), map * offset)
     }
 
     fn no_counts(&self) -> Counts {
@@ -115,7 +115,7 @@ impl Rows {
         Counts { cells: vec![0; all], voted: vec![0; self.map[0].len()] }
     }
 
-    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Placement)> {
+    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Similarity)> {
         self.count(turn, counts);
         let expected = self.expected(&counts.cells);
         let asked: Vec<f64> =

@@ -15,7 +15,6 @@ use crate::verified::contender::{Contender, by_evidence, distinct};
 use crate::verified::decision::{self, MIN_FRUITS};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
-use crate::verified::placement::Placement;
 use crate::verified::proposal::Effort;
 use crate::verified::search::REACH;
 use nalgebra::Vector3;
@@ -157,7 +156,7 @@ impl Case<'_> {
         let spot = REACH * self.landscape.spacing;
         let mut kept: Vec<Contender> = Vec::new();
         for one in contenders {
-            let apart = |other: &Contender| (one.pose.apply(&one.place) - other.pose.apply(&one.place)).norm();
+            let apart = |other: &Contender| (one.pose.image(&one.place) - other.pose.image(&one.place)).norm();
             let same = |other: &Contender| {
                 apart(other) < SAME_PLACE * self.index.facts.spacing && one.pose.turn_to(&other.pose) < SAME_TURN_RAD
             };
@@ -183,7 +182,7 @@ impl Case<'_> {
     fn rows_around(&self, contenders: &[Contender]) -> Vec<u32> {
         let places = |one: &Contender| {
             let pose = one.pose;
-            self.landscape.points.iter().map(move |p| pose.apply(p))
+            self.landscape.points.iter().map(move |p| pose.image(p))
         };
         let mut rows: Vec<u32> = contenders.iter().flat_map(|one| self.ground.around(places(one), MARGIN)).collect();
         rows.sort_unstable();
@@ -215,7 +214,7 @@ fn in_map(mut found: Match, rows: &[u32]) -> Match {
 impl Contender {
     /// The same where the map's origin is elsewhere.
     fn moved(&self, by: Vector3<f64>) -> Self {
-        let pose = Placement { translation: self.pose.translation + by, ..self.pose };
+        let pose = Similarity { translation: self.pose.translation + by, ..self.pose };
         Self { pose, ..*self }
     }
 }
