@@ -28,13 +28,17 @@ impl Moments {
         self.square += query * (query * weight).transpose();
     }
 
-    /// Adds another sum with a weight of its own.
-    pub(crate) fn accumulate(&mut self, other: &Self, weight: f64) {
-        self.weight += other.weight * weight;
-        self.query += other.query * weight;
-        self.map += other.map * weight;
-        self.cross += other.cross * weight;
-        self.square += other.square * weight;
+    /// Sum of sums, each with a weight of its own.
+    pub(crate) fn total<'a>(parts: impl Iterator<Item = (&'a Self, f64)>) -> Self {
+        let mut sum = Self::default();
+        for (part, weight) in parts {
+            sum.weight += part.weight * weight;
+            sum.query += part.query * weight;
+            sum.map += part.map * weight;
+            sum.cross += part.cross * weight;
+            sum.square += part.square * weight;
+        }
+        sum
     }
 
     /// Centroid of the query's points.

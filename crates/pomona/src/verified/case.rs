@@ -10,7 +10,7 @@ use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
-use crate::geometry::{Scale, Similarity};
+use crate::geometry::Scale;
 use crate::matching::Request;
 
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
@@ -43,7 +43,7 @@ impl VerifiedMap {
 
     /// What is cut out of a map of so many fruits and of this spacing, for poses that are proposed.
     pub(super) fn part(cloud: &FruitCloud, spacing: f64, fruits: usize) -> Self {
-        let landscape = Landscape::part(cloud, spacing);
+        let landscape = Landscape::with_spacing(cloud, Some(spacing));
         Self { landscape, seeds: SeedIndex::empty(), scale: Scale::Metric, fruits }
     }
 }
@@ -164,10 +164,6 @@ impl<'a> Search<'a> {
     /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
     pub(super) fn least(&self) -> f64 {
         reached(self.config.false_alarm_rate, poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
-    }
-
-    pub(super) fn admits(&self, pose: &Similarity) -> bool {
-        self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
     /// Whether a finding has enough evidence: as it grew or once it is settled, every fruit predicted without its own partner,

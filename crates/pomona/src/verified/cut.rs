@@ -23,20 +23,6 @@ pub(crate) struct Cell {
     pub(super) reached: bool,
 }
 
-/// Weighted sum of sums.
-pub(super) fn total<'a>(parts: impl Iterator<Item = (&'a Moments, f64)>) -> Moments {
-    let mut sum = Moments::default();
-    for (part, weight) in parts {
-        sum.accumulate(part, weight);
-    }
-    sum
-}
-
-/// Pairs in and around a cell, the nearer the more.
-pub(super) fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
-    total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
-}
-
 /// The cells of a cloud, as every growth starts with them.
 #[derive(Debug, Clone)]
 pub(crate) struct Cut {

@@ -233,7 +233,7 @@ impl<'a> Search<'a> {
 
     /// Whether a finding is a whole pose: it stands as a known vertical asks, and its turns are fixed.
     fn is_pose(&self, finding: &Finding) -> bool {
-        self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
+        self.model.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
     }
 
     pub(super) fn stages(&self, Findings { accepted, log, .. }: &Findings) -> Vec<(&'static str, f64)> {
@@ -291,7 +291,7 @@ impl<'a> Search<'a> {
     /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
     /// much more the other poses of this search show: the answer must stand out of them.
     fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
-        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model, &|pose| self.admits(pose));
+        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model);
         log.refined += hypotheses.len();
         if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
             return;
@@ -311,7 +311,7 @@ impl<'a> Search<'a> {
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = extent::hypothesis(self.query, self.map, &self.model, &|pose| self.admits(pose))?;
+        let seed = extent::hypothesis(self.query, self.map, &self.model)?;
         let model = Model { sigma: seed.sigma, ..self.model };
         let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);

@@ -5,11 +5,11 @@ use super::contender::{Contender, SAME_PLACE};
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
 use super::overlap::Overlap;
+use super::patches::Landing;
 use super::search::REACH;
 use crate::geometry::Similarity;
 use crate::moments::Moments;
 use crate::neighbours::tree::single;
-use crate::verified::patches::Landing;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
@@ -123,7 +123,7 @@ impl<'a> Search<'a> {
         let reach = REACH * self.query.spacing;
         let Some(&seed) = refined([self.query, self.map], &model, reach, &starts).first() else { return };
         let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
-        if better.overlap.log_odds > finding.overlap.log_odds && self.admits(&better.overlap.pose) {
+        if better.overlap.log_odds > finding.overlap.log_odds && self.model.admits(&better.overlap.pose) {
             *finding = better;
         }
     }

@@ -16,7 +16,6 @@ use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
-use crate::neighbours::tree::single;
 use nalgebra::Vector3;
 
 /// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
@@ -64,18 +63,11 @@ impl Search<'_> {
         }
         let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
         let fruits = quad.map(|row| self.query.points[row as usize]);
-        let near = fruits.map(|fruit| self.near(&expected.image(&fruit)));
+        // A fruit may be off by a spacing from where it is expected: 27 cm in an orchard.
+        let near = fruits.map(|fruit| self.map.within(&expected.image(&fruit), self.map.spacing));
         let most = 2.0 * (WITHIN * self.model.sigma).powi(2);
         let effort = &mut Effort::default();
         self.each_alike(&fruits, &near, &mut |target| found.extend(proposer.contender(&target, most, effort)));
-    }
-
-    /// Fruits of the map within a spacing of a place, 27 cm in an orchard: so far a fruit may be off from where it is expected.
-    fn near(&self, place: &Vector3<f64>) -> Vec<u32> {
-        let mut rows = Vec::new();
-        self.map.tree.within(&single(place), self.map.spacing as f32, |row, _| rows.push(row));
-        rows.sort_unstable();
-        rows
     }
 
     /// Calls `take` with four fruits of the map, one of each list, that lie to each other as those of the query do.

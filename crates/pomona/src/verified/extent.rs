@@ -18,12 +18,7 @@ use rayon::prelude::*;
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
 
 /// The pose of the outline with the evidence of its fine structure; `None` where it is no better than chance.
-pub(crate) fn hypothesis(
-    query: &Landscape,
-    map: &Landscape,
-    model: &Model,
-    admits: &(impl Fn(&Similarity) -> bool + Sync),
-) -> Option<Hypothesis> {
+pub(crate) fn hypothesis(query: &Landscape, map: &Landscape, model: &Model) -> Option<Hypothesis> {
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
     }
@@ -38,7 +33,7 @@ pub(crate) fn hypothesis(
         let rotation = Rotation3::from_matrix_unchecked(turned * axes_query.transpose());
         let start = Similarity { rotation, translation: Vector3::zeros(), scale: ratio };
         let (pose, _) = pulled(query, map, model, &start, &ANNEALING);
-        admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
+        model.admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
     };
     let found: Vec<_> = HALF_TURNS.into_par_iter().filter_map(annealed).collect();
     let (pose, first) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -4,14 +4,14 @@
 //! Each cell has its own pose ([`super::patches`]). Growth goes from cell to neighbouring cell and stops where the
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
-use super::cut::{Cell, surroundings};
+use super::claims::Claims;
+use super::cut::Cell;
 use super::hypothesis::{GATE, Hypothesis, Model, TURNS};
 use super::landscape::Landscape;
-use super::patches::{NEXT, Patchwork};
+use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::search::REACH;
 use super::sight::unseen;
 use crate::neighbours::others::SHARE_OF_ROWS;
-use crate::verified::patches::Landing;
 use rayon::prelude::*;
 
 /// The first rounds look further than the noise.
@@ -101,24 +101,20 @@ impl<'a> Growth<'a> {
     /// wins.
     fn meet(&mut self, widening: f64) {
         self.patches.predict(
-            |patches, cell| patches.footing(&surroundings(&patches.cells, cell), HOLD, cell),
+            |patches, cell| patches.footing(cell, ALL, HOLD),
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
         let Patchwork { map, model, .. } = self.patches;
         let nearest = |at: &Option<Landing>| self.nearest(at.as_ref()?);
         let met: Vec<Option<(u32, f64)>> =
             self.patches.predictions.par_iter().with_min_len(SHARE_OF_ROWS).map(nearest).collect();
-        let mut owners: Vec<Option<(usize, f64)>> = vec![None; map.len()];
+        let mut claims = Claims::on(map.len());
         for (row, met) in met.iter().enumerate() {
-            let &Some((partner, ratio)) = met else { continue };
-            let owner = &mut owners[partner as usize];
-            if owner.is_none_or(|(_, most)| ratio > most) {
-                *owner = Some((row, ratio));
-            }
+            met.iter().for_each(|&(partner, ratio)| claims.claim(partner, row, ratio));
         }
         let mut gains = vec![0.0; met.len()];
         for (row, met) in met.into_iter().enumerate() {
-            let kept = met.filter(|met| owners[met.0 as usize].is_some_and(|(owner, _)| owner == row));
+            let kept = met.filter(|met| claims.owner(met.0) == Some(row));
             gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
             self.partners[row] = kept.map(|(partner, _)| partner);
             let target =

@@ -1,5 +1,6 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
+use super::claims::Claims;
 use super::footing::Footing;
 use super::landscape::Landscape;
 use super::vertical::Vertical;
@@ -49,6 +50,11 @@ impl Model {
         let pose = pairs.step(start, self.scale, 0.0)?;
         let Some(vertical) = self.vertical else { return Some(pose) };
         Some(vertical.upheld(&pose, &pairs.centroid(), &(pairs.inertia_under(&pose) / (sigma * sigma))))
+    }
+
+    /// Whether a pose stands as a known vertical asks.
+    pub(crate) fn admits(&self, pose: &Similarity) -> bool {
+        self.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
     /// Noise per axis of pairs whose squared residuals sum up to `squares` under a pose that was fitted to them.
@@ -101,15 +107,11 @@ struct Refiner<'a> {
     map: &'a Landscape,
     model: Model,
     /// Fruits of the query around the place.
-    region: Vec<u32>,
-    /// The partner of each, none where that is `NOBODY`, with the squared distance and the variance of the prediction.
-    partners: Vec<(u32, f64, f64)>,
-    /// Of each fruit of the map: when it was claimed last, and by whom in the region.
-    owner: Vec<(u32, u32)>,
-    stamp: u32,
+    region: Vec<Vector3<f64>>,
+    /// Of each the variance of the prediction, and the nearest fruit of the map with its squared distance.
+    nearest: Vec<(f64, Option<(u32, f64)>)>,
+    claims: Claims,
 }
-
-const NOBODY: u32 = u32::MAX;
 
 /// Steps of a refinement, the last of which only weighs: with four, two of 30 rows are lost that have few fruits in common.
 const STEPS: usize = 6;
@@ -121,15 +123,14 @@ pub(super) const TURNS: usize = 4;
 
 impl<'a> Refiner<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
-        let owner = vec![(0, 0); map.len()];
-        Self { query, map, model: *model, region: Vec::new(), partners: Vec::new(), owner, stamp: 0 }
+        let claims = Claims::on(map.len());
+        Self { query, map, model: *model, region: Vec::new(), nearest: Vec::new(), claims }
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
     fn refine(&mut self, start: &Similarity, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
-        self.region.clear();
-        self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
-        self.region.sort_unstable();
+        let query = self.query;
+        self.region = query.within(place, reach).iter().map(|&row| query.points[row as usize]).collect();
         let model = self.model;
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
@@ -158,42 +159,30 @@ impl<'a> Refiner<'a> {
 
     /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
     fn pair_up(&mut self, pose: &Similarity, variance_at: impl Fn(&Vector3<f64>) -> f64) {
-        self.stamp += 1;
-        self.partners.clear();
-        for (at, &row) in self.region.iter().enumerate() {
-            let p = self.query.points[row as usize];
-            let variance = variance_at(&p);
-            let found = self.map.nearest(&pose.image(&p), GATE * variance.sqrt());
-            let mut entry = found.map_or((NOBODY, 0.0, variance), |(partner, d2)| (partner, d2, variance));
-            if let Some((partner, d2)) = found {
-                let owner = &mut self.owner[partner as usize];
-                let rival = (owner.0 == self.stamp).then_some(owner.1 as usize);
-                if rival.is_some_and(|rival| self.partners[rival].1 <= d2) {
-                    entry.0 = NOBODY;
-                } else {
-                    *owner = (self.stamp, at as u32);
-                    if let Some(rival) = rival {
-                        self.partners[rival].0 = NOBODY;
-                    }
-                }
+        self.claims.forget();
+        self.nearest.clear();
+        for (at, p) in self.region.iter().enumerate() {
+            let variance = variance_at(p);
+            let nearest = self.map.nearest(&pose.image(p), GATE * variance.sqrt());
+            if let Some((partner, d2)) = nearest {
+                self.claims.claim(partner, at, -d2);
             }
-            self.partners.push(entry);
+            self.nearest.push((variance, nearest));
         }
     }
 
     /// Sums over the pairs, their weighted squared distances, and the evidence of the region's fruits.
     fn weigh(&self, pose: &Similarity) -> (Moments, f64, f64) {
         let (mut moments, mut residual, mut evidence) = (Moments::default(), 0.0, Evidence::default());
-        for (&row, &(partner, d2, variance)) in self.region.iter().zip(&self.partners) {
-            let p = self.query.points[row as usize];
-            if partner == NOBODY {
-                evidence.multiply(self.model.missed(self.map.support.at(&pose.image(&p))));
+        for (at, (p, &(variance, nearest))) in self.region.iter().zip(&self.nearest).enumerate() {
+            let Some((partner, d2)) = nearest.filter(|nearest| self.claims.owner(nearest.0) == Some(at)) else {
+                evidence.multiply(self.model.missed(self.map.support.at(&pose.image(p))));
                 continue;
-            }
+            };
             let met = self.model.met(d2, variance, self.map.density[partner as usize]);
             evidence.multiply(met);
             let weight = self.model.no_stranger(met);
-            moments.add(&p, &self.map.points[partner as usize], weight);
+            moments.add(p, &self.map.points[partner as usize], weight);
             residual += weight * d2;
         }
         (moments, residual, evidence.log_odds())
@@ -205,11 +194,11 @@ impl<'a> Refiner<'a> {
     /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
     /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
     fn other_side(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64) -> f64 {
-        let support = |&row: &u32| self.map.support.at(&pose.image(&self.query.points[row as usize]));
+        let support = |p: &Vector3<f64>| self.map.support.at(&pose.image(p));
         let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
         let mut missing = Evidence::default();
         self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
-            if self.owner[row as usize].0 != self.stamp {
+            if self.claims.owner(row).is_none() {
                 let seen = self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
                 missing.multiply(self.model.missed(seen));
             }

@@ -55,15 +55,11 @@ pub(crate) struct Landscape {
 
 impl Landscape {
     pub(crate) fn new(cloud: &FruitCloud) -> Self {
-        Self::with_spacing(cloud, spacing_of)
+        Self::with_spacing(cloud, None)
     }
 
-    /// A part that is cut out of a cloud of this spacing: at its rim fruits have fewer neighbours than they had.
-    pub(super) fn part(cloud: &FruitCloud, spacing: f64) -> Self {
-        Self::with_spacing(cloud, |_, _| spacing)
-    }
-
-    fn with_spacing(cloud: &FruitCloud, spacing: impl Fn(&[Vector3<f64>], &Neighbours) -> f64) -> Self {
+    /// A part that is cut out of a cloud has that one's spacing: at its rim fruits have fewer neighbours than they had.
+    pub(super) fn with_spacing(cloud: &FruitCloud, spacing: Option<f64>) -> Self {
         let count = cloud.len().max(1) as f64;
         let mut rows: Vec<u32> = (0..cloud.len() as u32).collect();
         rows.sort_by(|&a, &b| {
@@ -75,7 +71,7 @@ impl Landscape {
         let single: Vec<_> = points.iter().map(single).collect();
         let tree = Tree::new(&single);
         let neighbours = Neighbours::new(&single, &tree);
-        let spacing = spacing(&points, &neighbours);
+        let spacing = spacing.unwrap_or_else(|| spacing_of(&points, &neighbours));
         let floor = floor_of(spacing);
         let ((kinship, density, crowding, companions), (grid, vicinities, support)) = rayon::join(
             || {
@@ -154,6 +150,14 @@ impl Landscape {
         }
         self.near(place, gate, |row| found = nearer(found, row));
         found.0.map(|row| (row, found.1))
+    }
+
+    /// All points within `reach` of `place`, in order.
+    pub(crate) fn within(&self, place: &Vector3<f64>, reach: f64) -> Vec<u32> {
+        let mut rows = Vec::new();
+        self.tree.within(&single(place), reach as f32, |row, _| rows.push(row));
+        rows.sort_unstable();
+        rows
     }
 
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.

@@ -20,6 +20,7 @@ mod acceptance;
 mod axes;
 mod case;
 mod chance;
+mod claims;
 pub mod compact;
 mod conclusion;
 mod contender;

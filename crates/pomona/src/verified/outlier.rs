@@ -35,7 +35,7 @@ impl<'a> Search<'a> {
     ) -> Option<Finding<'a>> {
         best_first(others);
         let distinct = self.distinct(others);
-        distinct.first().filter(|&&best| self.admits(&others[best].overlap.pose))?;
+        distinct.first().filter(|&&best| self.model.admits(&others[best].overlap.pose))?;
         let rate = self.config.false_alarm_rate;
         // Half of the distance that is asked for: most poses that do not stand out need no closer look.
         if evidence(others, distinct[0]) <= outlying(rate.sqrt(), self.second(others, &distinct)) {

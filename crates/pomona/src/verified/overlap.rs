@@ -2,9 +2,9 @@
 
 use super::evidence::likeliest_share;
 use super::growth::Growth;
+use super::patches::Landing;
 use crate::geometry::Similarity;
 use crate::statistics::gaussian;
-use crate::verified::patches::Landing;
 use nalgebra::Vector3;
 
 /// The overlap that a hypothesis explains.

@@ -1,10 +1,8 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::landscape::Landscape;
+use super::patches::{Landing, Patchwork};
 use crate::beliefs::{Beliefs, Edge};
-use crate::geometry::Similarity;
 use crate::neighbours::others::SHARE_OF_ROWS;
-use crate::verified::patches::Landing;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -27,8 +25,8 @@ impl Beliefs {
     ///
     /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
     /// `p / (1 - p) N(d) / new density` against leaving both alone.
-    pub(super) fn of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
-        let Laid { query, map, .. } = *laid;
+    pub(super) fn of(laid: &Patchwork, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
+        let Patchwork { query, map, .. } = *laid;
         let edge = |meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = share * support;
@@ -59,16 +57,7 @@ impl Meeting {
     }
 }
 
-/// The query laid on the map, each of its fruits where it is expected.
-#[derive(Clone, Copy)]
-pub(crate) struct Laid<'a> {
-    pub(super) query: &'a Landscape,
-    pub(super) map: &'a Landscape,
-    pub(super) predictions: &'a [Option<Landing>],
-    pub(super) pose: &'a Similarity,
-}
-
-impl Laid<'_> {
+impl Patchwork<'_> {
     /// Fruits per cubic metre of the map that chance puts at a distance from a fruit: as many as both visits show around
     /// their own.
     pub(super) fn companions(&self, distance: f64) -> f64 {
@@ -87,7 +76,7 @@ impl Laid<'_> {
     }
 
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
-        let (map, pose) = (self.map, self.pose);
+        let (map, pose) = (self.map, &self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support.at(&place);
         let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));

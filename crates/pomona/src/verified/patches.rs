@@ -6,12 +6,11 @@
 //! neighbourhood, in the measure in which neighbours move together. What patches leave over is carried on from fruit to
 //! fruit ([`super::displacement`]).
 
-use super::cut::{Cell, Cut, surroundings, total};
+use super::cut::{Cell, Cut};
 use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::sight::is_among;
 use crate::geometry::{Scale, Similarity};
 use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
@@ -19,8 +18,10 @@ use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Cells of a patch's own fit, by their weight (see [`super::cut`]): those next to it.
+/// Weights (see [`super::cut`]) that cells around a cell exceed: those that its patch is fitted to, next to it, and those of its
+/// surroundings, all of them.
 pub(super) const NEXT: f64 = 0.3;
+pub(super) const ALL: f64 = 0.0;
 
 /// Cells at the least that are worth a thread of their own.
 const SHARE_OF_CELLS: usize = 32;
@@ -54,7 +55,7 @@ pub(crate) struct Patchwork<'a> {
     /// What patches left over when it was looked at last: from where they put a fruit to its partner.
     pub(super) left_over: Vec<Residual>,
     pub(super) predictions: Vec<Option<Landing>>,
-    /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
+    /// Fruits of the query, and of the map, that hang where the other visit does not see.
     pub(super) unseen: [Vec<bool>; 2],
 }
 
@@ -75,7 +76,7 @@ impl<'a> Patchwork<'a> {
             targets: vec![None; query.len()],
             left_over: vec![None; query.len()],
             predictions: vec![None; query.len()],
-            unseen: Default::default(),
+            unseen: [vec![false; query.len()], vec![false; map.len()]],
         }
     }
 
@@ -100,15 +101,15 @@ impl<'a> Patchwork<'a> {
         let footing = |cell: &Cell| cell.reached.then(|| footing(self, cell));
         let footings: Vec<Option<F>> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(footing).collect();
         let at = |row: usize| {
-            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !is_among(&self.unseen[0], row))?;
+            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !self.unseen[0][row])?;
             Some(landing(self, row, footing))
         };
         self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
     }
 
-    /// How firmly pairs, and as many more as `hold`, hold the pose of a cell.
-    pub(super) fn footing(&self, pairs: &Moments, hold: f64, cell: &Cell) -> Footing {
-        Footing::new(pairs, hold, self.cut.edge, cell.centre)
+    /// How firmly the pairs of cells around whose weight exceeds `least`, and as many more as `hold`, hold the pose of a cell.
+    pub(super) fn footing(&self, cell: &Cell, least: f64, hold: f64) -> Footing {
+        Footing::new(&self.pairs_around(cell, least), hold, self.cut.edge, cell.centre)
     }
 
     /// Where a fruit should lie, whose patch has the variance of one pair times `looseness`; noise is taken to be `widening` times
@@ -138,7 +139,13 @@ impl<'a> Patchwork<'a> {
 
     /// Sums over all pairs.
     pub(super) fn all_pairs(&self) -> Moments {
-        total(self.cells.iter().filter(|cell| cell.reached).map(|cell| (&cell.moments, 1.0)))
+        Moments::total(self.cells.iter().filter(|cell| cell.reached).map(|cell| (&cell.moments, 1.0)))
+    }
+
+    /// Sums over the pairs in a cell and in those around whose weight exceeds `least`.
+    fn pairs_around(&self, cell: &Cell, least: f64) -> Moments {
+        let near = cell.around.iter().filter(|(_, weight)| *weight > least);
+        Moments::total(near.map(|&(other, weight)| (&self.cells[other as usize].moments, weight)))
     }
 
     /// The common pose from the pairs, for all cells; `false` where they are too few.
@@ -160,9 +167,9 @@ impl<'a> Patchwork<'a> {
     /// the holds of patches and surroundings.
     pub(super) fn bend(&mut self, hold: impl Fn(&Self) -> f64) -> [f64; 2] {
         let of_surroundings = hold(self);
-        self.fit(surroundings, of_surroundings);
+        self.fit(ALL, of_surroundings);
         let of_patches = hold(self);
-        self.fit(next_to, of_patches);
+        self.fit(NEXT, of_patches);
         [of_patches, of_surroundings]
     }
 
@@ -189,14 +196,14 @@ impl<'a> Patchwork<'a> {
         1.0 / (shared / (self.sigma * self.sigma)).max(f64::EPSILON)
     }
 
-    /// Fits every cell's pose to the pairs around it, held to the pose that it has.
-    fn fit(&mut self, around: impl Fn(&[Cell], &Cell) -> Moments + Sync, hold: f64) {
+    /// Fits every cell's pose to the pairs of cells around whose weight exceeds `least`, held to the pose that it has.
+    fn fit(&mut self, least: f64, hold: f64) {
         let prior = hold * self.cut.edge * self.cut.edge;
         let fitted = |cell: &Cell| {
             if !cell.reached {
                 return cell.pose;
             }
-            let mut moments = around(&self.cells, cell);
+            let mut moments = self.pairs_around(cell, least);
             moments.add(&cell.centre, &cell.pose.image(&cell.centre), hold);
             moments.step(&cell.pose, Scale::Metric, prior).unwrap_or(cell.pose)
         };
@@ -206,16 +213,11 @@ impl<'a> Patchwork<'a> {
 
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.
     pub(super) fn looked_at(&self, row: usize) -> f64 {
-        if is_among(&self.unseen[1], row) {
+        if self.unseen[1][row] {
             return 0.0;
         }
         let place = self.pose.preimage(&self.map.points[row]);
         let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
         if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
     }
-}
-
-/// Sums over the cells next to a cell, itself included.
-pub(super) fn next_to(cells: &[Cell], cell: &Cell) -> Moments {
-    total(cell.around.iter().filter(|a| a.1 > NEXT).map(|a| (&cells[a.0 as usize].moments, a.1)))
 }

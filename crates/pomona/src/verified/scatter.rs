@@ -9,7 +9,7 @@
 //! true one where fruits crowd, so that the noise comes out small.
 
 use super::hypothesis::SHARES;
-use super::pairing::Laid;
+use super::patches::Patchwork;
 use crate::neighbours::others::SHARE_OF_ROWS;
 use crate::neighbours::tree::single;
 use crate::statistics::maxwell;
@@ -49,7 +49,7 @@ const STEADY: f64 = 200.0;
 const ROUNDS: usize = 20;
 
 /// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
-pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
+pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> f64 {
     let counts = Counts::new(laid);
     // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
     let tried: Vec<(f64, f64)> = (0..8 * BINS as i32)
@@ -72,8 +72,8 @@ pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
 }
 
 impl Counts {
-    fn new(laid: &Laid) -> Self {
-        let &Laid { query, map, predictions, .. } = laid;
+    fn new(laid: &Patchwork) -> Self {
+        let Patchwork { query, map, predictions, .. } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], 0.0);
@@ -129,7 +129,8 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Similarity;
+    use crate::geometry::{Scale, Similarity};
+    use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::fixture::visits;
     use crate::verified::landscape::Landscape;
     use crate::verified::patches::Landing;
@@ -141,8 +142,9 @@ mod tests {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
             let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
-            let predictions: Vec<_> = query.points.iter().map(place).collect();
-            let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Similarity::identity() };
+            let model = Model { sigma, detection: DETECTION, scale: Scale::Metric, vertical: None };
+            let mut laid = Patchwork::new(&query, &map, Similarity::identity(), sigma, &model);
+            laid.predictions = query.points.iter().map(place).collect();
             // A guess, and what a caller says and is wrong by a factor of two.
             for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
                 let found = scatter(&laid, KnownNoise { sigma: told, width });

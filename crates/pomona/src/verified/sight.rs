@@ -16,11 +16,6 @@ const LEAST: f64 = 0.1;
 /// Standard deviation of the depths over which fruits are counted, in spacings: 7 cm in an orchard.
 const WIDTH: f64 = 0.25;
 
-/// Whether a fruit is told to be one of some; of no fruits none is.
-pub(super) fn is_among(rows: &[bool], row: usize) -> bool {
-    rows.get(row).is_some_and(|&told| told)
-}
-
 /// Fruits of the query, and of the map, that hang where the other visit does not see; none where the map is no row.
 pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Similarity) -> [Vec<bool>; 2] {
     let Some(axes) = row_axes(map) else { return [vec![false; query.len()], vec![false; map.len()]] };

@@ -4,6 +4,7 @@
 //! counted in cells. Crowns on crowns raise whole regions of them; fruits on fruits raise one.
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
+use super::hypothesis::Model;
 use super::landscape::Landscape;
 use crate::geometry::Similarity;
 use crate::random::shuffled;
@@ -95,9 +96,9 @@ impl Rows {
     }
 
     /// Poses whose cells stand out, with the standard deviations by which, turn by turn, of those that are admitted.
-    pub(super) fn peaks(&self, admits: &(impl Fn(&Similarity) -> bool + Sync)) -> Vec<(f64, Similarity)> {
+    pub(super) fn peaks(&self, model: &Model) -> Vec<(f64, Similarity)> {
         let turns: Vec<Matrix3<f64>> =
-            turns().filter(|turn| admits(&self.placement(turn, &Vector3::zeros()))).collect();
+            turns().filter(|turn| model.admits(&self.placement(turn, &Vector3::zeros()))).collect();
         turns
             .par_iter()
             .map_init(|| self.no_counts(), |counts, turn| self.peaks_of(turn, counts))

@@ -5,7 +5,6 @@
 
 use crate::geometry::Similarity;
 use crate::moments::{FIXING, Moments};
-use crate::neighbours::tree::single;
 use crate::statistics::Evidence;
 use crate::verified::contender::{Contender, by_evidence};
 use crate::verified::footing::Footing;
@@ -66,9 +65,8 @@ struct Region {
 
 impl Region {
     fn around(query: &Landscape, place: Vector3<f64>) -> Self {
-        let (reach, mut rows) = (REACH * query.spacing, Vec::new());
-        query.tree.within(&single(&place), reach as f32, |row, _| rows.push(row));
-        rows.sort_unstable();
+        let reach = REACH * query.spacing;
+        let rows = query.within(&place, reach);
         Self { place, fruits: rows.iter().map(|&row| query.points[row as usize]).collect(), reach }
     }
 
