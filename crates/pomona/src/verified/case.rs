@@ -1,6 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{PATTERN, VerifiedConfig, WORTH_IT, poses, reached};
+use super::acceptance::{VerifiedConfig, WORTH_IT, poses, reached};
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
@@ -23,7 +23,7 @@ pub(super) const SETTLED: f64 = 0.8;
 #[derive(Debug, Clone)]
 pub(crate) struct VerifiedMap {
     pub(super) landscape: Landscape,
-    seeds: SeedIndex,
+    pub(super) seeds: SeedIndex,
     scale: Scale,
     /// Fruits of the map that this is, or is a part of.
     fruits: usize,
@@ -90,9 +90,7 @@ pub(super) fn best_first(findings: &mut [Finding]) {
 pub(super) struct Search<'a> {
     pub(super) query: &'a Landscape,
     pub(super) map: &'a Landscape,
-    /// Fruits of all of the map, where `map` is a part of it.
-    map_fruits: usize,
-    pub(super) seeds: &'a SeedIndex,
+    pub(super) prepared: &'a VerifiedMap,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
     noise_m: Option<f64>,
@@ -104,7 +102,7 @@ pub(super) struct Log {
     pub(super) effort: Effort,
     pub(super) refined: usize,
     pub(super) grown: usize,
-    /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
+    /// Most evidence of a grown pose and of a settled one, accepted or not, nats; not a number before there is one.
     pub(super) best: f64,
     pub(super) settled: f64,
     /// Evidence that a grown pose has to exceed, as far as the search shows, nats.
@@ -116,7 +114,7 @@ pub(super) struct Log {
 impl Findings<'_> {
     /// Nothing yet, where `effort` was spent and so much evidence is asked for.
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
-        let (best, settled, settled_threshold) = (f64::NEG_INFINITY, f64::NEG_INFINITY, SETTLED * threshold);
+        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, SETTLED * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
         Self { accepted: Vec::new(), others: Vec::new(), log }
     }
@@ -132,8 +130,7 @@ impl<'a> Search<'a> {
         Self {
             query,
             map: &prepared.landscape,
-            map_fruits: prepared.fruits,
-            seeds: &prepared.seeds,
+            prepared,
             model: model_of(prepared.landscape.spacing, prepared.scale, request),
             config: *config,
             noise_m: request.noise_m,
@@ -146,18 +143,14 @@ impl<'a> Search<'a> {
         Some(Self { model: Model { vertical, ..self.model }, ..*self })
     }
 
-    /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
+    /// Evidence that a grown pose must exceed, nats.
     pub(super) fn threshold(&self, share: f64) -> f64 {
         self.reached(self.config.false_alarm_rate, share)
     }
 
-    /// Evidence from which on another pose counts as a rival, accepted or not, nats.
-    pub(super) fn pattern(&self, share: f64) -> f64 {
-        self.reached(PATTERN, share)
-    }
-
-    fn reached(&self, rate: f64, share: f64) -> f64 {
-        let offered = poses(self.query.len(), self.map_fruits, self.model.scale);
+    /// Evidence that the best wrong pose exceeds with a probability of `rate`, nats; a known vertical leaves this `share` of them.
+    pub(super) fn reached(&self, rate: f64, share: f64) -> f64 {
+        let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         reached(rate, offered, self.model.vertical.map_or(1.0, |_| share))
     }
 

@@ -1,5 +1,6 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
+use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
@@ -7,12 +8,24 @@ use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
 
 impl Search<'_> {
+    /// The answer to what was found.
+    pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
+        let mut stages = self.stages(&findings);
+        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best)) {
+            stages.push(("mirrored", 1.0));
+            findings.accepted.clear();
+        }
+        let answer = self.answer(findings, stages);
+        // Where no pair is probable enough to be reported, there is nothing to answer with.
+        if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
+    }
+
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
     /// The other optima of the same search show what wrong poses reach on this very planting.
     pub(super) fn answer(&self, findings: Findings, mut stages: Vec<(&'static str, f64)>) -> Match {
         let Findings { accepted, others, log } = findings;
-        let pattern = self.pattern(log.effort.stands.share_left());
+        let pattern = self.reached(PATTERN, log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
         let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
             return Match::without_answer(Verdict::NoMatch, stages);
@@ -54,6 +67,25 @@ impl Search<'_> {
         let mut pairs: Vec<Pair> = chosen.into_iter().filter_map(pair).collect();
         pairs.sort_unstable_by_key(|pair| pair.query);
         pairs
+    }
+
+    /// What the search did, by stages.
+    pub(super) fn stages(&self, Findings { accepted, log, .. }: &Findings) -> Vec<(&'static str, f64)> {
+        vec![
+            ("query_fruits", self.query.len() as f64),
+            ("map_fruits", self.map.len() as f64),
+            ("map_seeds", self.prepared.seeds.quads.len() as f64),
+            ("query_codes", log.effort.codes as f64),
+            ("candidates", log.effort.candidates as f64),
+            ("fitted", log.effort.fitted as f64),
+            ("refined", log.refined as f64),
+            ("grown", log.grown as f64),
+            ("threshold_nats", log.threshold),
+            ("best_nats", log.best),
+            ("settled_threshold_nats", log.settled_threshold),
+            ("settled_nats", log.settled),
+            ("verified", accepted.len() as f64),
+        ]
     }
 
     fn registration(&self, overlap: &Overlap) -> Registration {

@@ -71,8 +71,8 @@ fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::{Scale, Similarity};
-    use crate::verified::hypothesis::Model;
     use crate::verified::fixture::visits;
+    use crate::verified::hypothesis::Model;
     use crate::verified::landscape::Landscape;
     use crate::verified::patches::Landing;
     use nalgebra::Vector3;

@@ -130,8 +130,8 @@ impl Counts {
 mod tests {
     use super::*;
     use crate::geometry::{Scale, Similarity};
-    use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::fixture::visits;
+    use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::landscape::Landscape;
     use crate::verified::patches::Landing;
     use nalgebra::Vector3;
