@@ -36,5 +36,10 @@ impl Neighbours {
     }
 }
 
+/// What `of` makes of each row, in order.
+pub(crate) fn each_row<T: Send>(count: usize, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..count).into_par_iter().with_min_len(SHARE_OF_ROWS).map(of).collect()
+}
+
 /// Rows at the least that are worth a thread of their own.
 pub(crate) const SHARE_OF_ROWS: usize = 256;

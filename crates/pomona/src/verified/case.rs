@@ -1,6 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{VerifiedConfig, WORTH_IT, poses, reached};
+use super::acceptance::{KEPT, VerifiedConfig, WORTH_IT, poses, reached};
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
@@ -15,9 +15,6 @@ use crate::matching::Request;
 
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
 pub(crate) const SEED_SIGMA: f64 = 0.075;
-
-/// Share of the evidence needed that a pose must have both as it grew and once it is settled.
-pub(super) const SETTLED: f64 = 0.8;
 
 /// A map made ready for many queries.
 #[derive(Debug, Clone)]
@@ -114,7 +111,7 @@ pub(super) struct Log {
 impl Findings<'_> {
     /// Nothing yet, where `effort` was spent and so much evidence is asked for.
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
-        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, SETTLED * threshold);
+        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.of_threshold * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
         Self { accepted: Vec::new(), others: Vec::new(), log }
     }

@@ -1,7 +1,7 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::VerifiedConfig;
-use super::case::{Finding, Findings, SETTLED, Search, VerifiedMap, best_first};
+use super::acceptance::{KEPT, VerifiedConfig};
+use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
@@ -9,7 +9,6 @@ use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
-use super::outlier::{KEPT, KEPT_LAID};
 use super::proposal::Effort;
 use super::search::{FIRST_FRUITS, of_some_fruits};
 use super::seeds::Seed;
@@ -145,7 +144,7 @@ impl<'a> Search<'a> {
 
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
     fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
-        accepted.extend(self.single_out(others, least, KEPT, log));
+        accepted.extend(self.single_out(others, least, KEPT.of_outlier, log));
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
@@ -172,7 +171,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            let enough = self.holds(&mut finding, SETTLED, &mut findings.log);
+            let enough = self.holds(&mut finding, KEPT.of_threshold, &mut findings.log);
             (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
         }
     }
@@ -230,7 +229,7 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT_LAID, log);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.of_laid, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             accepted.push(answer);
             others.extend(laid);

@@ -1,7 +1,7 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
 use super::case::{Finding, Findings, Search};
-use super::contender::{Contender, SAME_PLACE};
+use super::contender::{Contender, SAME};
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
 use super::overlap::Overlap;
@@ -41,7 +41,7 @@ impl<'a> Search<'a> {
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
     pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Similarity) -> bool {
-        let reach = SAME_PLACE * self.query.spacing;
+        let reach = SAME.0 * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
         let same = near

@@ -21,9 +21,6 @@ use crate::beliefs::Beliefs;
 /// misses: of rows with 15 % in common 4 of 100 were no longer found.
 const SEEN_AGAIN: (f64, f64) = (0.35, 0.9);
 
-/// Halvings of what the share may be, to .002.
-const HALVINGS: usize = 8;
-
 /// Evidence of an overlap, nats.
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let map = laid.map;
@@ -50,7 +47,8 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
 /// The share under which evidence of this slope, which falls, is largest.
 pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = SEEN_AGAIN;
-    for _ in 0..HALVINGS {
+    // Eight halvings of what it may be leave .002.
+    for _ in 0..8 {
         let middle = 0.5 * (low + high);
         *(if slope(middle) > 0.0 { &mut low } else { &mut high }) = middle;
     }

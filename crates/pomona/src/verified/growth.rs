@@ -11,14 +11,11 @@ use super::landscape::Landscape;
 use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::search::REACH;
 use super::sight::unseen;
-use crate::neighbours::others::SHARE_OF_ROWS;
-use rayon::prelude::*;
+use crate::neighbours::others::each_row;
 
-/// The first rounds look further than the noise.
-const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
-
-/// The first rounds fit one rigid pose: patches would bend towards a seed that is turned by a few degrees.
-const RIGID_ROUNDS: usize = 6;
+/// How many times further than the noise the first rounds look. They fit one rigid pose: patches would bend towards a seed that is
+/// turned by a few degrees.
+const RIGID: [f64; 6] = [2.0, 2.0, 1.6, 1.3, 1.0, 1.0];
 
 /// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.
 const WHOLE_ROUNDS: usize = 2;
@@ -46,15 +43,14 @@ pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothes
     let mut growth = Growth::new(query, map, seed, model);
     let extent = growth.patches.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
     // Two steps for each cell of the way.
-    let most = (extent / growth.patches.cut.edge) as usize * 2 + RIGID_ROUNDS;
+    let most = (extent / growth.patches.cut.edge) as usize * 2 + RIGID.len();
     let mut settled = 0;
     for round in 0..most {
-        let rigid = round < RIGID_ROUNDS;
-        let widening = WIDENING.get(round).copied().unwrap_or(1.0);
-        growth.meet(widening);
-        growth.refit(rigid);
+        let rigid = RIGID.get(round);
+        growth.meet(rigid.copied().unwrap_or(1.0));
+        growth.refit(rigid.is_some());
         settled = if growth.spread() { 0 } else { settled + 1 };
-        if settled == TURNS && round > RIGID_ROUNDS + 2 {
+        if settled == TURNS && round > RIGID.len() + 2 {
             break;
         }
     }
@@ -105,9 +101,7 @@ impl<'a> Growth<'a> {
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
         let Patchwork { map, model, .. } = self.patches;
-        let nearest = |at: &Option<Landing>| self.nearest(at.as_ref()?);
-        let met: Vec<Option<(u32, f64)>> =
-            self.patches.predictions.par_iter().with_min_len(SHARE_OF_ROWS).map(nearest).collect();
+        let met = each_row(self.partners.len(), |row| self.nearest(self.patches.predictions[row].as_ref()?));
         let mut claims = Claims::on(map.len());
         for (row, met) in met.iter().enumerate() {
             met.iter().for_each(|&(partner, ratio)| claims.claim(partner, row, ratio));

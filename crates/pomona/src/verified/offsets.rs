@@ -24,8 +24,7 @@ pub(super) const FEW_AGAIN: f64 = 0.25;
 const PULLS: [(usize, &[f64]); 2] = [(1024, &[0.25, 0.25]), (24, &[0.2, 0.2, 0.16, 0.16])];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
-const SAME: f64 = 0.5;
-const SAME_TURN_RAD: f64 = 0.06;
+const SAME: (f64, f64) = (0.5, 0.06);
 
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> Vec<Hypothesis> {
@@ -52,7 +51,7 @@ pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> V
 /// The first poses, one of those that are the same.
 fn distinct(poses: Vec<Similarity>, most: usize, spacing: f64) -> Vec<Similarity> {
     let same = |one: &Similarity, other: &Similarity| {
-        (one.translation - other.translation).norm() < SAME * spacing && one.turn_to(other) < SAME_TURN_RAD
+        (one.translation - other.translation).norm() < SAME.0 * spacing && one.turn_to(other) < SAME.1
     };
     first_of_each(poses.into_iter(), most, same)
 }

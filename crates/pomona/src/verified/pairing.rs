@@ -9,12 +9,11 @@ use rayon::prelude::*;
 /// Standard deviations that an edge reaches: as far as a branch may have moved for itself.
 const GATE: f64 = 5.0;
 
-/// Share of the fruits that moved otherwise than their neighbours, and how much wider they scatter.
+/// Share of the fruits that moved otherwise than their neighbours, and how many times wider they scatter.
 ///
 /// Real residuals have tails that no normal distribution has: a branch broke loose, a depth was measured on a leaf. A
 /// pair far off is believed only where nothing else is near.
-const LOOSE: f64 = 0.01;
-const LOOSE_WIDTH: f64 = 3.0;
+const LOOSE: (f64, f64) = (0.01, 3.0);
 
 /// Pairs less likely than this against both being alone are left out.
 const LEAST_RATIO: f64 = 1e-3;
@@ -68,11 +67,8 @@ impl Patchwork<'_> {
 
     /// What `kept` makes of every meeting within the gate, by rows of the query.
     pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
-        let rows: Vec<usize> = (0..self.predictions.len()).collect();
-        let of_part = |rows: &[usize]| -> Vec<T> {
-            rows.iter().flat_map(|&row| self.meetings_of(row)).filter_map(|meeting| kept(&meeting)).collect()
-        };
-        rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(of_part).collect()
+        let of = |row: usize| self.meetings_of(row).into_iter().filter_map(|meeting| kept(&meeting));
+        (0..self.predictions.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).flat_map_iter(of).collect()
     }
 
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
@@ -118,8 +114,9 @@ impl Patchwork<'_> {
 fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
     // Density by the squared Mahalanobis distance, times the product of the three standard deviations.
     let tailed = |d2: f64| {
-        let loose = (-0.5 * d2 / (LOOSE_WIDTH * LOOSE_WIDTH)).exp() / LOOSE_WIDTH.powi(3);
-        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - LOOSE) * (-0.5 * d2).exp() + LOOSE * loose)
+        let (share, width) = LOOSE;
+        let loose = (-0.5 * d2 / (width * width)).exp() / width.powi(3);
+        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - share) * (-0.5 * d2).exp() + share * loose)
     };
     let isotropic = || {
         let d2 = offset.norm_squared() / variance;

@@ -14,7 +14,7 @@ use super::landscape::Landscape;
 use crate::geometry::{Scale, Similarity};
 use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
-use crate::neighbours::others::SHARE_OF_ROWS;
+use crate::neighbours::others::each_row;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -104,7 +104,7 @@ impl<'a> Patchwork<'a> {
             let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !self.unseen[0][row])?;
             Some(landing(self, row, footing))
         };
-        self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
+        self.predictions = each_row(self.query.len(), at);
     }
 
     /// How firmly the pairs of cells around whose weight exceeds `least`, and as many more as `hold`, hold the pose of a cell.

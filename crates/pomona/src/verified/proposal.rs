@@ -3,7 +3,7 @@
 use super::contender::Contender;
 use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
-use super::seeds::{Quad, STARS, frame_of};
+use super::seeds::{Quad, STARS, frame};
 use super::vertical::Stands;
 use crate::geometry::{Scale, Similarity};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -94,7 +94,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     /// `None` where the seed is degenerate.
     pub(crate) fn new(query: &'a Landscape, map: &'a M, model: &'a Model, quad: Quad) -> Option<Self> {
         let fruits = quad.map(|row| query.points[row as usize]);
-        let to_frame = Matrix3::from_columns(&frame_of(&fruits)?).transpose();
+        let to_frame = Matrix3::from_columns(&frame(&fruits)?).transpose();
         let (centroid, fruits) = in_frame(fruits, &to_frame);
         let moments = fruits.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose());
         let off_centre = |&i: &usize| fruits[i].norm_squared();
@@ -107,7 +107,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     /// The pose on a seed of the map, where its squared residuals sum up to `most` at the most, it stands as a vertical asks and
     /// the fruits around speak for it.
     pub(super) fn contender(&self, target: &Quad, most: f64, effort: &mut Effort) -> Option<Contender> {
-        let (pose, residual) = self.fit(target)?;
+        let (pose, residual) = self.fit(target.map(|row| self.map.place(row)))?;
         if residual > most {
             return None;
         }
@@ -119,19 +119,13 @@ impl<'a, M: Terrain> Proposer<'a, M> {
         (log_odds > 0.0).then_some(Contender { pose, log_odds, place: self.centroid, key })
     }
 
-    /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
+    /// Least-squares pose on the fruits of a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
     ///
     /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does
     /// the rest (see [`crate::moments`]): the inertia is the same for all candidates.
     #[inline]
-    pub(crate) fn fit(&self, target: &Quad) -> Option<(Similarity, f64)> {
-        self.fit_on(target.map(|row| self.map.place(row)))
-    }
-
-    /// The same where the fruits of that seed are known.
-    #[inline]
-    pub(super) fn fit_on(&self, fruits: [Vector3<f64>; STARS]) -> Option<(Similarity, f64)> {
-        let axes = Matrix3::from_columns(&frame_of(&fruits)?);
+    pub(crate) fn fit(&self, fruits: [Vector3<f64>; STARS]) -> Option<(Similarity, f64)> {
+        let axes = Matrix3::from_columns(&frame(&fruits)?);
         let (centroid, fruits) = in_frame(fruits, &axes.transpose());
         let both = || self.fruits.iter().zip(&fruits);
         let torque = both().fold(Vector3::zeros(), |sum, (here, there)| sum + here.cross(there));
@@ -247,7 +241,8 @@ mod tests {
             let map = Landscape::new(&FruitCloud::from_positions(cloud.positions.iter().map(moved).collect()));
             for (quad, _) in longest(&query, 50) {
                 let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
-                let (pose, residual) = proposer.fit(&quad.map(|row| shown(&query, &map, row))).expect("nor its image");
+                let (pose, residual) =
+                    proposer.fit(quad.map(|row| map.points[shown(&query, &map, row) as usize])).expect("nor its image");
                 assert!(residual < 1e-18, "{residual}");
                 assert!((pose.rotation.matrix() - turn.matrix()).norm() < 1e-9 && (pose.scale - scale).abs() < 1e-9);
                 for (row, p) in (0..).zip(&query.points) {

@@ -95,7 +95,7 @@ impl Search<'_> {
         }
         // Standard deviations that the two seeds may differ by.
         let apart = match model.scale {
-            Scale::Metric => WITHIN * (length / (LONG * sigma)).clamp(1.0, WIDEST),
+            Scale::Metric => WITHIN * (length / (LONG.0 * sigma)).clamp(1.0, LONG.1),
             Scale::Free => WITHIN,
         };
         let (mut runs, mut hits) = (Vec::new(), Vec::new());
@@ -131,8 +131,7 @@ impl Search<'_> {
 ///
 /// They bend more between visits, and where the noise is larger than expected they are found still. It costs little
 /// where the length tells: a long seed has few lookalikes.
-const LONG: f64 = 24.0;
-const WIDEST: f64 = 2.0;
+const LONG: (f64, f64) = (24.0, 2.0);
 
 /// Seeds whose code has more neighbours in the map than this are passed over.
 const COMMON: usize = 48;

@@ -62,13 +62,7 @@ fn oriented(points: &[Vector3<f64>], [a, b, c, d]: Quad) -> Quad {
 
 /// Unit axes of a seed: along AB, towards C, and their cross product. `None` for near-collinear seeds.
 #[inline]
-pub(crate) fn frame(points: &[Vector3<f64>], quad: &Quad) -> Option<[Vector3<f64>; 3]> {
-    frame_of(&quad.map(|row| points[row as usize]))
-}
-
-/// The same of its fruits.
-#[inline]
-pub(super) fn frame_of(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 3]> {
+pub(crate) fn frame(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 3]> {
     let [origin, ..] = *fruits;
     let ab = fruits[1] - origin;
     let ac = fruits[2] - origin;
@@ -87,8 +81,9 @@ pub(super) fn frame_of(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 
 ///
 /// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
 fn code(points: &[Vector3<f64>], quad: Quad) -> Option<Code> {
-    let [e1, e2, e3] = frame(points, &quad)?;
-    let [ab, ac, ad] = [1, 2, 3].map(|i| points[quad[i] as usize] - points[quad[0] as usize]);
+    let fruits = quad.map(|row| points[row as usize]);
+    let [e1, e2, e3] = frame(&fruits)?;
+    let [ab, ac, ad] = [1, 2, 3].map(|i| fruits[i] - fruits[0]);
     Some([ab.dot(&e1), ac.dot(&e1), ac.dot(&e2), ad.dot(&e1), ad.dot(&e2), ad.dot(&e3)].map(|x| x as f32))
 }
 

@@ -15,11 +15,9 @@ use rayon::prelude::*;
 /// which.
 const LEAST_RATIO: f64 = 1.2;
 
-/// Pairs of fruits that are counted for each turn; of larger clouds some fruits are taken.
-const MOST_PAIRS: usize = 60_000;
-
-/// Clouds with more pairs than this are left alone: with so few of their fruits too little in common would be asked.
-const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
+/// Pairs of fruits that are counted for each turn, of larger clouds those of some fruits; and pairs of clouds that are left alone: with
+/// so few of their fruits too little in common would be asked.
+const MOST_PAIRS: [usize; 2] = [60_000, 960_000];
 
 /// Visits to one row show fruits that hang at most so many times as far apart in one as in the other: one fruit in 27. Cells
 /// count by the cube of it, so that a query in millimetres would ask for more of them than there is memory.
@@ -28,8 +26,7 @@ const ALIKE: f64 = 3.0;
 /// Radians between turns that are tried, 3 degrees, and steps either way about the axis across the row and about the one along
 /// it: the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
 const STEP_RAD: f64 = 0.05;
-const ACROSS: i32 = 5;
-const ALONG: i32 = 1;
+const STEPS: [i32; 2] = [5, 1];
 
 /// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
 const CELL: [f64; 3] = [0.45, 0.45, 0.6];
@@ -80,11 +77,11 @@ impl Rows {
     pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
         let pairs = query.len() * map.len();
         let alike = query.spacing.max(map.spacing) <= ALIKE * query.spacing.min(map.spacing);
-        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
+        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > MOST_PAIRS[1] {
             return None;
         }
         let axes = [row_axes(query)?, row_axes(map)?];
-        let share = (MOST_PAIRS as f64 / pairs as f64).sqrt().min(1.0);
+        let share = (MOST_PAIRS[0] as f64 / pairs as f64).sqrt().min(1.0);
         let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
         let edges = Vector3::from(CELL) * map.spacing;
         let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
@@ -203,8 +200,8 @@ fn cell(parts: i32) -> u32 {
 fn turns() -> impl Iterator<Item = Matrix3<f64>> {
     let steps = |count: i32| (-count..=count).map(|i| f64::from(i) * STEP_RAD);
     let of = move |signs: [f64; 3]| {
-        steps(ACROSS).flat_map(move |across| {
-            steps(ALONG).map(move |along| {
+        steps(STEPS[0]).flat_map(move |across| {
+            steps(STEPS[1]).map(move |along| {
                 let turn = Rotation3::new(Vector3::x() * along) * Rotation3::new(Vector3::z() * across);
                 turn.into_inner() * Matrix3::from_diagonal(&Vector3::from(signs))
             })

@@ -58,7 +58,7 @@ impl<'a, M: Terrain> Glance<'a, M> {
             let Some(place) = near.place(number) else { return Some(f64::INFINITY) };
             *fruit = place;
         }
-        let fitted = self.proposer.fit_on(fruits).filter(|(_, residual)| *residual <= self.most);
+        let fitted = self.proposer.fit(fruits).filter(|(_, residual)| *residual <= self.most);
         let pose = fitted.and_then(|(pose, _)| self.proposer.upright(pose))?;
         let anchor = which.iter().position(|&number| number == 0).unwrap_or_default();
         let mut around = 1.0;

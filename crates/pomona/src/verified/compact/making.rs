@@ -14,7 +14,7 @@ use super::{CompactMap, Facts, fingerprint};
 use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
 use crate::neighbours::code_grid::{Cells, Code};
-use crate::neighbours::others::{Neighbours, SHARE_OF_ROWS};
+use crate::neighbours::others::{Neighbours, each_row};
 use crate::neighbours::tree::{Tree, single};
 use crate::random::shuffled;
 use crate::verified::chance::local_density;
@@ -192,7 +192,7 @@ fn surroundings(points: &[Vector3<f64>], neighbours: &Neighbours, density: &[f64
         let offsets = neighbours.of(row).iter().map(|&other| points[other as usize] - points[row]);
         packed(offsets, density[row], step)
     };
-    (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(of).collect()
+    each_row(points.len(), of)
 }
 
 /// The largest count of a cell such that all cells with no more have at most `most` together.
