@@ -22,12 +22,12 @@ pub(super) fn by_evidence(a: &Contender, b: &Contender) -> std::cmp::Ordering {
 
 /// The best `keep` candidates of those given best first, one of each pose.
 pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Contender], keep: usize) -> Vec<Contender> {
-    let (near, (same, same_turn_rad)) = (query.spacing, SAME);
+    let (spacings, turn_rad) = SAME;
     first_of_each(candidates.iter().copied(), keep, |candidate, other| {
         let place = candidate.place;
-        (place - other.place).norm() < near
-            && (candidate.pose.image(&place) - other.pose.image(&place)).norm() < same * map_spacing
-            && candidate.pose.turn_to(&other.pose) < same_turn_rad
+        (place - other.place).norm() < query.spacing
+            && (candidate.pose.image(&place) - other.pose.image(&place)).norm() < spacings * map_spacing
+            && candidate.pose.turn_to(&other.pose) < turn_rad
     })
 }
 

@@ -41,7 +41,8 @@ impl<'a> Search<'a> {
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
     pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Similarity) -> bool {
-        let reach = SAME.0 * self.query.spacing;
+        let (spacings, _) = SAME;
+        let reach = spacings * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
         let same = near

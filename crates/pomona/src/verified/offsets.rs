@@ -50,8 +50,9 @@ pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> V
 
 /// The first poses, one of those that are the same.
 fn distinct(poses: Vec<Similarity>, most: usize, spacing: f64) -> Vec<Similarity> {
+    let (spacings, turn_rad) = SAME;
     let same = |one: &Similarity, other: &Similarity| {
-        (one.translation - other.translation).norm() < SAME.0 * spacing && one.turn_to(other) < SAME.1
+        (one.translation - other.translation).norm() < spacings * spacing && one.turn_to(other) < turn_rad
     };
     first_of_each(poses.into_iter(), most, same)
 }
@@ -96,7 +97,7 @@ mod tests {
         }
         let free = Model { scale: Scale::Free, ..model };
         assert!(hypotheses(&query, &map, &free).is_empty());
-        // Along the axis across the row half of the turns stand, along the one in depth none.
+        // What is up in the query is in depth in the map: no row laid along a row does that.
         let lying = Model { vertical: Some(Vertical::new([turn.inverse() * Vector3::y(), Vector3::z()])), ..model };
         assert!(hypotheses(&query, &map, &lying).is_empty());
     }

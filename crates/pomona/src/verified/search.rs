@@ -94,8 +94,9 @@ impl Search<'_> {
             return (found, effort);
         }
         // Standard deviations that the two seeds may differ by.
+        let (long, widest) = LONG;
         let apart = match model.scale {
-            Scale::Metric => WITHIN * (length / (LONG.0 * sigma)).clamp(1.0, LONG.1),
+            Scale::Metric => WITHIN * (length / (long * sigma)).clamp(1.0, widest),
             Scale::Free => WITHIN,
         };
         let (mut runs, mut hits) = (Vec::new(), Vec::new());

@@ -75,13 +75,13 @@ struct Counts {
 impl Rows {
     /// `None` where the clouds are no rows, not alike, or too large.
     pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
-        let pairs = query.len() * map.len();
+        let (pairs, [counted, too_many]) = (query.len() * map.len(), MOST_PAIRS);
         let alike = query.spacing.max(map.spacing) <= ALIKE * query.spacing.min(map.spacing);
-        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > MOST_PAIRS[1] {
+        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > too_many {
             return None;
         }
         let axes = [row_axes(query)?, row_axes(map)?];
-        let share = (MOST_PAIRS[0] as f64 / pairs as f64).sqrt().min(1.0);
+        let share = (counted as f64 / pairs as f64).sqrt().min(1.0);
         let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
         let edges = Vector3::from(CELL) * map.spacing;
         let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
@@ -198,10 +198,11 @@ fn cell(parts: i32) -> u32 {
 
 /// Turns of a row laid along a row, in the frames of their axes.
 fn turns() -> impl Iterator<Item = Matrix3<f64>> {
+    let [most_across, most_along] = STEPS;
     let steps = |count: i32| (-count..=count).map(|i| f64::from(i) * STEP_RAD);
     let of = move |signs: [f64; 3]| {
-        steps(STEPS[0]).flat_map(move |across| {
-            steps(STEPS[1]).map(move |along| {
+        steps(most_across).flat_map(move |across| {
+            steps(most_along).map(move |along| {
                 let turn = Rotation3::new(Vector3::x() * along) * Rotation3::new(Vector3::z() * across);
                 turn.into_inner() * Matrix3::from_diagonal(&Vector3::from(signs))
             })
