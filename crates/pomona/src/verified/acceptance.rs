@@ -75,16 +75,16 @@ pub(crate) fn reached(rate: f64, poses: f64, share: f64) -> f64 {
 /// partner.
 pub(super) struct Kept {
     /// Where the threshold is what chance reaches anywhere.
-    pub(super) of_threshold: f64,
+    pub(super) threshold: f64,
     /// Where a pose stands out of all others: what true poses keep. Poses on wires that have far more than all others keep 0.5 to
     /// 0.75.
-    pub(super) of_outlier: f64,
+    pub(super) outlier: f64,
     /// The same of rows laid along rows, whose fruits in common are few: on wires wrong poses with as much evidence keep half of
     /// what is needed and less.
-    pub(super) of_laid: f64,
+    pub(super) laid: f64,
 }
 
-pub(super) const KEPT: Kept = Kept { of_threshold: 0.8, of_outlier: 0.9, of_laid: 0.7 };
+pub(super) const KEPT: Kept = Kept { threshold: 0.8, outlier: 0.9, laid: 0.7 };
 
 /// Rate of the log-odds from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
 /// in twenty.

@@ -39,9 +39,9 @@ mod tests {
     #[test]
     fn the_strongest_claim_counts_and_of_equals_the_first_until_all_are_forgotten() {
         let mut claims = Claims::on(2);
-        [(5, -2.0), (6, -1.0), (7, -1.0), (8, -3.0)]
-            .into_iter()
-            .for_each(|(by, strength)| claims.claim(1, by, strength));
+        for (by, strength) in [(5, -2.0), (6, -1.0), (7, -1.0), (8, -3.0)] {
+            claims.claim(1, by, strength);
+        }
         assert_eq!([0, 1].map(|fruit| claims.owner(fruit)), [None, Some(6)]);
         claims.forget();
         assert_eq!(claims.owner(1), None);

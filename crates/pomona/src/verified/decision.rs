@@ -27,7 +27,7 @@ pub(super) const MIN_FRUITS: usize = 5;
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
 /// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
-const RIVAL_SEED: f64 = 0.3;
+pub(super) const RIVAL_SEED: f64 = 0.3;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
@@ -144,7 +144,7 @@ impl<'a> Search<'a> {
 
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
     fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
-        accepted.extend(self.single_out(others, least, KEPT.of_outlier, log));
+        accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            let enough = self.holds(&mut finding, KEPT.of_threshold, &mut findings.log);
+            let enough = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
             (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
         }
     }
@@ -229,7 +229,7 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.of_laid, log);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             accepted.push(answer);
             others.extend(laid);

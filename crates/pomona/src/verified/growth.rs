@@ -104,7 +104,9 @@ impl<'a> Growth<'a> {
         let met = each_row(self.partners.len(), |row| self.nearest(self.patches.predictions[row].as_ref()?));
         let mut claims = Claims::on(map.len());
         for (row, met) in met.iter().enumerate() {
-            met.iter().for_each(|&(partner, ratio)| claims.claim(partner, row, ratio));
+            if let Some((partner, ratio)) = *met {
+                claims.claim(partner, row, ratio);
+            }
         }
         let mut gains = vec![0.0; met.len()];
         for (row, met) in met.into_iter().enumerate() {

@@ -12,7 +12,7 @@ use crate::matching::Request;
 use crate::verified::acceptance::VerifiedConfig;
 use crate::verified::case::{Search, VerifiedMap, model_of};
 use crate::verified::contender::{Contender, by_evidence, distinct};
-use crate::verified::decision::{self, MIN_FRUITS};
+use crate::verified::decision::{self, MIN_FRUITS, RIVAL_SEED};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
 use crate::verified::proposal::Effort;
@@ -42,9 +42,6 @@ const WHOLE: usize = 12;
 
 /// Nats by which the best contender has to stand out of those of other poses to be verified before the last round.
 const STANDS_OUT: f64 = 6.0;
-
-/// Share of its evidence from which on others are verified with it there: as in [`decision`], less grow to no rival.
-const RIVAL: f64 = 0.3;
 
 /// Poses are one where they put the seed of one of them within so many spacings of one place, turned by less than that.
 const SAME_PLACE: f64 = 1.0;
@@ -195,7 +192,7 @@ impl Case<'_> {
 fn outstanding(contenders: &[Contender]) -> Option<&[Contender]> {
     let best = contenders.first()?.log_odds;
     let second = contenders.get(1).map_or(0.0, |one| one.log_odds.max(0.0));
-    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
+    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL_SEED * best).count();
     (best > STANDS_OUT + second).then(|| &contenders[..rivals])
 }
 
