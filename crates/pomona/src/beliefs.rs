@@ -61,8 +61,8 @@ impl Beliefs {
         }
     }
 
-    /// The one-to-one edges that gain most expected right answers, by rows of the query, with their probabilities: a wrong one costs
-    /// as much as one of `least` is worth.
+    /// The one-to-one edges that gain most expected right answers, by rows of the query, with their probabilities: a
+    /// wrong one costs as much as one of `least` is worth.
     pub(crate) fn chosen(&self, n_query: usize, n_map: usize, least: f64) -> Vec<(Edge, f64)> {
         let gain = |(edge, p): (&Edge, f64)| (edge.query as usize, edge.map as usize, p - least);
         let partners = assign(n_query, n_map, &self.links().map(gain).collect::<Vec<_>>());

@@ -57,8 +57,8 @@ impl Moments {
         self.weight * self.spread().trace() * 2.0 / 3.0
     }
 
-    /// Inertia of the query's points about their centroid as `pose` turns and scales them; over the variance of a pair it is
-    /// the inverse covariance of the turn.
+    /// Inertia of the query's points about their centroid as `pose` turns and scales them; over the variance of a
+    /// pair it is the inverse covariance of the turn.
     pub(crate) fn inertia_under(&self, pose: &Similarity) -> Matrix3<f64> {
         let turned = pose.image_of_covariance(&self.spread()) * self.weight;
         Matrix3::identity() * turned.trace() - turned

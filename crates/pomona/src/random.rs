@@ -3,8 +3,8 @@
 /// From one state of [`SplitMix`] to the next.
 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// A fixed shuffle of 64-bit keys, the first number of [`SplitMix`] from each: what is tried first must not follow the input's
-/// order.
+/// A fixed shuffle of 64-bit keys, the first number of [`SplitMix`] from each: what is tried first must not follow
+/// the input's order.
 pub(crate) fn shuffled(key: u64) -> u64 {
     let mut z = key.wrapping_add(STEP);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

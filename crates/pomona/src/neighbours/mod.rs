@@ -5,8 +5,8 @@
 //! - `tree`: the same question of fruits in single precision, answered point by point, in an order that never changes.
 //!   The verified method sums over what it visits.
 //! - `others`: the nearest other fruits of every fruit, looked up once with that tree.
-//! - `code_grid`: codes of six numbers in single precision that stay, asked for all within a radius, a million times. Seeds
-//!   of the verified method.
+//! - `code_grid`: codes of six numbers in single precision that stay, asked for all within a radius, a million times.
+//!   Seeds of the verified method.
 //! - `grid`: fruits that stay, asked for all within a gate that a cell holds.
 //! - `vicinity`: fruits that stay, asked for the nearest within a reach that is known beforehand, by one look at a list.
 //! - `moving`: points that move, come and go, asked for all in a box.

@@ -145,7 +145,8 @@ impl<'a> Search<'a> {
         self.reached(self.config.false_alarm_rate, share)
     }
 
-    /// Evidence that the best wrong pose exceeds with a probability of `rate`, nats; a known vertical leaves this `share` of them.
+    /// Evidence that the best wrong pose exceeds with a probability of `rate`, nats; a known vertical leaves this
+    /// `share` of them.
     pub(super) fn reached(&self, rate: f64, share: f64) -> f64 {
         let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         reached(rate, offered, self.model.vertical.map_or(1.0, |_| share))

@@ -13,8 +13,8 @@ use super::search::REACH;
 use super::sight::unseen;
 use crate::neighbours::others::each_row;
 
-/// How many times further than the noise the first rounds look. They fit one rigid pose: patches would bend towards a seed that is
-/// turned by a few degrees.
+/// How many times further than the noise the first rounds look. They fit one rigid pose: patches would bend towards a
+/// seed that is turned by a few degrees.
 const RIGID: [f64; 6] = [2.0, 2.0, 1.6, 1.3, 1.0, 1.0];
 
 /// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.

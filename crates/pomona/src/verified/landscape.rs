@@ -115,7 +115,8 @@ impl Landscape {
         self.points.len()
     }
 
-    /// The nearest [`NEIGHBOURS`] other fruits, nearest first; all others in smaller clouds.
+    /// The nearest other fruits, as many as [`crate::neighbours::others`] keeps, nearest first; all others in smaller
+    /// clouds.
     #[inline]
     pub(crate) fn neighbours(&self, row: usize) -> &[u32] {
         self.neighbours.of(row)

@@ -18,8 +18,8 @@ use crate::neighbours::others::each_row;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Weights (see [`super::cut`]) that cells around a cell exceed: those that its patch is fitted to, next to it, and those of its
-/// surroundings, all of them.
+/// Weights (see [`super::cut`]) that cells around a cell exceed: those that its patch is fitted to, next to it, and
+/// those of its surroundings, all of them.
 pub(super) const NEXT: f64 = 0.3;
 pub(super) const ALL: f64 = 0.0;
 
@@ -107,7 +107,8 @@ impl<'a> Patchwork<'a> {
         self.predictions = each_row(self.query.len(), at);
     }
 
-    /// How firmly the pairs of cells around whose weight exceeds `least`, and as many more as `hold`, hold the pose of a cell.
+    /// How firmly the pairs of cells around whose weight exceeds `least`, and as many more as `hold`, hold the pose
+    /// of a cell.
     pub(super) fn footing(&self, cell: &Cell, least: f64, hold: f64) -> Footing {
         Footing::new(&self.pairs_around(cell, least), hold, self.cut.edge, cell.centre)
     }

@@ -119,7 +119,8 @@ impl<'a, M: Terrain> Proposer<'a, M> {
         (log_odds > 0.0).then_some(Contender { pose, log_odds, place: self.centroid, key })
     }
 
-    /// Least-squares pose on the fruits of a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
+    /// Least-squares pose on the fruits of a seed of the map and the sum of the squared residuals. `None` where that
+    /// is degenerate.
     ///
     /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does
     /// the rest (see [`crate::moments`]): the inertia is the same for all candidates.

@@ -23,8 +23,8 @@ pub(super) const FIRST_FRUITS: usize = 256;
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
 
-/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the other
-/// poses that an answer has to stand out of.
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the
+/// other poses that an answer has to stand out of.
 const UPRIGHT_SEEDS: u64 = 2;
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
@@ -44,7 +44,8 @@ fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
 }
 
 impl Search<'_> {
-    /// The rounds of a search, each made when it is asked for: their seeds, and how many of their candidates are refined.
+    /// The rounds of a search, each made when it is asked for: their seeds, and how many of their candidates are
+    /// refined.
     pub(super) fn rounds(&self) -> impl Iterator<Item = (Vec<Seed>, usize)> {
         let mut longest = Vec::new();
         (0..).zip(ROUNDS).map(move |(round, keep)| (self.seeds_of(round, &mut longest), keep))

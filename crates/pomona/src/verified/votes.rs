@@ -15,8 +15,8 @@ use rayon::prelude::*;
 /// which.
 const LEAST_RATIO: f64 = 1.2;
 
-/// Pairs of fruits that are counted for each turn, of larger clouds those of some fruits; and pairs of clouds that are left alone: with
-/// so few of their fruits too little in common would be asked.
+/// Pairs of fruits that are counted for each turn, of larger clouds those of some fruits; and pairs of clouds that
+/// are left alone: with so few of their fruits too little in common would be asked.
 const MOST_PAIRS: [usize; 2] = [60_000, 960_000];
 
 /// Visits to one row show fruits that hang at most so many times as far apart in one as in the other: one fruit in 27. Cells

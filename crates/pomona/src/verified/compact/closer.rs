@@ -1,7 +1,7 @@
 //! A closer look at a contender: its pose refined on the places in the index, and what the fruits around its seed say then.
 //!
-//! It does what [`crate::verified::hypothesis::refined`] does, without the map's side of the evidence and without what only a
-//! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
+//! It does what [`crate::verified::hypothesis::refined`] does, without the map's side of the evidence and without
+//! what only a prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
 
 use crate::geometry::Similarity;
 use crate::moments::{FIXING, Moments};
