@@ -17,6 +17,7 @@ use crate::cloud::{FruitCloud, Views};
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use crate::neighbours::cells::{CellKey, CellMap};
+use crate::statistics::upper_median;
 use nalgebra::{Point3, Vector3};
 
 /// Fruits whose spacing is measured: enough for a median that up to fifteen strays among them do not touch.
@@ -220,7 +221,7 @@ impl Sample {
                 *distances.select_nth_unstable_by(others, f64::total_cmp).1
             })
             .collect();
-        let spacing = if nearest.is_empty() { 0.0 } else { crate::verified::median(&mut nearest) };
+        let spacing = upper_median(&mut nearest);
         let around = |p: &Point3<f64>| sampled.iter().filter(|other| (*other - p).norm() <= REACH * spacing).count();
         // Of equals the first.
         let bulk = sampled.iter().rev().max_by_key(|p| around(p)).copied().unwrap_or_default();

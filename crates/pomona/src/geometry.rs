@@ -34,7 +34,51 @@ impl Similarity {
     /// The image of a point.
     #[inline]
     pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
-        Point3::from(self.rotation * point.coords * self.scale + self.translation)
+        Point3::from(self.image(&point.coords))
+    }
+
+    /// The image of a place, as seen from the origin.
+    #[inline]
+    pub(crate) fn image(&self, place: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * place * self.scale + self.translation
+    }
+
+    /// The place whose image is `place`.
+    #[inline]
+    pub(crate) fn preimage(&self, place: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.inverse_transform_vector(&(place - self.translation)) / self.scale
+    }
+
+    /// The image of a covariance.
+    #[inline]
+    pub(crate) fn image_of_covariance(&self, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+        let rotation = self.rotation.matrix();
+        rotation * covariance * rotation.transpose() * (self.scale * self.scale)
+    }
+
+    /// The same, turned about the image of `middle`.
+    #[inline]
+    pub(crate) fn turned(&self, middle: &Vector3<f64>, turn: &Rotation3<f64>) -> Self {
+        let rotation = turn * self.rotation;
+        Self { rotation, translation: self.image(middle) - rotation * middle * self.scale, scale: self.scale }
+    }
+
+    /// The same, turned about the image of `middle` by an angle either way about each axis of the target.
+    pub(crate) fn turned_either_way(&self, middle: &Vector3<f64>, angle_rad: f64) -> [Self; 6] {
+        let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * angle_rad);
+        [-x, -y, -z, x, y, z].map(|turn| self.turned(middle, &Rotation3::new(turn)))
+    }
+
+    /// Angle between this rotation and another, radians.
+    #[inline]
+    pub(crate) fn turn_to(&self, other: &Self) -> f64 {
+        let cosine = (self.rotation.matrix().component_mul(other.rotation.matrix()).sum() - 1.0) / 2.0;
+        cosine.clamp(-1.0, 1.0).acos()
+    }
+
+    /// The same between places as seen from `source` and from `target`.
+    pub(crate) fn about(&self, source: &Vector3<f64>, target: &Vector3<f64>) -> Self {
+        Self { translation: self.image(source) - target, ..*self }
     }
 
     /// The transform that undoes this one.

@@ -65,6 +65,7 @@
 
 pub mod answer;
 pub mod assignment;
+mod beliefs;
 pub mod bundle;
 pub mod camera;
 pub mod cloud;
@@ -78,12 +79,14 @@ pub mod localization;
 pub mod look;
 pub mod matching;
 mod meanings;
+mod moments;
 pub mod neighbours;
 pub mod odometry;
 pub mod paper;
 pub mod pose;
 mod random;
 pub mod row_search;
+mod statistics;
 pub mod stereo;
 pub mod tracking;
 pub mod verified;

@@ -9,9 +9,10 @@ use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
 use crate::error::Result;
 use crate::geometry::{Scale, Similarity, fit};
-use crate::neighbours::tree::Tree;
+use crate::neighbours::tree::{Tree, single};
+use crate::random::shuffled;
 use crate::verified::{
-    COMPANIONS, Landscape, Quad, SEED_SIGMA, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled, single,
+    COMPANIONS, Landscape, Quad, SEED_SIGMA, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties,
 };
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -157,7 +158,7 @@ impl<'a> Search<'a> {
             near_ties(&around, quad, WITHIN * self.sigma, &mut |quad, code| {
                 hits.clear();
                 self.seeds.codes.within(&code, (RADIUS * self.sigma) as f32, &mut runs, |hit| hits.push(hit));
-                if let Some(axes) = frame(&around, &quad).filter(|_| hits.len() <= COMMON) {
+                if let Some(axes) = frame(&quad.map(|row| around[row as usize])).filter(|_| hits.len() <= COMMON) {
                     guesses.extend(hits.iter().filter_map(|&hit| self.guess(anchor, &around, quad, &axes, hit)));
                 }
             });
@@ -175,8 +176,8 @@ impl<'a> Search<'a> {
         hit: u32,
     ) -> Option<Guess> {
         let seen = self.seeds.quads[hit as usize];
-        let rotation =
-            Matrix3::from_columns(axes) * Matrix3::from_columns(&frame(&self.visit.points, &seen)?).transpose();
+        let rotation = Matrix3::from_columns(axes)
+            * Matrix3::from_columns(&frame(&seen.map(|row| self.visit.points[row as usize]))?).transpose();
         let middle = |points: &[Vector3<f64>], quad: Quad| {
             quad.iter().map(|&row| points[row as usize]).sum::<Vector3<f64>>() / 4.0
         };

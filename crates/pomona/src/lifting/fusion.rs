@@ -20,7 +20,7 @@
 //!               Phi((D - D_i) / sigma_i - sigma_i / (h_i D_i)).                                     (1)
 //! ```
 
-use super::statistics::{log_normal_cdf, median};
+use crate::statistics::{log_normal_cdf, median};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 const ITERATIONS: usize = 10;

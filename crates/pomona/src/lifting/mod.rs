@@ -27,7 +27,6 @@ pub mod fruits;
 pub mod fusion;
 pub mod outline;
 mod shift;
-pub(crate) mod statistics;
 pub mod surface;
 
 use crate::camera::{Camera, DepthPicture, PixelBox};

@@ -2,8 +2,8 @@
 
 use super::SURFACE_PATCHES;
 use super::outline::Outline;
-use super::statistics::median;
 use super::surface::{DepthVote, MIN_PIXELS, MIN_SURFACE_SIGMA_M, P_GAP, Pixel, RIM, UnitSphere};
+use crate::statistics::median;
 
 /// Places tried along the hidden side of a box; the farthest two leave the fruit flush with one edge.
 const SHIFTS: usize = 17;

@@ -19,7 +19,7 @@
 //! cameras flatten small spheres (skin lets infrared in, filters smooth). A sphere fitted to box and depth together
 //! made apples 25 mm too large on average; the box alone 6 mm, most of it a nominal focal length.
 
-use super::statistics::{median, quantile_of_sorted};
+use crate::statistics::{median, quantile_of_sorted};
 
 /// Part of the outline's radius that votes: beyond it the surface is steep and depth cameras mix it with what is behind.
 const FACE: f64 = 0.85;

@@ -1,5 +1,7 @@
 //! Search among fruits in single precision: a balanced k-d tree with bucket leaves, visited in an order that is its own.
 
+use nalgebra::Vector3;
+
 /// A k-d tree over points in single precision.
 ///
 /// Leaves hold up to [`LEAF`] points in the order of the tree, so that a leaf is scanned in one sweep.
@@ -22,6 +24,12 @@ struct Node {
 }
 
 const LEAF: usize = 12;
+
+/// A place in single precision.
+#[inline]
+pub(crate) fn single(p: &Vector3<f64>) -> [f32; 3] {
+    [p.x as f32, p.y as f32, p.z as f32]
+}
 
 impl Tree {
     /// Builds the tree; the order of `points` decides the rows that queries return.

@@ -19,8 +19,8 @@ mod way;
 mod window;
 
 use crate::camera::Camera;
-use crate::lifting::statistics::median;
 use crate::pose::Pose;
+use crate::statistics::median;
 use nalgebra::{Matrix6, Vector2, Vector3};
 
 pub use config::{OdometryConfig, PicturesConfig};

@@ -6,8 +6,8 @@ use super::eyes::Eyes;
 use super::reference::{Found, Reference};
 use super::way::{Placed, Way};
 use super::window::{Sighting, Window};
-use crate::lifting::statistics::median;
 use crate::pose::Pose;
+use crate::statistics::median;
 use nalgebra::{Rotation3, Vector2, Vector3};
 
 /// Frames that hang together; the first one's camera is the frame of reference.

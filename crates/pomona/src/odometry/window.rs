@@ -5,8 +5,8 @@ use super::way::Way;
 use crate::bundle::{Measured, PointView, Problem, Settings, State, adjust};
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::lifting::statistics::median;
 use crate::pose::Pose;
+use crate::statistics::median;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
 use std::collections::VecDeque;
 

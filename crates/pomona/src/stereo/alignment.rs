@@ -9,7 +9,7 @@
 //!
 //! whatever the depth. One match in five is wrong on foliage, so the fit is reweighted from the median on.
 
-use crate::lifting::statistics::median;
+use crate::statistics::median;
 use nalgebra::{Matrix3, Vector3};
 
 /// Offset, pixels, and turn, radians, from which on rows count as misaligned; half a pixel, or 0.1 degrees, is always told

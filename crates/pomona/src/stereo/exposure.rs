@@ -5,7 +5,7 @@
 //! scene itself changes from frame to frame stays below the least gain that is taken out, so pictures that were exposed
 //! alike stay as they are.
 
-use crate::lifting::statistics::median;
+use crate::statistics::median;
 
 /// Quantiles that are compared: dark parts are noise, and the brightest are cut off.
 const QUANTILES: [f64; 2] = [0.2, 0.9];

@@ -5,7 +5,7 @@
 //! disparity of another fruit costs by how far it is from them. The cost grows as the logarithm of a Cauchy density does: a
 //! clear match overrules it, a fruit of another size is believed.
 
-use crate::lifting::statistics::median;
+use crate::statistics::median;
 
 /// Least number of sure matches that speak for the others.
 const MIN_SURE: usize = 4;

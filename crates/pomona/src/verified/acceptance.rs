@@ -61,14 +61,30 @@ impl VerifiedConfig {
 ///
 /// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six or
 /// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
-/// `P(max > t) = exp(-(t - OFFSET - PER_POSE ln N) / STRETCH)`. `python -m benchmarks chance` fits the three constants; it
-/// gives 14.7, 0.86 and 2.2 for crowns, more for a dozen fruits and less for rows. The cells without overlap and the
+/// `P(max > t) = exp(-(t - offset - per_pose ln N) / stretch)`. `python -m benchmarks chance` fits the three; it gives
+/// 14.7, 0.86 and 2.2 for crowns, more for a dozen fruits and less for rows. The cells without overlap and the
 /// unrelated clouds of the benchmarks `cells` and `season` hold them to account.
 ///
 /// Where only a `share` of all turns is admitted, the probability is that share of it.
 pub(crate) fn reached(rate: f64, poses: f64, share: f64) -> f64 {
-    OFFSET + PER_POSE * poses.max(1.0).ln() + STRETCH * (share.ln() - rate.ln())
+    let [offset, per_pose, stretch] = LARGEST;
+    offset + per_pose * poses.max(1.0).ln() + stretch * (share.ln() - rate.ln())
 }
+
+/// Share of the evidence needed that a pose must have both as it grew and once it is settled, every fruit predicted
+/// without its own partner.
+pub(super) struct Kept {
+    /// Where the threshold is what chance reaches anywhere.
+    pub(super) threshold: f64,
+    /// Where a pose stands out of all others: what true poses keep. Poses on wires that have far more than all others
+    /// keep 0.5 to 0.75.
+    pub(super) outlier: f64,
+    /// The same of rows laid along rows, whose fruits in common are few: on wires wrong poses with as much evidence
+    /// keep half of what is needed and less.
+    pub(super) laid: f64,
+}
+
+pub(super) const KEPT: Kept = Kept { threshold: 0.8, outlier: 0.9, laid: 0.7 };
 
 /// Rate of the log-odds from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
 /// in twenty.
@@ -92,14 +108,10 @@ pub(crate) fn poses(n_query: usize, n_map: usize, scale: Scale) -> f64 {
     n_query as f64 * n_map as f64 * scales
 }
 
-/// Log-odds, in nats, that a single wrong pose reaches.
-const OFFSET: f64 = 5.1;
-
-/// Growth of the largest wrong log-odds with the logarithm of the poses, from a dozen fruits to rows of five trees.
-const PER_POSE: f64 = 2.5;
-
-/// How much slower than exp(-t) the tail of refined wrong poses falls.
-const STRETCH: f64 = 1.77;
+/// The law of the largest log-odds of wrong poses: what a single one reaches, in nats; how they grow with the
+/// logarithm of the poses, from a dozen fruits to rows of five trees; and how much slower than exp(-t) the tail of
+/// refined ones falls.
+const LARGEST: [f64; 3] = [5.1, 2.5, 1.77];
 
 /// Mean distance, in nats, from the best wrong pose of a search to the second best: of 460 pairs of unrelated clouds, from
 /// frames of 16 fruits to rows, a tenth lie more than 4.7 apart, one in a hundred 7.6.

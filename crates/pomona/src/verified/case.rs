@@ -1,11 +1,10 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{PATTERN, VerifiedConfig, WORTH_IT, poses, reached};
+use super::acceptance::{KEPT, VerifiedConfig, WORTH_IT, poses, reached};
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
-use super::placement::Placement;
 use super::proposal::Effort;
 use super::seeds::{SHORTEST, SeedIndex};
 use super::settlement::{Settled, settle};
@@ -17,14 +16,11 @@ use crate::matching::Request;
 /// Noise in spacings that seeds are searched with: 2 cm in an orchard.
 pub(crate) const SEED_SIGMA: f64 = 0.075;
 
-/// Share of the evidence needed that a pose must have both as it grew and once it is settled.
-pub(super) const SETTLED: f64 = 0.8;
-
 /// A map made ready for many queries.
 #[derive(Debug, Clone)]
 pub(crate) struct VerifiedMap {
     pub(super) landscape: Landscape,
-    seeds: SeedIndex,
+    pub(super) seeds: SeedIndex,
     scale: Scale,
     /// Fruits of the map that this is, or is a part of.
     fruits: usize,
@@ -44,7 +40,7 @@ impl VerifiedMap {
 
     /// What is cut out of a map of so many fruits and of this spacing, for poses that are proposed.
     pub(super) fn part(cloud: &FruitCloud, spacing: f64, fruits: usize) -> Self {
-        let landscape = Landscape::part(cloud, spacing);
+        let landscape = Landscape::with_spacing(cloud, Some(spacing));
         Self { landscape, seeds: SeedIndex::empty(), scale: Scale::Metric, fruits }
     }
 }
@@ -91,9 +87,7 @@ pub(super) fn best_first(findings: &mut [Finding]) {
 pub(super) struct Search<'a> {
     pub(super) query: &'a Landscape,
     pub(super) map: &'a Landscape,
-    /// Fruits of all of the map, where `map` is a part of it.
-    map_fruits: usize,
-    pub(super) seeds: &'a SeedIndex,
+    pub(super) prepared: &'a VerifiedMap,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
     noise_m: Option<f64>,
@@ -105,7 +99,7 @@ pub(super) struct Log {
     pub(super) effort: Effort,
     pub(super) refined: usize,
     pub(super) grown: usize,
-    /// Most evidence of a grown pose and of a settled one, accepted or not, nats.
+    /// Most evidence of a grown pose and of a settled one, accepted or not, nats; not a number before there is one.
     pub(super) best: f64,
     pub(super) settled: f64,
     /// Evidence that a grown pose has to exceed, as far as the search shows, nats.
@@ -117,7 +111,7 @@ pub(super) struct Log {
 impl Findings<'_> {
     /// Nothing yet, where `effort` was spent and so much evidence is asked for.
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
-        let (best, settled, settled_threshold) = (f64::NEG_INFINITY, f64::NEG_INFINITY, SETTLED * threshold);
+        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.threshold * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
         Self { accepted: Vec::new(), others: Vec::new(), log }
     }
@@ -133,8 +127,7 @@ impl<'a> Search<'a> {
         Self {
             query,
             map: &prepared.landscape,
-            map_fruits: prepared.fruits,
-            seeds: &prepared.seeds,
+            prepared,
             model: model_of(prepared.landscape.spacing, prepared.scale, request),
             config: *config,
             noise_m: request.noise_m,
@@ -147,28 +140,21 @@ impl<'a> Search<'a> {
         Some(Self { model: Model { vertical, ..self.model }, ..*self })
     }
 
-    /// Evidence that a grown pose must exceed, nats; a known vertical leaves this `share` of the wrong poses.
+    /// Evidence that a grown pose must exceed, nats.
     pub(super) fn threshold(&self, share: f64) -> f64 {
         self.reached(self.config.false_alarm_rate, share)
     }
 
-    /// Evidence from which on another pose counts as a rival, accepted or not, nats.
-    pub(super) fn pattern(&self, share: f64) -> f64 {
-        self.reached(PATTERN, share)
-    }
-
-    fn reached(&self, rate: f64, share: f64) -> f64 {
-        let offered = poses(self.query.len(), self.map_fruits, self.model.scale);
+    /// Evidence that the best wrong pose exceeds with a probability of `rate`, nats; a known vertical leaves this
+    /// `share` of them.
+    pub(super) fn reached(&self, rate: f64, share: f64) -> f64 {
+        let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         reached(rate, offered, self.model.vertical.map_or(1.0, |_| share))
     }
 
     /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
     pub(super) fn least(&self) -> f64 {
         reached(self.config.false_alarm_rate, poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
-    }
-
-    pub(super) fn admits(&self, pose: &Placement) -> bool {
-        self.model.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
     /// Whether a finding has enough evidence: as it grew or once it is settled, every fruit predicted without its own partner,
@@ -190,8 +176,8 @@ impl<'a> Search<'a> {
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where there is none.
     fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
-        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), WORTH_IT);
-        pairs.iter().map(|pair| pair.probability).sum::<f64>() / pairs.len().max(1) as f64
+        let pairs = settled.beliefs.chosen(self.query.len(), self.map.len(), WORTH_IT);
+        pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64
     }
 
     /// Looks closely at a finding, over all that it reaches; returns its evidence.

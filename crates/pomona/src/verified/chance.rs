@@ -1,8 +1,7 @@
 //! What chance puts at each place of a cloud: the density of strangers, near a fruit and at a distance from one.
 
-use super::nearest::{Neighbours, SHARE_OF_ROWS};
+use crate::neighbours::others::{Neighbours, each_row};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// Kernel estimate at each fruit from its neighbours, half at the width of a cluster, half at that of a branch.
 ///
@@ -12,23 +11,14 @@ use rayon::prelude::*;
 /// is as flat as the cloud around.
 pub(super) fn local_density(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64, floor: f64) -> Vec<f64> {
     let flatness = flatness(points, neighbours, spacing);
-    points
-        .par_iter()
-        .enumerate()
-        .with_min_len(SHARE_OF_ROWS)
-        .map(|(row, p)| {
-            let kernels = KERNELS.map(|width| Kernel::new(width * spacing, &flatness[row]));
-            let sum: f64 = neighbours
-                .of(row)
-                .iter()
-                .map(|&other| {
-                    let apart = points[other as usize] - p;
-                    kernels.iter().map(|kernel| kernel.at(&apart)).sum::<f64>()
-                })
-                .sum();
-            sum / KERNELS.len() as f64 + floor
-        })
-        .collect()
+    each_row(points.len(), |row| {
+        let kernels = KERNELS.map(|width| Kernel::new(width * spacing, &flatness[row]));
+        let from = |&other: &u32| {
+            let apart = points[other as usize] - points[row];
+            kernels.iter().map(|kernel| kernel.at(&apart)).sum::<f64>()
+        };
+        neighbours.of(row).iter().map(from).sum::<f64>() / KERNELS.len() as f64 + floor
+    })
 }
 
 /// Widths of the kernels in spacings: of a cluster, and of a branch.
@@ -74,7 +64,7 @@ fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> V
         };
         near.iter().map(spread).sum::<Matrix3<f64>>() / count
     };
-    let of_each: Vec<_> = (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(around).collect();
+    let of_each = each_row(points.len(), around);
     // Two dozen fruits show a shape where there is none; those of their neighbours together do not.
     let seen = SEEN.min(points.len() as f64);
     let round = Matrix3::identity() * spacing.powi(2);
@@ -87,7 +77,7 @@ fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> V
         let longest = covariance.symmetric_eigenvalues().max();
         covariance.try_inverse().map_or(Matrix3::zeros(), |inverse| inverse - Matrix3::identity() / longest)
     };
-    (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(shape).collect()
+    each_row(points.len(), shape)
 }
 
 /// Expected density of companions at each fruit over the mean, from the number of its neighbours within the spacing.
@@ -109,6 +99,9 @@ pub(super) fn crowding(points: &[Vector3<f64>], neighbours: &Neighbours, spacing
     counts.iter().map(|n| (1.0 + inverse_shape * n) / (1.0 + inverse_shape * mean)).collect()
 }
 
+/// Width of a bin of distances between fruits, in spacings: 1.1 cm in an orchard.
+pub(super) const BIN: f64 = 1.0 / 24.0;
+
 /// The fruits around a fruit by their distance, from the cloud's own pairs.
 ///
 /// Fruits of a cluster keep their distance and crowd beyond it: there is no companion at 3 cm and many at 8 cm. What
@@ -121,15 +114,14 @@ pub(super) struct Companions {
 }
 
 impl Companions {
-    /// Width of a bin in spacings: 1.1 cm in an orchard; counted up to 1.5 spacings.
-    const BIN: f64 = 1.0 / 24.0;
+    /// Up to 1.5 spacings.
     const BINS: usize = 36;
 
     /// Half the width of what a density is the mean of, in bins: a shell of 3 cm in an orchard.
     const HALF: f64 = 1.5;
 
     pub(super) fn new(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Self {
-        let bin = Self::BIN * spacing;
+        let bin = BIN * spacing;
         let mut within = vec![0.0; Self::BINS + 1];
         for (row, p) in points.iter().enumerate() {
             for &other in neighbours.of(row) {
@@ -184,15 +176,16 @@ pub(super) fn kinship(points: &[Vector3<f64>], neighbours: &Neighbours, spacing:
 mod tests {
     use super::*;
     use crate::cloud::FruitCloud;
+    use crate::statistics::upper_median;
     use crate::verified::fixture::Dice;
-    use crate::verified::landscape::{Landscape, median};
+    use crate::verified::landscape::Landscape;
 
     /// Median density of fruits spread evenly in a box, over the true one.
     fn seen(count: usize, size: [f64; 3]) -> f64 {
         let mut dice = Dice(3);
         let fruits = (0..count).map(|_| size.map(|length| length * dice.uniform()).into()).collect();
         let mut density = Landscape::new(&FruitCloud::from_positions(fruits)).density;
-        median(&mut density) * size.iter().product::<f64>() / count as f64
+        upper_median(&mut density) * size.iter().product::<f64>() / count as f64
     }
 
     #[test]

@@ -1,23 +1,38 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
+use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
+use crate::beliefs::{Beliefs, Edge};
+use crate::geometry::Similarity;
 
 impl Search<'_> {
+    /// The answer to what was found.
+    pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
+        let mut stages = self.stages(&findings);
+        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best)) {
+            stages.push(("mirrored", 1.0));
+            findings.accepted.clear();
+        }
+        let answer = self.answer(findings, stages);
+        // Where no pair is probable enough to be reported, there is nothing to answer with.
+        if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
+    }
+
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
     /// The other optima of the same search show what wrong poses reach on this very planting.
     pub(super) fn answer(&self, findings: Findings, mut stages: Vec<(&'static str, f64)>) -> Match {
         let Findings { accepted, others, log } = findings;
-        let pattern = self.pattern(log.effort.stands.share_left());
+        let pattern = self.reached(PATTERN, log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
         let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
         let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap, pattern);
-        let pairs = settled.beliefs.pairs(self.query.len(), self.map.len(), self.config.min_probability);
+        let pairs = self.pairs(&settled.beliefs, &overlap);
         let outdone = others.iter().any(rivals);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
@@ -29,26 +44,54 @@ impl Search<'_> {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),
             alternatives: rivals,
-            pairs: self.in_rows(pairs),
+            pairs,
             noise_m: overlap.sigma,
             stages,
         }
     }
 
-    /// Pairs in the rows of the clouds, in the order of the query.
-    fn in_rows(&self, mut pairs: Vec<Pair>) -> Vec<Pair> {
-        for pair in &mut pairs {
-            pair.query = self.query.rows[pair.query] as usize;
-            pair.map = self.map.rows[pair.map] as usize;
-        }
+    /// One-to-one pairs in the rows of the clouds, in the order of the query.
+    fn pairs(&self, beliefs: &Beliefs, overlap: &Overlap) -> Vec<Pair> {
+        let (query, map) = (self.query, self.map);
+        let pair = |(edge, probability): (Edge, f64)| {
+            let at = overlap.predictions[edge.query as usize]?.place;
+            Some(Pair {
+                query: query.rows[edge.query as usize] as usize,
+                map: map.rows[edge.map as usize] as usize,
+                probability,
+                distance_m: (map.points[edge.map as usize] - at).norm(),
+                support: edge.ratio.ln(),
+            })
+        };
+        let chosen = beliefs.chosen(query.len(), map.len(), self.config.min_probability);
+        let mut pairs: Vec<Pair> = chosen.into_iter().filter_map(pair).collect();
         pairs.sort_unstable_by_key(|pair| pair.query);
         pairs
     }
 
+    /// What the search did, by stages.
+    pub(super) fn stages(&self, Findings { accepted, log, .. }: &Findings) -> Vec<(&'static str, f64)> {
+        vec![
+            ("query_fruits", self.query.len() as f64),
+            ("map_fruits", self.map.len() as f64),
+            ("map_seeds", self.prepared.seeds.quads.len() as f64),
+            ("query_codes", log.effort.codes as f64),
+            ("candidates", log.effort.candidates as f64),
+            ("fitted", log.effort.fitted as f64),
+            ("refined", log.refined as f64),
+            ("grown", log.grown as f64),
+            ("threshold_nats", log.threshold),
+            ("best_nats", log.best),
+            ("settled_threshold_nats", log.settled_threshold),
+            ("settled_nats", log.settled),
+            ("verified", accepted.len() as f64),
+        ]
+    }
+
     fn registration(&self, overlap: &Overlap) -> Registration {
-        Registration {
-            map_from_query: overlap.pose.to_similarity(&self.query.centre, &self.map.centre),
-            log_odds: overlap.log_odds,
-        }
+        let Similarity { mut rotation, translation, scale } = overlap.pose;
+        rotation.renormalize();
+        let translation = self.map.centre + translation - rotation * self.query.centre * scale;
+        Registration { map_from_query: Similarity { rotation, translation, scale }, log_odds: overlap.log_odds }
     }
 }

@@ -1,14 +1,14 @@
 //! Poses that seeds propose, most evidence first and one of each.
 
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::seeds::Quad;
+use crate::geometry::Similarity;
 use nalgebra::Vector3;
 
 /// A seed of the query laid on a seed of the map.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contender {
-    pub(crate) pose: Placement,
+    pub(crate) pose: Similarity,
     pub(crate) log_odds: f64,
     pub(crate) place: Vector3<f64>,
     /// Rows of both seeds: an order for equal evidence.
@@ -22,12 +22,12 @@ pub(super) fn by_evidence(a: &Contender, b: &Contender) -> std::cmp::Ordering {
 
 /// The best `keep` candidates of those given best first, one of each pose.
 pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Contender], keep: usize) -> Vec<Contender> {
-    let (near, same) = (query.spacing, SAME_PLACE * map_spacing);
+    let (spacings, turn_rad) = SAME;
     first_of_each(candidates.iter().copied(), keep, |candidate, other| {
         let place = candidate.place;
-        (place - other.place).norm() < near
-            && (candidate.pose.apply(&place) - other.pose.apply(&place)).norm() < same
-            && candidate.pose.turn_to(&other.pose) < SAME_TURN_RAD
+        (place - other.place).norm() < query.spacing
+            && (candidate.pose.image(&place) - other.pose.image(&place)).norm() < spacings * map_spacing
+            && candidate.pose.turn_to(&other.pose) < turn_rad
     })
 }
 
@@ -46,6 +46,5 @@ pub(super) fn first_of_each<T>(some: impl Iterator<Item = T>, most: usize, same:
 }
 
 /// Candidates of one neighbourhood are the same pose when they put it within this many spacings of one place, turned by
-/// less than that: what one refinement reaches.
-pub(super) const SAME_PLACE: f64 = 0.4;
-const SAME_TURN_RAD: f64 = 0.15;
+/// less than this many radians: what one refinement reaches.
+pub(super) const SAME: (f64, f64) = (0.4, 0.15);

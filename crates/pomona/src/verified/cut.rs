@@ -1,6 +1,7 @@
 //! The cells that a query is cut into for growth: some ten fruits each, with a pose of their own.
 
-use super::placement::{Moments, Placement};
+use crate::geometry::Similarity;
+use crate::moments::Moments;
 use crate::neighbours::cells::{self, CellKey, CellMap, around};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -17,23 +18,9 @@ pub(crate) struct Cell {
     pub(super) around: Arc<[(u32, f64)]>,
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
-    pub(super) pose: Placement,
+    pub(super) pose: Similarity,
     /// Whether growth has come here.
     pub(super) reached: bool,
-}
-
-/// Weighted sum of sums.
-pub(super) fn total<'a>(parts: impl Iterator<Item = (&'a Moments, f64)>) -> Moments {
-    let mut sum = Moments::default();
-    for (part, weight) in parts {
-        sum.accumulate(part, weight);
-    }
-    sum
-}
-
-/// Pairs in and around a cell, the nearer the more.
-pub(super) fn surroundings(cells: &[Cell], cell: &Cell) -> Moments {
-    total(cell.around.iter().map(|a| (&cells[a.0 as usize].moments, a.1)))
 }
 
 /// The cells of a cloud, as every growth starts with them.
@@ -81,7 +68,7 @@ impl Cut {
                 rows: rows.into(),
                 around: neighbours(keys[i]).map(|other| (other as u32, closeness(i, other))).collect(),
                 moments: Moments::default(),
-                pose: Placement::identity(),
+                pose: Similarity::identity(),
                 reached: false,
             })
             .collect();

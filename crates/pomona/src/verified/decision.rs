@@ -1,7 +1,7 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::VerifiedConfig;
-use super::case::{Finding, Findings, Log, SETTLED, Search, VerifiedMap, best_first};
+use super::acceptance::{KEPT, VerifiedConfig};
+use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::extent;
@@ -9,11 +9,9 @@ use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
-use super::outlier::{KEPT, KEPT_LAID};
-use super::placement::Placement;
 use super::proposal::Effort;
-use super::search::of_some_fruits;
-use super::seeds::{self, Seed};
+use super::search::{FIRST_FRUITS, of_some_fruits};
+use super::seeds::Seed;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
@@ -28,21 +26,8 @@ pub(super) const MIN_FRUITS: usize = 5;
 /// Fruits of a map at the most whose seeds are all kept: some 7 kB a fruit; and of a query.
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
-/// Candidates that are refined in each round of the search (see [`Search::seeds_of`]).
-const ROUNDS: [usize; 4] = [32, 32, 48, 64];
-
-/// One in so many of the longest seeds is tried in the third round.
-const THIRD_ROUND: usize = 5;
-
-/// Fruits whose seeds make the first round, at the most: where the visits overlap well, few are enough in a cloud of
-/// any size. Also the seeds that are tried at the least before an answer stands alone.
-const FIRST_FRUITS: usize = 256;
-
 /// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
-const RIVAL_SEED: f64 = 0.3;
-
-/// Small clouds try at least this many seeds: all of them in a cloud of twelve.
-const FEW_SEEDS: u64 = 1500;
+pub(super) const RIVAL_SEED: f64 = 0.3;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
@@ -52,10 +37,6 @@ const LEAST_LAID: f64 = 10.0;
 
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
 pub(super) const SURE: f64 = 6.0;
-
-/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the other
-/// poses that an answer has to stand out of.
-const UPRIGHT_SEEDS: u64 = 2;
 
 /// Finds the query in the map.
 pub(crate) fn search(map: &VerifiedMap, query: &FruitCloud, request: &Request, config: &VerifiedConfig) -> Match {
@@ -80,7 +61,7 @@ pub(crate) fn pairs_under(
     if query.len() == 0 || search.map.len() < MIN_FRUITS {
         return Match::too_few();
     }
-    let pose = Placement::from_similarity(map_from_query, &query.centre, &search.map.centre);
+    let pose = map_from_query.about(&query.centre, &search.map.centre);
     let sigma = request.noise_m.unwrap_or(search.model.sigma);
     let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
@@ -95,18 +76,15 @@ impl Match {
 }
 
 impl<'a> Search<'a> {
-    /// Rounds of seeds until a pose is accepted, then the outline.
+    /// Rounds of seeds until a pose is accepted, with the outline and the offsets where they find none.
     fn run(&self) -> Findings<'a> {
         let mut findings = Findings::none(Effort::default(), self.threshold(Vertical::share_of_turns()));
-        let mut longest = Vec::new();
-        for (index, keep) in ROUNDS.into_iter().enumerate() {
-            let seeds = self.seeds_of(index, &mut longest);
-            let (hypotheses, rest) = self.ask(&seeds, keep, &mut findings.log);
-            self.grow_distinct(&hypotheses, &mut findings);
+        for (round, (seeds, keep)) in self.rounds().enumerate() {
+            let rest = self.try_seeds(&seeds, keep, &mut findings);
             self.sift(&mut findings);
             if !findings.accepted.is_empty() {
                 self.doubt(&mut findings, &rest);
-            } else if index == 1 {
+            } else if round == 1 {
                 // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
                 findings.accepted.extend(self.by_outline());
                 // Of the half-turns about a row's axes a known vertical leaves one half.
@@ -131,15 +109,19 @@ impl<'a> Search<'a> {
     /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.
     fn upside_down_poses(&self) -> Vec<Finding<'a>> {
         let Some(inverted) = self.upside_down() else { return Vec::new() };
-        let mut findings = Findings::none(Effort::default(), f64::INFINITY);
-        let mut longest = Vec::new();
-        for (index, keep) in ROUNDS.into_iter().enumerate() {
-            let seeds = inverted.seeds_of(index, &mut longest);
-            let (hypotheses, _) = inverted.ask(&seeds, keep, &mut findings.log);
-            inverted.grow_distinct(&hypotheses, &mut findings);
+        let mut findings = Findings::none(Effort::default(), 0.0);
+        for (seeds, keep) in inverted.rounds() {
+            inverted.try_seeds(&seeds, keep, &mut findings);
         }
         findings.accepted.retain(|finding| inverted.is_pose(finding));
         findings.accepted
+    }
+
+    /// Grows the best of what seeds propose; returns the candidates that were not refined.
+    fn try_seeds(&self, seeds: &[Seed], keep: usize, findings: &mut Findings<'a>) -> Vec<Contender> {
+        let (hypotheses, rest) = self.ask(seeds, keep, &mut findings.log);
+        self.grow_distinct(&hypotheses, findings);
+        rest
     }
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
@@ -160,36 +142,9 @@ impl<'a> Search<'a> {
         findings
     }
 
-    /// The answer to what was found.
-    pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
-        let mut stages = self.stages(&findings);
-        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best)) {
-            stages.push(("mirrored", 1.0));
-            findings.accepted.clear();
-        }
-        let answer = self.answer(findings, stages);
-        // Where no pair is probable enough to be reported, there is nothing to answer with.
-        if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
-    }
-
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
     fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
-        accepted.extend(self.single_out(others, least, KEPT, log));
-    }
-
-    /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
-    fn seeds_of(&self, round: usize, longest: &mut Vec<Seed>) -> Vec<Seed> {
-        match round {
-            0 => of_some_fruits(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
-            1 => of_some_fruits(self.query, 1, 1..2),
-            2 => {
-                let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
-                let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
-                *longest = seeds::longest(self.query, usize::try_from(count).unwrap_or(usize::MAX));
-                longest.split_off(longest.len() - longest.len() / THIRD_ROUND)
-            }
-            _ => std::mem::take(longest),
-        }
+        accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
@@ -200,24 +155,13 @@ impl<'a> Search<'a> {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - findings.log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
-            let (more, _) = self.ask(&more, RIVAL_CANDIDATES, &mut findings.log);
-            self.grow_distinct(&more, findings);
+            self.try_seeds(&more, RIVAL_CANDIDATES, findings);
         }
         self.sift(findings);
         let least = SURE * findings.log.threshold;
         let unsure = |finding: &&mut Finding| finding.overlap.log_odds < least;
         findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
         self.sift(findings);
-    }
-
-    /// Hypotheses of one round, and the candidates that were not refined.
-    fn ask(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
-        let (hypotheses, rest, spent) = self.round(seeds, keep);
-        log.seeds += seeds.len();
-        log.effort = log.effort + spent;
-        log.threshold = self.threshold(log.effort.stands.share_left());
-        log.refined += hypotheses.len();
-        (hypotheses, rest)
     }
 
     /// Tells findings with enough evidence, grown and settled, from the others.
@@ -227,33 +171,14 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            let enough = self.holds(&mut finding, SETTLED, &mut findings.log);
+            let enough = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
             (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
         }
     }
 
     /// Whether a finding is a whole pose: it stands as a known vertical asks, and its turns are fixed.
     fn is_pose(&self, finding: &Finding) -> bool {
-        self.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
-    }
-
-    pub(super) fn stages(&self, Findings { accepted, log, .. }: &Findings) -> Vec<(&'static str, f64)> {
-        let known = |nats: f64| if nats.is_finite() { nats } else { f64::NAN };
-        vec![
-            ("query_fruits", self.query.len() as f64),
-            ("map_fruits", self.map.len() as f64),
-            ("map_seeds", self.seeds.quads.len() as f64),
-            ("query_codes", log.effort.codes as f64),
-            ("candidates", log.effort.candidates as f64),
-            ("fitted", log.effort.fitted as f64),
-            ("refined", log.refined as f64),
-            ("grown", log.grown as f64),
-            ("threshold_nats", log.threshold),
-            ("best_nats", known(log.best)),
-            ("settled_threshold_nats", log.settled_threshold),
-            ("settled_nats", known(log.settled)),
-            ("verified", accepted.len() as f64),
-        ]
+        self.model.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
     }
 
     /// Grows the best hypotheses that no accepted finding explains yet, and adds them to these.
@@ -292,7 +217,7 @@ impl<'a> Search<'a> {
     /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
     /// much more the other poses of this search show: the answer must stand out of them.
     fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
-        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model, &|pose| self.admits(pose));
+        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model);
         log.refined += hypotheses.len();
         if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
             return;
@@ -304,7 +229,7 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT_LAID, log);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
             accepted.push(answer);
             others.extend(laid);
@@ -312,7 +237,7 @@ impl<'a> Search<'a> {
     }
 
     fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = extent::hypothesis(self.query, self.map, &self.model, &|pose| self.admits(pose))?;
+        let seed = extent::hypothesis(self.query, self.map, &self.model)?;
         let model = Model { sigma: seed.sigma, ..self.model };
         let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
         finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);

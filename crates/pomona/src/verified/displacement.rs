@@ -1,7 +1,7 @@
 //! What a fruit's displacement shares with its neighbours': sag and drift do, noise does not.
 
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
+use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 

@@ -1,14 +1,16 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
 use super::case::{Finding, Findings, Search};
-use super::contender::{Contender, SAME_PLACE};
+use super::contender::{Contender, SAME};
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
-use super::nearest::single;
 use super::overlap::Overlap;
-use super::placement::{Landing, Moments, Placement};
+use super::patches::Landing;
 use super::search::REACH;
-use nalgebra::{Matrix3, Vector3};
+use crate::geometry::Similarity;
+use crate::moments::Moments;
+use crate::neighbours::tree::single;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -38,8 +40,9 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a finding puts the fruits around the seed where the seed puts them.
-    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Placement) -> bool {
-        let reach = SAME_PLACE * self.query.spacing;
+    pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Similarity) -> bool {
+        let (spacings, _) = SAME;
+        let reach = spacings * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
         let same = near
@@ -48,9 +51,9 @@ impl<'a> Search<'a> {
                 let p = self.query.points[*row as usize];
                 let found = match finding.overlap.predictions[*row as usize] {
                     Some(prediction) => prediction.place,
-                    None => finding.seed.pose.apply(&p),
+                    None => finding.seed.pose.image(&p),
                 };
-                (found - pose.apply(&p)).norm() < reach * pose.scale
+                (found - pose.image(&p)).norm() < reach * pose.scale
             })
             .count();
         2 * same > near.len()
@@ -94,10 +97,16 @@ impl<'a> Search<'a> {
         let eigen = moments.spread().symmetric_eigen();
         let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
         let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
-        let rotation = pose.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
-        let translation = pose.apply(&middle) - rotation * middle * pose.scale;
-        let seed =
-            Hypothesis { pose: Placement { rotation, translation, scale: pose.scale }, place: middle, sigma, log_odds };
+        // No rotation but a reflection, which every step keeps as it is.
+        let reflection = Matrix3::identity() - normal * normal.transpose() * 2.0;
+        let rotation = pose.rotation * Rotation3::from_matrix_unchecked(reflection);
+        let translation = pose.image(&middle) - rotation * middle * pose.scale;
+        let seed = Hypothesis {
+            pose: Similarity { rotation, translation, scale: pose.scale },
+            place: middle,
+            sigma,
+            log_odds,
+        };
         let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
         self.polish(&mut mirrored);
         mirrored.overlap.log_odds > MIRRORED * log_odds
@@ -115,7 +124,7 @@ impl<'a> Search<'a> {
         let reach = REACH * self.query.spacing;
         let Some(&seed) = refined([self.query, self.map], &model, reach, &starts).first() else { return };
         let better = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
-        if better.overlap.log_odds > finding.overlap.log_odds && self.admits(&better.overlap.pose) {
+        if better.overlap.log_odds > finding.overlap.log_odds && self.model.admits(&better.overlap.pose) {
             *finding = better;
         }
     }
@@ -137,7 +146,7 @@ impl<'a> Search<'a> {
     pub(super) fn elsewhere(&self, best: &Overlap, other: &Overlap) -> f64 {
         let apart = |(p, at): (&Vector3<f64>, &Option<Landing>)| {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
-            at.map(|at| (other.pose.apply(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
+            at.map(|at| (other.pose.image(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
         };
         let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
         apart.iter().filter(|&&apart| apart).count() as f64 / apart.len().max(1) as f64

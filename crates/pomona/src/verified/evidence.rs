@@ -12,22 +12,19 @@
 //! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
 //! when it grew, below zero where nothing was selected.
 
-use super::beliefs::Beliefs;
 use super::hypothesis::{DETECTION, SHARES, TURNS};
-use super::pairing::{Laid, Meeting};
+use super::pairing::Meeting;
+use super::patches::Patchwork;
+use crate::beliefs::Beliefs;
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
 /// misses: of rows with 15 % in common 4 of 100 were no longer found.
 const SEEN_AGAIN: (f64, f64) = (0.35, 0.9);
 
-/// Halvings of what the share may be, to .002.
-const HALVINGS: usize = 8;
-
 /// Evidence of an overlap, nats.
-///
-/// `there` has, for each fruit of the map, how surely the query would have shown it; 0 outside the overlap.
-pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
+pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let map = laid.map;
+    let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
     let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support.at(&at.place))).collect();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
@@ -40,7 +37,7 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
             meeting.edge(seen * meeting.density / strangers)
         };
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
-        let alone: f64 = here.iter().chain(there).map(|support| (1.0 - share * support).ln()).sum();
+        let alone: f64 = here.iter().chain(&there).map(|support| (1.0 - share * support).ln()).sum();
         evidence = beliefs.log_sum + alone + share * due[0];
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
     }
@@ -50,7 +47,8 @@ pub(super) fn evidence(laid: &Laid, there: &[f64]) -> f64 {
 /// The share under which evidence of this slope, which falls, is largest.
 pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = SEEN_AGAIN;
-    for _ in 0..HALVINGS {
+    // Eight halvings of what it may be leave .002.
+    for _ in 0..8 {
         let middle = 0.5 * (low + high);
         *(if slope(middle) > 0.0 { &mut low } else { &mut high }) = middle;
     }
@@ -70,9 +68,11 @@ fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Scale, Similarity};
     use crate::verified::fixture::visits;
+    use crate::verified::hypothesis::Model;
     use crate::verified::landscape::Landscape;
-    use crate::verified::placement::{Landing, Placement};
+    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]
@@ -98,12 +98,14 @@ mod tests {
     fn the_true_pose_has_evidence_and_the_same_pose_moved_along_has_less_than_none() {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None };
         let at = |shift: Vector3<f64>| {
-            let pose = Placement { translation: query.centre - map.centre + shift, ..Placement::identity() };
-            let land = |p: &Vector3<f64>| Some(Landing { place: pose.apply(p), variance: 0.02 * 0.02 });
-            let predictions: Vec<_> = query.points.iter().map(land).collect();
-            let there: Vec<f64> = map.points.iter().map(|p| query.support.at(&pose.apply_inverse(p))).collect();
-            evidence(&Laid { query: &query, map: &map, predictions: &predictions, pose: &pose }, &there)
+            let pose = Similarity { translation: query.centre - map.centre + shift, ..Similarity::identity() };
+            let mut laid = Patchwork::new(&query, &map, pose, model.sigma, &model);
+            laid.cells.iter_mut().for_each(|cell| cell.reached = true);
+            let land = |p: &Vector3<f64>| Some(Landing { place: pose.image(p), variance: 0.02 * 0.02 });
+            laid.predictions = query.points.iter().map(land).collect();
+            evidence(&laid)
         };
         assert!(at(Vector3::zeros()) > 300.0);
         for step in [0.3, 0.5, 1.0] {

@@ -9,8 +9,6 @@ use super::acceptance::VerifiedConfig;
 use super::case::{Search, VerifiedMap};
 use super::contender::{Contender, by_evidence, distinct};
 use super::decision::{MIN_FRUITS, SURE};
-use super::nearest::single;
-use super::placement::Placement;
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
 use super::seeds::{Quad, SHORTEST, STARS, Seed, WITHIN};
@@ -36,7 +34,7 @@ pub(crate) fn search_expected(
     if search.query.len().min(search.map.len()) < MIN_FRUITS || request.scale != Scale::Metric {
         return Match::without_answer(Verdict::NoMatch, Vec::new());
     }
-    let expected = Placement::from_similarity(map_from_query, &search.query.centre, &search.map.centre);
+    let expected = map_from_query.about(&search.query.centre, &search.map.centre);
     let contenders = search.contenders(&expected);
     let findings = search.weigh(&contenders, Effort::default());
     let least = SURE * search.threshold(Vertical::share_of_turns());
@@ -49,7 +47,7 @@ pub(crate) fn search_expected(
 
 impl Search<'_> {
     /// The best poses that lay a seed of the query on fruits near where it is expected.
-    fn contenders(&self, expected: &Placement) -> Vec<Contender> {
+    fn contenders(&self, expected: &Similarity) -> Vec<Contender> {
         let seeds = of_some_fruits(self.query, self.query.len().div_ceil(FRUITS) as u64, 0..1);
         let mut found = Vec::new();
         for seed in &seeds {
@@ -59,24 +57,17 @@ impl Search<'_> {
         distinct(self.query, self.map.spacing, &found, REFINED)
     }
 
-    fn lay(&self, &(quad, code): &Seed, expected: &Placement, found: &mut Vec<Contender>) {
+    fn lay(&self, &(quad, code): &Seed, expected: &Similarity, found: &mut Vec<Contender>) {
         if f64::from(code[0]) < SHORTEST * self.model.sigma {
             return;
         }
         let Some(proposer) = Proposer::new(self.query, self.map, &self.model, quad) else { return };
         let fruits = quad.map(|row| self.query.points[row as usize]);
-        let near = fruits.map(|fruit| self.near(&expected.apply(&fruit)));
+        // A fruit may be off by a spacing from where it is expected: 27 cm in an orchard.
+        let near = fruits.map(|fruit| self.map.within(&expected.image(&fruit), self.map.spacing));
         let most = 2.0 * (WITHIN * self.model.sigma).powi(2);
         let effort = &mut Effort::default();
         self.each_alike(&fruits, &near, &mut |target| found.extend(proposer.contender(&target, most, effort)));
-    }
-
-    /// Fruits of the map within a spacing of a place, 27 cm in an orchard: so far a fruit may be off from where it is expected.
-    fn near(&self, place: &Vector3<f64>) -> Vec<u32> {
-        let mut rows = Vec::new();
-        self.map.tree.within(&single(place), self.map.spacing as f32, |row, _| rows.push(row));
-        rows.sort_unstable();
-        rows
     }
 
     /// Calls `take` with four fruits of the map, one of each list, that lie to each other as those of the query do.

@@ -5,11 +5,11 @@
 //! the width of a branch down to the noise, decides between them.
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
-use super::hypothesis::{DETECTION, Hypothesis, Model, gaussian};
+use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::soft::pulled;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use crate::statistics::gaussian;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
@@ -18,12 +18,7 @@ use rayon::prelude::*;
 const ANNEALING: [f64; 10] = [1.2, 0.9, 0.7, 0.55, 0.45, 0.38, 0.32, 0.3, 0.3, 0.3];
 
 /// The pose of the outline with the evidence of its fine structure; `None` where it is no better than chance.
-pub(crate) fn hypothesis(
-    query: &Landscape,
-    map: &Landscape,
-    model: &Model,
-    admits: &(impl Fn(&Placement) -> bool + Sync),
-) -> Option<Hypothesis> {
+pub(crate) fn hypothesis(query: &Landscape, map: &Landscape, model: &Model) -> Option<Hypothesis> {
     if query.len().min(map.len()) < MIN_FRUITS {
         return None;
     }
@@ -35,10 +30,10 @@ pub(crate) fn hypothesis(
     let [.., last] = ANNEALING;
     let annealed = |signs: [f64; 3]| {
         let turned = axes_map * Matrix3::from_diagonal(&Vector3::from(signs));
-        let rotation = turned * axes_query.transpose();
-        let start = Placement { rotation, translation: Vector3::zeros(), scale: ratio };
+        let rotation = Rotation3::from_matrix_unchecked(turned * axes_query.transpose());
+        let start = Similarity { rotation, translation: Vector3::zeros(), scale: ratio };
         let (pose, _) = pulled(query, map, model, &start, &ANNEALING);
-        admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
+        model.admits(&pose).then(|| (pose, fine_structure(query, map, &pose, last * map.spacing)))
     };
     let found: Vec<_> = HALF_TURNS.into_par_iter().filter_map(annealed).collect();
     let (pose, first) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -60,14 +55,19 @@ pub(crate) fn hypothesis(
 ///
 /// In a hedge, a pergola or the skin of a round crown fruits hang denser than the width of a branch tells, and layer
 /// laid on layer gains anywhere. But it gains nearly as much a little aside, along the layer; fruits on fruits do not.
-fn beside(query: &Landscape, pose: &Placement, axes: &Matrix3<f64>, distance: f64) -> impl Iterator<Item = Placement> {
+fn beside(
+    query: &Landscape,
+    pose: &Similarity,
+    axes: &Matrix3<f64>,
+    distance: f64,
+) -> impl Iterator<Item = Similarity> {
     let directed = (0..3).flat_map(|i| [1.0, -1.0].map(|sign| axes.column(i) * sign));
     directed.flat_map(move |axis| {
         let arm2: f64 = query.points.iter().map(|p| (pose.rotation * p).cross(&axis).norm_squared()).sum();
         let arm = pose.scale * (arm2 / query.len() as f64).sqrt();
-        let turn = Rotation3::new(axis * (distance / arm)).into_inner();
-        let shifted = Placement { translation: pose.translation + axis * distance, ..*pose };
-        [shifted, Placement { rotation: turn * pose.rotation, ..*pose }]
+        let turn = Rotation3::new(axis * (distance / arm));
+        let shifted = Similarity { translation: pose.translation + axis * distance, ..*pose };
+        [shifted, Similarity { rotation: turn * pose.rotation, ..*pose }]
     })
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn threshold(query: &Landscape) -> f64 {
 const OUTSTANDING: f64 = 0.85;
 
 /// The noise under which the fine structure speaks most for the pose, and what it says, nats.
-fn sharpest(query: &Landscape, map: &Landscape, pose: &Placement) -> (f64, f64) {
+fn sharpest(query: &Landscape, map: &Landscape, pose: &Similarity) -> (f64, f64) {
     SIGMAS
         .iter()
         .map(|&share| (share * map.spacing, fine_structure(query, map, pose, share * map.spacing)))
@@ -95,14 +95,14 @@ fn sharpest(query: &Landscape, map: &Landscape, pose: &Placement) -> (f64, f64) 
 
 /// Whether fruits line up, given that crowns do: the density of the map's fruits at the width of the noise against
 /// that at the width of a branch. Under a pose that lays crown on crown by chance the expectation is below zero.
-fn fine_structure(query: &Landscape, map: &Landscape, pose: &Placement, sigma: f64) -> f64 {
+fn fine_structure(query: &Landscape, map: &Landscape, pose: &Similarity, sigma: f64) -> f64 {
     let variance = sigma * sigma;
     let wide = WIDE * map.spacing * WIDE * map.spacing + variance;
     query
         .points
         .iter()
         .map(|p| {
-            let place = pose.apply(p);
+            let place = pose.image(p);
             let (mut here, mut around) = (0.0, map.floor);
             map.near(&place, 2.5 * wide.sqrt(), |row| {
                 let d2 = (map.points[row as usize] - place).norm_squared();

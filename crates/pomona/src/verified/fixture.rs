@@ -1,7 +1,7 @@
 //! Seeded visits of an orchard for the tests.
 
-use super::seeds::shuffled;
 use crate::cloud::FruitCloud;
+use crate::random::shuffled;
 use nalgebra::{Point3, Vector3};
 
 /// Uniform numbers in 0..1 of a fixed sequence.

@@ -1,7 +1,7 @@
 //! How firmly pairs hold a pose.
 
-use super::placement::{FIXING, Moments};
 use super::seeds::STARS;
+use crate::moments::{FIXING, Moments};
 use nalgebra::Vector3;
 
 /// Inertia of a fruit that stands for a region without pairs, over the square of how far that reaches.

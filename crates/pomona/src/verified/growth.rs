@@ -4,21 +4,18 @@
 //! Each cell has its own pose ([`super::patches`]). Growth goes from cell to neighbouring cell and stops where the
 //! evidence turns. What it finds is settled once more before it is reported ([`super::settlement`]).
 
-use super::cut::{Cell, surroundings};
+use super::claims::Claims;
+use super::cut::Cell;
 use super::hypothesis::{GATE, Hypothesis, Model, TURNS};
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
-use super::patches::{NEXT, Patchwork};
-use super::placement::Landing;
+use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::search::REACH;
 use super::sight::unseen;
-use rayon::prelude::*;
+use crate::neighbours::others::each_row;
 
-/// The first rounds look further than the noise.
-const WIDENING: [f64; 4] = [2.0, 2.0, 1.6, 1.3];
-
-/// The first rounds fit one rigid pose: patches would bend towards a seed that is turned by a few degrees.
-const RIGID_ROUNDS: usize = 6;
+/// How many times further than the noise the first rounds look. They fit one rigid pose: patches would bend towards a
+/// seed that is turned by a few degrees.
+const RIGID: [f64; 6] = [2.0, 2.0, 1.6, 1.3, 1.0, 1.0];
 
 /// Rounds of pairing and fitting when the pose is known for the whole query, and once fruits or cells were left out of it.
 const WHOLE_ROUNDS: usize = 2;
@@ -46,15 +43,14 @@ pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothes
     let mut growth = Growth::new(query, map, seed, model);
     let extent = growth.patches.cells.iter().fold(0.0f64, |far, cell| far.max((cell.centre - seed.place).norm()));
     // Two steps for each cell of the way.
-    let most = (extent / growth.patches.cut.edge) as usize * 2 + RIGID_ROUNDS;
+    let most = (extent / growth.patches.cut.edge) as usize * 2 + RIGID.len();
     let mut settled = 0;
     for round in 0..most {
-        let rigid = round < RIGID_ROUNDS;
-        let widening = WIDENING.get(round).copied().unwrap_or(1.0);
-        growth.meet(widening);
-        growth.refit(rigid);
+        let rigid = RIGID.get(round);
+        growth.meet(rigid.copied().unwrap_or(1.0));
+        growth.refit(rigid.is_some());
         settled = if growth.spread() { 0 } else { settled + 1 };
-        if settled == TURNS && round > RIGID_ROUNDS + 2 {
+        if settled == TURNS && round > RIGID.len() + 2 {
             break;
         }
     }
@@ -101,24 +97,20 @@ impl<'a> Growth<'a> {
     /// wins.
     fn meet(&mut self, widening: f64) {
         self.patches.predict(
-            |patches, cell| patches.footing(&surroundings(&patches.cells, cell), HOLD, cell),
+            |patches, cell| patches.footing(cell, ALL, HOLD),
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
         let Patchwork { map, model, .. } = self.patches;
-        let nearest = |at: &Option<Landing>| self.nearest(at.as_ref()?);
-        let met: Vec<Option<(u32, f64)>> =
-            self.patches.predictions.par_iter().with_min_len(SHARE_OF_ROWS).map(nearest).collect();
-        let mut owners: Vec<Option<(usize, f64)>> = vec![None; map.len()];
+        let met = each_row(self.partners.len(), |row| self.nearest(self.patches.predictions[row].as_ref()?));
+        let mut claims = Claims::on(map.len());
         for (row, met) in met.iter().enumerate() {
-            let &Some((partner, ratio)) = met else { continue };
-            let owner = &mut owners[partner as usize];
-            if owner.is_none_or(|(_, most)| ratio > most) {
-                *owner = Some((row, ratio));
+            if let Some((partner, ratio)) = *met {
+                claims.claim(partner, row, ratio);
             }
         }
         let mut gains = vec![0.0; met.len()];
         for (row, met) in met.into_iter().enumerate() {
-            let kept = met.filter(|met| owners[met.0 as usize].is_some_and(|(owner, _)| owner == row));
+            let kept = met.filter(|met| claims.owner(met.0) == Some(row));
             gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
             self.partners[row] = kept.map(|(partner, _)| partner);
             let target =

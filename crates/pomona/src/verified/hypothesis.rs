@@ -1,11 +1,13 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
+use super::claims::Claims;
 use super::footing::Footing;
 use super::landscape::Landscape;
-use super::nearest::single;
-use super::placement::{FIXING, Moments, Placement};
 use super::vertical::Vertical;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use crate::moments::{FIXING, Moments};
+use crate::neighbours::tree::single;
+use crate::statistics::{Evidence, gaussian};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -44,10 +46,15 @@ impl Model {
     }
 
     /// One least-squares step from `start`, of pairs whose noise is `sigma` and of a vertical that is known.
-    pub(crate) fn step(&self, pairs: &Moments, start: &Placement, sigma: f64) -> Option<Placement> {
+    pub(crate) fn step(&self, pairs: &Moments, start: &Similarity, sigma: f64) -> Option<Similarity> {
         let pose = pairs.step(start, self.scale, 0.0)?;
         let Some(vertical) = self.vertical else { return Some(pose) };
         Some(vertical.upheld(&pose, &pairs.centroid(), &(pairs.inertia_under(&pose) / (sigma * sigma))))
+    }
+
+    /// Whether a pose stands as a known vertical asks.
+    pub(crate) fn admits(&self, pose: &Similarity) -> bool {
+        self.vertical.is_none_or(|vertical| vertical.admits(pose))
     }
 
     /// Noise per axis of pairs whose squared residuals sum up to `squares` under a pose that was fitted to them.
@@ -64,49 +71,13 @@ impl Model {
     }
 }
 
-/// Density of an isotropic normal distribution in space at squared distance `d2`, per cubic metre.
-#[inline]
-pub(crate) fn gaussian(d2: f64, variance: f64) -> f64 {
-    const NORM: f64 = 0.063_493_635_934_240_97; // (2 pi)^(-3/2)
-    NORM / (variance * variance.sqrt()) * (-0.5 * d2 / variance).exp()
-}
-
-/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of
-/// every factor.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Evidence {
-    product: f64,
-    nats: f64,
-}
-
-impl Default for Evidence {
-    fn default() -> Self {
-        Self { product: 1.0, nats: 0.0 }
-    }
-}
-
-impl Evidence {
-    #[inline]
-    pub(crate) fn multiply(&mut self, ratio: f64) {
-        self.product *= ratio;
-        if !(1e-200..1e200).contains(&self.product) {
-            *self = Self { product: 1.0, nats: self.log_odds() };
-        }
-    }
-
-    #[inline]
-    pub(crate) fn log_odds(&self) -> f64 {
-        self.nats + self.product.ln()
-    }
-}
-
 /// How many standard deviations a partner may lie away: `P(chi^2_3 > 9)` = 3 %.
 pub(crate) const GATE: f64 = 3.0;
 
 /// A pose with the evidence around one place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hypothesis {
-    pub(crate) pose: Placement,
+    pub(crate) pose: Similarity,
     /// Evidence against chance within the place's reach, nats.
     pub(crate) log_odds: f64,
     /// Where the evidence lies, in the centred query.
@@ -120,10 +91,10 @@ pub(super) fn refined(
     [query, map]: [&Landscape; 2],
     model: &Model,
     reach: f64,
-    starts: &[(Placement, Vector3<f64>)],
+    starts: &[(Similarity, Vector3<f64>)],
 ) -> Vec<Hypothesis> {
     let refiner = || Refiner::new(query, map, model);
-    let from = |refiner: &mut Refiner, (start, place): &(Placement, Vector3<f64>)| refiner.refine(start, place, reach);
+    let from = |refiner: &mut Refiner, (start, place): &(Similarity, Vector3<f64>)| refiner.refine(start, place, reach);
     let mut found: Vec<Hypothesis> = starts.par_iter().map_init(refiner, from).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
@@ -136,15 +107,11 @@ struct Refiner<'a> {
     map: &'a Landscape,
     model: Model,
     /// Fruits of the query around the place.
-    region: Vec<u32>,
-    /// The partner of each, none where that is `NOBODY`, with the squared distance and the variance of the prediction.
-    partners: Vec<(u32, f64, f64)>,
-    /// Of each fruit of the map: when it was claimed last, and by whom in the region.
-    owner: Vec<(u32, u32)>,
-    stamp: u32,
+    region: Vec<Vector3<f64>>,
+    /// Of each the variance of the prediction, and the nearest fruit of the map with its squared distance.
+    nearest: Vec<(f64, Option<(u32, f64)>)>,
+    claims: Claims,
 }
-
-const NOBODY: u32 = u32::MAX;
 
 /// Steps of a refinement, the last of which only weighs: with four, two of 30 rows are lost that have few fruits in common.
 const STEPS: usize = 6;
@@ -156,15 +123,14 @@ pub(super) const TURNS: usize = 4;
 
 impl<'a> Refiner<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
-        let owner = vec![(0, 0); map.len()];
-        Self { query, map, model: *model, region: Vec::new(), partners: Vec::new(), owner, stamp: 0 }
+        let claims = Claims::on(map.len());
+        Self { query, map, model: *model, region: Vec::new(), nearest: Vec::new(), claims }
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
-    fn refine(&mut self, start: &Placement, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
-        self.region.clear();
-        self.query.tree.within(&single(place), reach as f32, |row, _| self.region.push(row));
-        self.region.sort_unstable();
+    fn refine(&mut self, start: &Similarity, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
+        let query = self.query;
+        self.region = query.within(place, reach).iter().map(|&row| query.points[row as usize]).collect();
         let model = self.model;
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
@@ -192,43 +158,31 @@ impl<'a> Refiner<'a> {
     }
 
     /// Nearest partners of the region's fruits; of several that claim one fruit the nearest keeps it.
-    fn pair_up(&mut self, pose: &Placement, variance_at: impl Fn(&Vector3<f64>) -> f64) {
-        self.stamp += 1;
-        self.partners.clear();
-        for (at, &row) in self.region.iter().enumerate() {
-            let p = self.query.points[row as usize];
-            let variance = variance_at(&p);
-            let found = self.map.nearest(&pose.apply(&p), GATE * variance.sqrt());
-            let mut entry = found.map_or((NOBODY, 0.0, variance), |(partner, d2)| (partner, d2, variance));
-            if let Some((partner, d2)) = found {
-                let owner = &mut self.owner[partner as usize];
-                let rival = (owner.0 == self.stamp).then_some(owner.1 as usize);
-                if rival.is_some_and(|rival| self.partners[rival].1 <= d2) {
-                    entry.0 = NOBODY;
-                } else {
-                    *owner = (self.stamp, at as u32);
-                    if let Some(rival) = rival {
-                        self.partners[rival].0 = NOBODY;
-                    }
-                }
+    fn pair_up(&mut self, pose: &Similarity, variance_at: impl Fn(&Vector3<f64>) -> f64) {
+        self.claims.forget();
+        self.nearest.clear();
+        for (at, p) in self.region.iter().enumerate() {
+            let variance = variance_at(p);
+            let nearest = self.map.nearest(&pose.image(p), GATE * variance.sqrt());
+            if let Some((partner, d2)) = nearest {
+                self.claims.claim(partner, at, -d2);
             }
-            self.partners.push(entry);
+            self.nearest.push((variance, nearest));
         }
     }
 
     /// Sums over the pairs, their weighted squared distances, and the evidence of the region's fruits.
-    fn weigh(&self, pose: &Placement) -> (Moments, f64, f64) {
+    fn weigh(&self, pose: &Similarity) -> (Moments, f64, f64) {
         let (mut moments, mut residual, mut evidence) = (Moments::default(), 0.0, Evidence::default());
-        for (&row, &(partner, d2, variance)) in self.region.iter().zip(&self.partners) {
-            let p = self.query.points[row as usize];
-            if partner == NOBODY {
-                evidence.multiply(self.model.missed(self.map.support.at(&pose.apply(&p))));
+        for (at, (p, &(variance, nearest))) in self.region.iter().zip(&self.nearest).enumerate() {
+            let Some((partner, d2)) = nearest.filter(|nearest| self.claims.owner(nearest.0) == Some(at)) else {
+                evidence.multiply(self.model.missed(self.map.support.at(&pose.image(p))));
                 continue;
-            }
+            };
             let met = self.model.met(d2, variance, self.map.density[partner as usize]);
             evidence.multiply(met);
             let weight = self.model.no_stranger(met);
-            moments.add(&p, &self.map.points[partner as usize], weight);
+            moments.add(p, &self.map.points[partner as usize], weight);
             residual += weight * d2;
         }
         (moments, residual, evidence.log_odds())
@@ -239,13 +193,13 @@ impl<'a> Refiner<'a> {
     /// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
     /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
     /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
-    fn other_side(&self, pose: &Placement, place: &Vector3<f64>, reach: f64) -> f64 {
-        let support = |&row: &u32| self.map.support.at(&pose.apply(&self.query.points[row as usize]));
+    fn other_side(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64) -> f64 {
+        let support = |p: &Vector3<f64>| self.map.support.at(&pose.image(p));
         let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
         let mut missing = Evidence::default();
-        self.map.tree.within(&single(&pose.apply(place)), (reach * pose.scale) as f32, |row, _| {
-            if self.owner[row as usize].0 != self.stamp {
-                let seen = self.query.support.at(&pose.apply_inverse(&self.map.points[row as usize]));
+        self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
+            if self.claims.owner(row).is_none() {
+                let seen = self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
                 missing.multiply(self.model.missed(seen));
             }
         });

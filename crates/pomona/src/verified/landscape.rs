@@ -2,12 +2,13 @@
 
 use super::chance::{Companions, crowding, kinship, local_density};
 use super::cut::{Cut, EDGE};
-use super::nearest::{Neighbours, single};
 use super::support::Support;
 use crate::cloud::FruitCloud;
 use crate::neighbours::grid::Grid;
-use crate::neighbours::tree::Tree;
+use crate::neighbours::others::Neighbours;
+use crate::neighbours::tree::{Tree, single};
 use crate::neighbours::vicinity::Vicinity;
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::OnceLock;
 
@@ -54,15 +55,11 @@ pub(crate) struct Landscape {
 
 impl Landscape {
     pub(crate) fn new(cloud: &FruitCloud) -> Self {
-        Self::with_spacing(cloud, spacing_of)
+        Self::with_spacing(cloud, None)
     }
 
-    /// A part that is cut out of a cloud of this spacing: at its rim fruits have fewer neighbours than they had.
-    pub(super) fn part(cloud: &FruitCloud, spacing: f64) -> Self {
-        Self::with_spacing(cloud, |_, _| spacing)
-    }
-
-    fn with_spacing(cloud: &FruitCloud, spacing: impl Fn(&[Vector3<f64>], &Neighbours) -> f64) -> Self {
+    /// A part that is cut out of a cloud has that one's spacing: at its rim fruits have fewer neighbours than they had.
+    pub(super) fn with_spacing(cloud: &FruitCloud, spacing: Option<f64>) -> Self {
         let count = cloud.len().max(1) as f64;
         let mut rows: Vec<u32> = (0..cloud.len() as u32).collect();
         rows.sort_by(|&a, &b| {
@@ -74,7 +71,7 @@ impl Landscape {
         let single: Vec<_> = points.iter().map(single).collect();
         let tree = Tree::new(&single);
         let neighbours = Neighbours::new(&single, &tree);
-        let spacing = spacing(&points, &neighbours);
+        let spacing = spacing.unwrap_or_else(|| spacing_of(&points, &neighbours));
         let floor = floor_of(spacing);
         let ((kinship, density, crowding, companions), (grid, vicinities, support)) = rayon::join(
             || {
@@ -118,7 +115,8 @@ impl Landscape {
         self.points.len()
     }
 
-    /// The nearest [`NEIGHBOURS`] other fruits, nearest first; all others in smaller clouds.
+    /// The nearest other fruits, as many as [`crate::neighbours::others`] keeps, nearest first; all others in smaller
+    /// clouds.
     #[inline]
     pub(crate) fn neighbours(&self, row: usize) -> &[u32] {
         self.neighbours.of(row)
@@ -155,6 +153,14 @@ impl Landscape {
         found.0.map(|row| (row, found.1))
     }
 
+    /// All points within `reach` of `place`, in order.
+    pub(crate) fn within(&self, place: &Vector3<f64>, reach: f64) -> Vec<u32> {
+        let mut rows = Vec::new();
+        self.tree.within(&single(place), reach as f32, |row, _| rows.push(row));
+        rows.sort_unstable();
+        rows
+    }
+
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.
     #[inline]
     pub(crate) fn near(&self, place: &Vector3<f64>, gate: f64, visit: impl FnMut(u32)) {
@@ -172,7 +178,7 @@ pub(super) fn spacing_of(points: &[Vector3<f64>], neighbours: &Neighbours) -> f6
         .collect();
     // Fruits on one spot have no spacing; cells must not become finer than the coordinates.
     let extent = points.iter().fold(0.0f64, |far, p| far.max(p.amax()));
-    median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE)
+    upper_median(&mut sixth).max(1e-6 * extent).max(f64::MIN_POSITIVE)
 }
 
 /// Fruits per cubic metre that chance puts anywhere, at the least.
@@ -180,14 +186,6 @@ pub(super) fn floor_of(spacing: f64) -> f64 {
     // Six neighbours within the spacing: their density, were fruits spread evenly.
     let typical = 6.0 / (4.0 / 3.0 * std::f64::consts::PI * spacing.powi(3));
     0.1 * typical
-}
-
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! The verified method: seeds propose poses, the fruits around them decide.
 //!
 //! 1. Seeds of four fruits, their metric codes (invariant ones where the scale is free), near-tie labelings included,
-//!    find candidates in the map (`seeds`, `codes`, `search`).
+//!    find candidates in the map (`seeds`, `search`).
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
-//!    local density, with an early exit (`proposal`, `vertical`); the best of different poses (`contender`) are refined (`hypothesis`).
+//!    local density, with an early exit (`proposal`, `vertical`); the best of different poses (`contender`) are refined
+//!    (`hypothesis`). A fruit that several claim is the strongest claim's (`claims`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
@@ -12,16 +13,15 @@
 //!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
 //!    what only one visit sees is left out (`sight`). All fruits at once pull both into place (`soft`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`), one-to-one pairs with
-//!    probabilities (`pairing`, `beliefs`) and patches fitted to them, in turns (`settlement`).
+//!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 //!
 //! Where it is known about where the query lies, seeds are looked up there in place of steps 1 and 5 (`expected`).
 
 mod acceptance;
 mod axes;
-mod beliefs;
 mod case;
 mod chance;
-mod codes;
+mod claims;
 pub mod compact;
 mod conclusion;
 mod contender;
@@ -38,13 +38,11 @@ mod footing;
 mod growth;
 mod hypothesis;
 mod landscape;
-mod nearest;
 mod offsets;
 mod outlier;
 mod overlap;
 mod pairing;
 mod patches;
-mod placement;
 mod proposal;
 mod scatter;
 mod search;
@@ -61,6 +59,5 @@ pub use acceptance::VerifiedConfig;
 pub(crate) use case::{SEED_SIGMA, VerifiedMap};
 pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
-pub(crate) use landscape::{Landscape, median};
-pub(crate) use nearest::single;
-pub(crate) use seeds::{COMPANIONS, Quad, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties, shuffled};
+pub(crate) use landscape::Landscape;
+pub(crate) use seeds::{COMPANIONS, Quad, SHORTEST, SeedIndex, WITHIN, canonical, frame, near_ties};

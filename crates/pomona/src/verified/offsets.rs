@@ -10,62 +10,51 @@
 use super::contender::first_of_each;
 use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::soft;
 use super::votes::Rows;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Share of fruits seen again, where ordinary shares have found nothing.
 pub(super) const FEW_AGAIN: f64 = 0.25;
 
-/// Peaks that are looked at, and how many of them go on: of 24 some 13 lie apart, which [`super::outlier`] asks for.
-const LOOKED_AT: usize = 1024;
-const REFINED: usize = 24;
-
-/// Widths, in spacings, at which fruits pull a peak into place, and then those that go on: from half a cell down to what rows
-/// bend.
-const FIRST_PULLS: [f64; 2] = [0.25, 0.25];
-const PULLS: [f64; 4] = [0.2, 0.2, 0.16, 0.16];
+/// How many poses are looked at and then go on, and the widths, in spacings, at which fruits pull them into place:
+/// from half a cell down to what rows bend. Of 24 some 13 lie apart, which [`super::outlier`] asks for.
+const PULLS: [(usize, &[f64]); 2] = [(1024, &[0.25, 0.25]), (24, &[0.2, 0.2, 0.16, 0.16])];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
-const SAME: f64 = 0.5;
-const SAME_TURN_RAD: f64 = 0.06;
+const SAME: (f64, f64) = (0.5, 0.06);
 
 /// Poses by what the fruits under them say, most evidence first.
-pub(super) fn hypotheses(
-    query: &Landscape,
-    map: &Landscape,
-    model: &Model,
-    admits: &(impl Fn(&Placement) -> bool + Sync),
-) -> Vec<Hypothesis> {
+pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> Vec<Hypothesis> {
     let model = Model { detection: FEW_AGAIN, ..*model };
     if model.scale == Scale::Free {
         return Vec::new();
     }
     let Some(rows) = Rows::new(query, map) else { return Vec::new() };
-    let mut peaks = rows.peaks(admits);
+    let mut peaks = rows.peaks(&model);
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let pulled = |poses: &[Placement], widths: &[f64]| -> Vec<Placement> {
-        let mut found: Vec<_> = poses.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
+    let mut poses: Vec<Similarity> = peaks.into_iter().map(|(_, pose)| pose).collect();
+    for (most, widths) in PULLS {
+        let some = distinct(poses, most, map.spacing);
+        let mut found: Vec<_> = some.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
         found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        found.into_iter().map(|(pose, _)| pose).collect()
-    };
-    let looked_at = distinct(peaks.iter().map(|peak| peak.1), LOOKED_AT, map.spacing);
-    let best = distinct(pulled(&looked_at, &FIRST_PULLS).into_iter(), REFINED, map.spacing);
-    let best = distinct(pulled(&best, &PULLS).into_iter(), REFINED, map.spacing);
+        poses = found.into_iter().map(|(pose, _)| pose).collect();
+    }
     let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
-    let starts: Vec<_> = best.into_iter().map(|pose| (pose, Vector3::zeros())).collect();
+    let apart = distinct(poses, usize::MAX, map.spacing);
+    let starts: Vec<_> = apart.into_iter().map(|pose| (pose, Vector3::zeros())).collect();
     refined([query, map], &model, reach, &starts)
 }
 
 /// The first poses, one of those that are the same.
-fn distinct(poses: impl Iterator<Item = Placement>, most: usize, spacing: f64) -> Vec<Placement> {
-    let same = |one: &Placement, other: &Placement| {
-        (one.translation - other.translation).norm() < SAME * spacing && one.turn_to(other) < SAME_TURN_RAD
+fn distinct(poses: Vec<Similarity>, most: usize, spacing: f64) -> Vec<Similarity> {
+    let (spacings, turn_rad) = SAME;
+    let same = |one: &Similarity, other: &Similarity| {
+        (one.translation - other.translation).norm() < spacings * spacing && one.turn_to(other) < turn_rad
     };
-    first_of_each(poses, most, same)
+    first_of_each(poses.into_iter(), most, same)
 }
 
 #[cfg(test)]
@@ -73,6 +62,7 @@ mod tests {
     use super::*;
     use crate::cloud::FruitCloud;
     use crate::verified::fixture::Dice;
+    use crate::verified::vertical::Vertical;
     use nalgebra::{Point3, Rotation3};
 
     /// A row of 6 x 2.6 x 0.6 m; a visit to either side of it sees a fruit the surer the nearer it hangs, four in ten of
@@ -98,15 +88,17 @@ mod tests {
     fn opposite_sides_are_laid_on_each_other_by_what_the_middle_shows() {
         let [query, map] = sides().map(|cloud| Landscape::new(&cloud));
         let model = Model { sigma: 0.02, detection: 0.55, scale: Scale::Metric, vertical: None };
-        let found = hypotheses(&query, &map, &model, &|_| true);
+        let found = hypotheses(&query, &map, &model);
         let turn = Rotation3::new(Vector3::new(0.7, -1.9, 0.4)).inverse();
         let best = found.first().expect("something stands out").pose;
         for p in &query.points {
             let place = turn * (p + query.centre - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
-            assert!((best.apply(p) - place).norm() < 0.1);
+            assert!((best.image(p) - place).norm() < 0.1);
         }
         let free = Model { scale: Scale::Free, ..model };
-        assert!(hypotheses(&query, &map, &free, &|_| true).is_empty());
-        assert!(hypotheses(&query, &map, &model, &|_| false).is_empty());
+        assert!(hypotheses(&query, &map, &free).is_empty());
+        // What is up in the query is in depth in the map: no row laid along a row does that.
+        let lying = Model { vertical: Some(Vertical::new([turn.inverse() * Vector3::y(), Vector3::z()])), ..model };
+        assert!(hypotheses(&query, &map, &lying).is_empty());
     }
 }

@@ -15,14 +15,6 @@ const REACHED: f64 = 12.0;
 /// Poses that are polished before they are compared: the best and what may come to be second.
 const COMPARED: usize = 3;
 
-/// Share of the evidence needed that must be left when every fruit is predicted without its own partner: what true poses
-/// keep. Poses on wires that have far more than all others keep 0.5 to 0.75.
-pub(super) const KEPT: f64 = 0.9;
-
-/// The same of rows laid along rows, whose fruits in common are few: on wires wrong poses with as much evidence keep half of
-/// what is needed and less.
-pub(super) const KEPT_LAID: f64 = 0.7;
-
 impl<'a> Search<'a> {
     /// Takes the best pose out of those that were not accepted, where it stands out of the others, has the `least` evidence and
     /// keeps the share `kept` of what is asked for.
@@ -35,7 +27,7 @@ impl<'a> Search<'a> {
     ) -> Option<Finding<'a>> {
         best_first(others);
         let distinct = self.distinct(others);
-        distinct.first().filter(|&&best| self.admits(&others[best].overlap.pose))?;
+        distinct.first().filter(|&&best| self.model.admits(&others[best].overlap.pose))?;
         let rate = self.config.false_alarm_rate;
         // Half of the distance that is asked for: most poses that do not stand out need no closer look.
         if evidence(others, distinct[0]) <= outlying(rate.sqrt(), self.second(others, &distinct)) {

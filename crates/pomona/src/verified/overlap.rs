@@ -2,15 +2,16 @@
 
 use super::evidence::likeliest_share;
 use super::growth::Growth;
-use super::hypothesis::gaussian;
-use super::placement::{Landing, Placement};
+use super::patches::Landing;
+use crate::geometry::Similarity;
+use crate::statistics::gaussian;
 use nalgebra::Vector3;
 
 /// The overlap that a hypothesis explains.
 #[derive(Debug, Clone)]
 pub(crate) struct Overlap {
     /// Least-squares pose over all pairs.
-    pub(crate) pose: Placement,
+    pub(crate) pose: Similarity,
     /// Evidence summed over all cells that growth reached, nats.
     pub(crate) log_odds: f64,
     /// Relative noise per axis, metres of the map.

@@ -1,23 +1,19 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
-use super::beliefs::{Beliefs, Edge};
-use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
-use super::placement::{Landing, Placement};
-use crate::answer::Pair;
-use crate::assignment::assign;
+use super::patches::{Landing, Patchwork};
+use crate::beliefs::{Beliefs, Edge};
+use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Standard deviations that an edge reaches: as far as a branch may have moved for itself.
 const GATE: f64 = 5.0;
 
-/// Share of the fruits that moved otherwise than their neighbours, and how much wider they scatter.
+/// Share of the fruits that moved otherwise than their neighbours, and how many times wider they scatter.
 ///
 /// Real residuals have tails that no normal distribution has: a branch broke loose, a depth was measured on a leaf. A
 /// pair far off is believed only where nothing else is near.
-const LOOSE: f64 = 0.01;
-const LOOSE_WIDTH: f64 = 3.0;
+const LOOSE: (f64, f64) = (0.01, 3.0);
 
 /// Pairs less likely than this against both being alone are left out.
 const LEAST_RATIO: f64 = 1e-3;
@@ -28,8 +24,8 @@ impl Beliefs {
     ///
     /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
     /// `p / (1 - p) N(d) / new density` against leaving both alone.
-    pub(super) fn of(laid: &Laid, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
-        let Laid { query, map, .. } = *laid;
+    pub(super) fn of(laid: &Patchwork, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
+        let Patchwork { query, map, .. } = *laid;
         let edge = |meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = share * support;
@@ -38,24 +34,6 @@ impl Beliefs {
             meeting.edge(seen / (1.0 - seen) * density / new * size(row, partner))
         };
         Self::new(laid.meetings(edge), query.len(), map.len())
-    }
-
-    /// The one-to-one pairs that gain most expected right answers, in rows of the landscapes.
-    pub(super) fn pairs(&self, n_query: usize, n_map: usize, min_probability: f64) -> Vec<Pair> {
-        let gain = |(edge, p): (&Edge, f64)| (edge.query as usize, edge.map as usize, p - min_probability);
-        let partners = assign(n_query, n_map, &self.links().map(gain).collect::<Vec<_>>());
-        let pair = |(edge, probability): (&Edge, f64)| Pair {
-            query: edge.query as usize,
-            map: edge.map as usize,
-            probability,
-            distance_m: edge.distance,
-            support: edge.ratio.ln(),
-        };
-        let is_best = |pair: &Pair| partners[pair.query] == Some(pair.map);
-        let mut pairs: Vec<Pair> = self.links().map(pair).filter(is_best).collect();
-        pairs.sort_unstable_by_key(|pair| (pair.query, pair.map));
-        pairs.dedup_by_key(|pair| (pair.query, pair.map));
-        pairs
     }
 }
 
@@ -74,21 +52,11 @@ pub(super) struct Meeting {
 impl Meeting {
     /// The pair with its likelihood ratio, where that is worth being looked at.
     pub(super) fn edge(&self, ratio: f64) -> Option<Edge> {
-        let Self { query, map, distance, .. } = *self;
-        (ratio > LEAST_RATIO).then_some(Edge { query, map, ratio, distance })
+        (ratio > LEAST_RATIO).then_some(Edge { query: self.query, map: self.map, ratio })
     }
 }
 
-/// The query laid on the map, each of its fruits where it is expected.
-#[derive(Clone, Copy)]
-pub(crate) struct Laid<'a> {
-    pub(super) query: &'a Landscape,
-    pub(super) map: &'a Landscape,
-    pub(super) predictions: &'a [Option<Landing>],
-    pub(super) pose: &'a Placement,
-}
-
-impl Laid<'_> {
+impl Patchwork<'_> {
     /// Fruits per cubic metre of the map that chance puts at a distance from a fruit: as many as both visits show around
     /// their own.
     pub(super) fn companions(&self, distance: f64) -> f64 {
@@ -100,18 +68,15 @@ impl Laid<'_> {
 
     /// What `kept` makes of every meeting within the gate, by rows of the query.
     pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
-        let rows: Vec<usize> = (0..self.predictions.len()).collect();
-        let of_part = |rows: &[usize]| -> Vec<T> {
-            rows.iter().flat_map(|&row| self.meetings_of(row)).filter_map(|meeting| kept(&meeting)).collect()
-        };
-        rows.par_chunks(SHARE_OF_ROWS).flat_map_iter(of_part).collect()
+        let of = |row: usize| self.meetings_of(row).into_iter().filter_map(|meeting| kept(&meeting));
+        (0..self.predictions.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).flat_map_iter(of).collect()
     }
 
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
-        let (map, pose) = (self.map, self.pose);
+        let (map, pose) = (self.map, &self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let support = map.support.at(&place);
-        let own = self.query.covariances.as_ref().map(|all| pose.seen_from_map(&all[row]));
+        let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));
         // No axis has more than the trace, three times the mean.
         let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { 1.0 };
         let reach = GATE * (widest * variance).sqrt();
@@ -150,8 +115,9 @@ impl Laid<'_> {
 fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
     // Density by the squared Mahalanobis distance, times the product of the three standard deviations.
     let tailed = |d2: f64| {
-        let loose = (-0.5 * d2 / (LOOSE_WIDTH * LOOSE_WIDTH)).exp() / LOOSE_WIDTH.powi(3);
-        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - LOOSE) * (-0.5 * d2).exp() + LOOSE * loose)
+        let (share, width) = LOOSE;
+        let loose = (-0.5 * d2 / (width * width)).exp() / width.powi(3);
+        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - share) * (-0.5 * d2).exp() + share * loose)
     };
     let isotropic = || {
         let d2 = offset.norm_squared() / variance;

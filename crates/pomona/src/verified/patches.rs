@@ -6,24 +6,33 @@
 //! neighbourhood, in the measure in which neighbours move together. What patches leave over is carried on from fruit to
 //! fruit ([`super::displacement`]).
 
-use super::cut::{Cell, Cut, surroundings, total};
+use super::cut::{Cell, Cut};
 use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::nearest::SHARE_OF_ROWS;
-use super::placement::{FIXING, Landing, Moments, Placement};
-use super::sight::is_among;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
+use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
+use crate::neighbours::others::each_row;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Cells of a patch's own fit, by their weight (see [`super::cut`]): those next to it.
+/// Weights (see [`super::cut`]) that cells around a cell exceed: those that its patch is fitted to, next to it, and
+/// those of its surroundings, all of them.
 pub(super) const NEXT: f64 = 0.3;
+pub(super) const ALL: f64 = 0.0;
 
 /// Cells at the least that are worth a thread of their own.
 const SHARE_OF_CELLS: usize = 32;
+
+/// A fruit of the query where the grown pose puts it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Landing {
+    pub(crate) place: Vector3<f64>,
+    /// Variance per axis of the distance to the partner, square metres of the map.
+    pub(crate) variance: f64,
+}
 
 /// Partner of a fruit, or the mean of all that it may be, and the probability that it has one.
 pub(super) type Target = Option<(Vector3<f64>, f64)>;
@@ -37,7 +46,7 @@ pub(crate) struct Patchwork<'a> {
     pub(super) model: Model,
     pub(super) cells: Vec<Cell>,
     /// The common pose.
-    pub(super) pose: Placement,
+    pub(super) pose: Similarity,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     pub(super) sigma: f64,
     /// Variance that neighbours' residuals about the patches share, square metres.
@@ -46,13 +55,13 @@ pub(crate) struct Patchwork<'a> {
     /// What patches left over when it was looked at last: from where they put a fruit to its partner.
     pub(super) left_over: Vec<Residual>,
     pub(super) predictions: Vec<Option<Landing>>,
-    /// Fruits of the query, and of the map, that hang where the other visit does not see; empty where all are seen.
+    /// Fruits of the query, and of the map, that hang where the other visit does not see.
     pub(super) unseen: [Vec<bool>; 2],
 }
 
 impl<'a> Patchwork<'a> {
     /// All cells under one pose, none of them reached.
-    pub(super) fn new(query: &'a Landscape, map: &'a Landscape, pose: Placement, sigma: f64, model: &Model) -> Self {
+    pub(super) fn new(query: &'a Landscape, map: &'a Landscape, pose: Similarity, sigma: f64, model: &Model) -> Self {
         let cut = query.cut();
         let cells = cut.cells.iter().map(|cell| Cell { pose, ..cell.clone() }).collect();
         Self {
@@ -67,13 +76,13 @@ impl<'a> Patchwork<'a> {
             targets: vec![None; query.len()],
             left_over: vec![None; query.len()],
             predictions: vec![None; query.len()],
-            unseen: Default::default(),
+            unseen: [vec![false; query.len()], vec![false; map.len()]],
         }
     }
 
     /// Where the patch puts a fruit.
     fn placed(&self, row: usize) -> Vector3<f64> {
-        self.cells[self.cut.cell_of[row] as usize].pose.apply(&self.query.points[row])
+        self.cells[self.cut.cell_of[row] as usize].pose.image(&self.query.points[row])
     }
 
     /// From where the patches put the fruits now to their partners.
@@ -92,15 +101,16 @@ impl<'a> Patchwork<'a> {
         let footing = |cell: &Cell| cell.reached.then(|| footing(self, cell));
         let footings: Vec<Option<F>> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(footing).collect();
         let at = |row: usize| {
-            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !is_among(&self.unseen[0], row))?;
+            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !self.unseen[0][row])?;
             Some(landing(self, row, footing))
         };
-        self.predictions = (0..self.query.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(at).collect();
+        self.predictions = each_row(self.query.len(), at);
     }
 
-    /// How firmly pairs, and as many more as `hold`, hold the pose of a cell.
-    pub(super) fn footing(&self, pairs: &Moments, hold: f64, cell: &Cell) -> Footing {
-        Footing::new(pairs, hold, self.cut.edge, cell.centre)
+    /// How firmly the pairs of cells around whose weight exceeds `least`, and as many more as `hold`, hold the pose
+    /// of a cell.
+    pub(super) fn footing(&self, cell: &Cell, least: f64, hold: f64) -> Footing {
+        Footing::new(&self.pairs_around(cell, least), hold, self.cut.edge, cell.centre)
     }
 
     /// Where a fruit should lie, whose patch has the variance of one pair times `looseness`; noise is taken to be `widening` times
@@ -130,7 +140,13 @@ impl<'a> Patchwork<'a> {
 
     /// Sums over all pairs.
     pub(super) fn all_pairs(&self) -> Moments {
-        total(self.cells.iter().filter(|cell| cell.reached).map(|cell| (&cell.moments, 1.0)))
+        Moments::total(self.cells.iter().filter(|cell| cell.reached).map(|cell| (&cell.moments, 1.0)))
+    }
+
+    /// Sums over the pairs in a cell and in those around whose weight exceeds `least`.
+    fn pairs_around(&self, cell: &Cell, least: f64) -> Moments {
+        let near = cell.around.iter().filter(|(_, weight)| *weight > least);
+        Moments::total(near.map(|&(other, weight)| (&self.cells[other as usize].moments, weight)))
     }
 
     /// The common pose from the pairs, for all cells; `false` where they are too few.
@@ -152,9 +168,9 @@ impl<'a> Patchwork<'a> {
     /// the holds of patches and surroundings.
     pub(super) fn bend(&mut self, hold: impl Fn(&Self) -> f64) -> [f64; 2] {
         let of_surroundings = hold(self);
-        self.fit(surroundings, of_surroundings);
+        self.fit(ALL, of_surroundings);
         let of_patches = hold(self);
-        self.fit(next_to, of_patches);
+        self.fit(NEXT, of_patches);
         [of_patches, of_surroundings]
     }
 
@@ -181,33 +197,28 @@ impl<'a> Patchwork<'a> {
         1.0 / (shared / (self.sigma * self.sigma)).max(f64::EPSILON)
     }
 
-    /// Fits every cell's pose to the pairs around it, held to the pose that it has.
-    fn fit(&mut self, around: impl Fn(&[Cell], &Cell) -> Moments + Sync, hold: f64) {
+    /// Fits every cell's pose to the pairs of cells around whose weight exceeds `least`, held to the pose that it has.
+    fn fit(&mut self, least: f64, hold: f64) {
         let prior = hold * self.cut.edge * self.cut.edge;
         let fitted = |cell: &Cell| {
             if !cell.reached {
                 return cell.pose;
             }
-            let mut moments = around(&self.cells, cell);
-            moments.add(&cell.centre, &cell.pose.apply(&cell.centre), hold);
+            let mut moments = self.pairs_around(cell, least);
+            moments.add(&cell.centre, &cell.pose.image(&cell.centre), hold);
             moments.step(&cell.pose, Scale::Metric, prior).unwrap_or(cell.pose)
         };
-        let poses: Vec<Placement> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
+        let poses: Vec<Similarity> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(fitted).collect();
         self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
     }
 
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.
     pub(super) fn looked_at(&self, row: usize) -> f64 {
-        if is_among(&self.unseen[1], row) {
+        if self.unseen[1][row] {
             return 0.0;
         }
-        let place = self.pose.apply_inverse(&self.map.points[row]);
+        let place = self.pose.preimage(&self.map.points[row]);
         let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
         if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
     }
-}
-
-/// Sums over the cells next to a cell, itself included.
-pub(super) fn next_to(cells: &[Cell], cell: &Cell) -> Moments {
-    total(cell.around.iter().filter(|a| a.1 > NEXT).map(|a| (&cells[a.0 as usize].moments, a.1)))
 }

@@ -3,10 +3,9 @@
 use super::contender::Contender;
 use super::hypothesis::{GATE, Model};
 use super::landscape::Landscape;
-use super::placement::Placement;
-use super::seeds::{Quad, STARS, frame_of};
+use super::seeds::{Quad, STARS, frame};
 use super::vertical::Stands;
-use crate::geometry::Scale;
+use crate::geometry::{Scale, Similarity};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::ops::Add;
 
@@ -95,7 +94,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     /// `None` where the seed is degenerate.
     pub(crate) fn new(query: &'a Landscape, map: &'a M, model: &'a Model, quad: Quad) -> Option<Self> {
         let fruits = quad.map(|row| query.points[row as usize]);
-        let to_frame = Matrix3::from_columns(&frame_of(&fruits)?).transpose();
+        let to_frame = Matrix3::from_columns(&frame(&fruits)?).transpose();
         let (centroid, fruits) = in_frame(fruits, &to_frame);
         let moments = fruits.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose());
         let off_centre = |&i: &usize| fruits[i].norm_squared();
@@ -108,7 +107,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
     /// The pose on a seed of the map, where its squared residuals sum up to `most` at the most, it stands as a vertical asks and
     /// the fruits around speak for it.
     pub(super) fn contender(&self, target: &Quad, most: f64, effort: &mut Effort) -> Option<Contender> {
-        let (pose, residual) = self.fit(target)?;
+        let (pose, residual) = self.fit(target.map(|row| self.map.place(row)))?;
         if residual > most {
             return None;
         }
@@ -120,19 +119,14 @@ impl<'a, M: Terrain> Proposer<'a, M> {
         (log_odds > 0.0).then_some(Contender { pose, log_odds, place: self.centroid, key })
     }
 
-    /// Least-squares pose on a seed of the map and the sum of the squared residuals. `None` where that is degenerate.
+    /// Least-squares pose on the fruits of a seed of the map and the sum of the squared residuals. `None` where that
+    /// is degenerate.
     ///
     /// The frames of both seeds are laid on each other; one Gauss-Newton step from there, in their common axes, does
-    /// the rest (see [`Placement`]'s step): the inertia is the same for all candidates.
+    /// the rest (see [`crate::moments`]): the inertia is the same for all candidates.
     #[inline]
-    pub(crate) fn fit(&self, target: &Quad) -> Option<(Placement, f64)> {
-        self.fit_on(target.map(|row| self.map.place(row)))
-    }
-
-    /// The same where the fruits of that seed are known.
-    #[inline]
-    pub(super) fn fit_on(&self, fruits: [Vector3<f64>; STARS]) -> Option<(Placement, f64)> {
-        let axes = Matrix3::from_columns(&frame_of(&fruits)?);
+    pub(crate) fn fit(&self, fruits: [Vector3<f64>; STARS]) -> Option<(Similarity, f64)> {
+        let axes = Matrix3::from_columns(&frame(&fruits)?);
         let (centroid, fruits) = in_frame(fruits, &axes.transpose());
         let both = || self.fruits.iter().zip(&fruits);
         let torque = both().fold(Vector3::zeros(), |sum, (here, there)| sum + here.cross(there));
@@ -146,27 +140,27 @@ impl<'a, M: Terrain> Proposer<'a, M> {
             return None;
         }
         let residual = turned.iter().zip(&fruits).map(|(here, there)| (there - here * scale).norm_squared()).sum();
-        let rotation = axes * turn * self.to_frame;
+        let rotation = Rotation3::from_matrix_unchecked(axes * turn * self.to_frame);
         let translation = centroid - rotation * self.centroid * scale;
-        Some((Placement { rotation, translation, scale }, residual))
+        Some((Similarity { rotation, translation, scale }, residual))
     }
 
     /// The pose as a known vertical corrects it; `None` where the two contradict each other.
     #[inline]
-    pub(crate) fn upright(&self, pose: Placement) -> Option<Placement> {
+    pub(crate) fn upright(&self, pose: Similarity) -> Option<Similarity> {
         let Some(vertical) = self.model.vertical else { return Some(pose) };
         vertical.straightened(&pose, &self.centroid, self.turn_variance(&pose))
     }
 
     /// How the pose stands, where a vertical is known.
     #[inline]
-    pub(crate) fn stand(&self, pose: &Placement) -> Stands {
+    pub(crate) fn stand(&self, pose: &Similarity) -> Stands {
         self.model.vertical.map_or(Stands::default(), |vertical| vertical.stand(pose, self.turn_variance(pose)))
     }
 
     /// Variance of the turn about each axis.
     #[inline]
-    fn turn_variance(&self, pose: &Placement) -> f64 {
+    fn turn_variance(&self, pose: &Similarity) -> f64 {
         // The noise is in metres of the map, the inertia in those of the query.
         let sigma = self.model.sigma / pose.scale;
         sigma * sigma * self.inverse_inertia.trace() / 3.0
@@ -174,7 +168,7 @@ impl<'a, M: Terrain> Proposer<'a, M> {
 
     /// Evidence of the fruits next to the seed, the seed's own fit included, with the pose as the seed gives it.
     #[inline]
-    pub(crate) fn first_look(&self, pose: &Placement) -> f64 {
+    pub(crate) fn first_look(&self, pose: &Similarity) -> f64 {
         // Likelihood ratios are multiplied: one logarithm in the end costs less than one a fruit.
         let mut around = 1.0;
         for &row in self.query.neighbours(self.middle as usize).iter().filter(|&row| !self.quad.contains(row)) {
@@ -206,10 +200,10 @@ impl<'a, M: Terrain> Proposer<'a, M> {
 
     /// What a fruit says for the pose, as a likelihood ratio.
     #[inline]
-    fn ratio(&self, row: u32, pose: &Placement) -> f64 {
+    fn ratio(&self, row: u32, pose: &Similarity) -> f64 {
         let p = self.query.points[row as usize];
         let variance = self.variance(&p);
-        let place = pose.apply(&p);
+        let place = pose.image(&p);
         match self.map.nearest(&place, GATE * variance.sqrt()) {
             Some((partner, d2)) => self.model.met(d2, variance, self.map.density(partner)),
             None => self.model.missed(self.map.support(&place)),
@@ -248,12 +242,13 @@ mod tests {
             let map = Landscape::new(&FruitCloud::from_positions(cloud.positions.iter().map(moved).collect()));
             for (quad, _) in longest(&query, 50) {
                 let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
-                let (pose, residual) = proposer.fit(&quad.map(|row| shown(&query, &map, row))).expect("nor its image");
+                let (pose, residual) =
+                    proposer.fit(quad.map(|row| map.points[shown(&query, &map, row) as usize])).expect("nor its image");
                 assert!(residual < 1e-18, "{residual}");
-                assert!((pose.rotation - turn.matrix()).norm() < 1e-9 && (pose.scale - scale).abs() < 1e-9);
+                assert!((pose.rotation.matrix() - turn.matrix()).norm() < 1e-9 && (pose.scale - scale).abs() < 1e-9);
                 for (row, p) in (0..).zip(&query.points) {
                     let place = map.points[shown(&query, &map, row) as usize];
-                    assert!((pose.apply(p) - place).norm() < 1e-9);
+                    assert!((pose.image(p) - place).norm() < 1e-9);
                 }
             }
         }
@@ -264,7 +259,7 @@ mod tests {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
         let model = model(Scale::Metric);
-        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
+        let truth = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
         let mut looks = Vec::new();
         for (quad, _) in longest(&query, 200) {
             let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");

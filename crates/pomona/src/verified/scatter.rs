@@ -8,10 +8,12 @@
 //! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
 //! true one where fruits crowd, so that the noise comes out small.
 
-use super::chance::shell;
+use super::chance::{BIN, shell};
 use super::hypothesis::SHARES;
-use super::nearest::{SHARE_OF_ROWS, single};
-use super::pairing::Laid;
+use super::patches::Patchwork;
+use crate::neighbours::others::SHARE_OF_ROWS;
+use crate::neighbours::tree::single;
+use crate::statistics::maxwell;
 use rayon::prelude::*;
 
 /// What is known of the noise beforehand.
@@ -36,10 +38,8 @@ struct Counts {
     due: f64,
 }
 
+/// Up to 1.25 spacings.
 const BINS: usize = 30;
-
-/// Width of a bin in spacings: 1.1 cm in an orchard; counted up to 1.25 spacings.
-const BIN: f64 = 1.0 / 24.0;
 
 /// Companions are as dense across the visits as within, as if this many had been counted so.
 const STEADY: f64 = 200.0;
@@ -48,7 +48,7 @@ const STEADY: f64 = 200.0;
 const ROUNDS: usize = 20;
 
 /// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
-pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
+pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> f64 {
     let counts = Counts::new(laid);
     // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
     let tried: Vec<(f64, f64)> = (0..8 * BINS as i32)
@@ -71,8 +71,8 @@ pub(super) fn scatter(laid: &Laid, expected: KnownNoise) -> f64 {
 }
 
 impl Counts {
-    fn new(laid: &Laid) -> Self {
-        let &Laid { query, map, predictions, pose } = laid;
+    fn new(laid: &Patchwork) -> Self {
+        let Patchwork { query, map, predictions, pose, .. } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], 0.0);
@@ -128,25 +128,14 @@ impl Counts {
     }
 }
 
-/// Distribution of the length of a vector of three standard normal numbers.
-fn maxwell(x: f64) -> f64 {
-    erf(x / std::f64::consts::SQRT_2) - (2.0 / std::f64::consts::PI).sqrt() * x * (-0.5 * x * x).exp()
-}
-
-/// Error function of x >= 0 to 1.5e-7 (Abramowitz and Stegun 7.1.26).
-fn erf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let polynomial =
-        ((((1.061_405_429 * t - 1.453_152_027) * t + 1.421_413_741) * t - 0.284_496_736) * t + 0.254_829_592) * t;
-    1.0 - polynomial * (-x * x).exp()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Scale, Similarity};
     use crate::verified::fixture::visits;
+    use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::landscape::Landscape;
-    use crate::verified::placement::{Landing, Placement};
+    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]
@@ -155,20 +144,14 @@ mod tests {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
             let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
-            let predictions: Vec<_> = query.points.iter().map(place).collect();
-            let laid = Laid { query: &query, map: &map, predictions: &predictions, pose: &Placement::identity() };
+            let model = Model { sigma, detection: DETECTION, scale: Scale::Metric, vertical: None };
+            let mut laid = Patchwork::new(&query, &map, Similarity::identity(), sigma, &model);
+            laid.predictions = query.points.iter().map(place).collect();
             // A guess, and what a caller says and is wrong by a factor of two.
             for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
                 let found = scatter(&laid, KnownNoise { sigma: told, width });
                 assert!((found / sigma - 1.0).abs() < off, "{found} for {sigma}, told {told}");
             }
         }
-    }
-
-    #[test]
-    fn the_distribution_of_lengths_is_that_of_maxwell() {
-        assert!(maxwell(0.0).abs() < 1e-6);
-        assert!((maxwell(1.538_17) - 0.5).abs() < 1e-4); // its median
-        assert!((maxwell(6.0) - 1.0).abs() < 1e-6);
     }
 }

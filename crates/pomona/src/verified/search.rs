@@ -1,18 +1,36 @@
 //! From seeds to hypotheses: rounds of query seeds, their candidates in the map, the best of them refined.
 
-use super::case::Search;
+use super::case::{Log, Search, VerifiedMap};
 use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::{Hypothesis, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
-use super::seeds::{SHORTEST, Seed, WITHIN, canonical, near_ties, shuffled, without_scale};
+use super::seeds::{COMPANIONS, SHORTEST, Seed, WITHIN, canonical, longest as longest_seeds, near_ties, without_scale};
 use crate::geometry::Scale;
+use crate::random::shuffled;
 use rayon::prelude::*;
+
+/// Candidates that are refined in each round of the search (see [`Search::seeds_of`]).
+const ROUNDS: [usize; 4] = [32, 32, 48, 64];
+
+/// One in so many of the longest seeds is tried in the third round.
+const THIRD_ROUND: usize = 5;
+
+/// Fruits whose seeds make the first round, at the most: where the visits overlap well, few are enough in a cloud of
+/// any size. Also the seeds that are tried at the least before an answer stands alone.
+pub(super) const FIRST_FRUITS: usize = 256;
+
+/// Small clouds try at least this many seeds: all of them in a cloud of twelve.
+const FEW_SEEDS: u64 = 1500;
+
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the
+/// other poses that an answer has to stand out of.
+const UPRIGHT_SEEDS: u64 = 2;
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
 fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
     let near = query.neighbours(row as usize);
-    let n = near.len().min(super::seeds::COMPANIONS) as u64;
+    let n = near.len().min(COMPANIONS) as u64;
     let count = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
     if turn >= count {
         return None;
@@ -26,20 +44,46 @@ fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
 }
 
 impl Search<'_> {
-    /// One round: candidates of all `seeds`, the best `keep` of them refined, and the other candidates in order.
-    pub(super) fn round(&self, seeds: &[Seed], keep: usize) -> (Vec<Hypothesis>, Vec<Contender>, Effort) {
+    /// The rounds of a search, each made when it is asked for: their seeds, and how many of their candidates are
+    /// refined.
+    pub(super) fn rounds(&self) -> impl Iterator<Item = (Vec<Seed>, usize)> {
+        let mut longest = Vec::new();
+        (0..).zip(ROUNDS).map(move |(round, keep)| (self.seeds_of(round, &mut longest), keep))
+    }
+
+    /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
+    fn seeds_of(&self, round: usize, longest: &mut Vec<Seed>) -> Vec<Seed> {
+        match round {
+            0 => of_some_fruits(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
+            1 => of_some_fruits(self.query, 1, 1..2),
+            2 => {
+                let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
+                let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
+                *longest = longest_seeds(self.query, usize::try_from(count).unwrap_or(usize::MAX));
+                longest.split_off(longest.len() - longest.len() / THIRD_ROUND)
+            }
+            _ => std::mem::take(longest),
+        }
+    }
+
+    /// Candidates of all seeds: the best `keep` of them refined, and the others in order.
+    pub(super) fn ask(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
         let of_each: Vec<(Vec<Contender>, Effort)> = seeds.par_iter().map(|&seed| self.candidates_of(seed)).collect();
-        let effort = of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
+        log.seeds += seeds.len();
+        log.effort = log.effort + of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
+        log.threshold = self.threshold(log.effort.stands.share_left());
         let mut candidates: Vec<Contender> = of_each.into_iter().flat_map(|(found, _)| found).collect();
         candidates.sort_unstable_by(by_evidence);
         let best = distinct(self.query, self.map.spacing, &candidates, keep);
         candidates.retain(|one| best.iter().all(|other| other.key != one.key));
-        (self.refined(&best), candidates, effort)
+        let hypotheses = self.refined(&best);
+        log.refined += hypotheses.len();
+        (hypotheses, candidates)
     }
 
     /// Candidates of one seed of the query that survive the fit and the first look.
     fn candidates_of(&self, seed: Seed) -> (Vec<Contender>, Effort) {
-        let Self { query, map, seeds: index, model, .. } = *self;
+        let Self { query, map, prepared: VerifiedMap { seeds: index, .. }, model, .. } = *self;
         let (mut found, mut effort) = (Vec::new(), Effort::default());
         let length = f64::from(seed.1[0]);
         // Noise in the metres of the query: with the scale unknown, the same share of the spacing.
@@ -51,8 +95,9 @@ impl Search<'_> {
             return (found, effort);
         }
         // Standard deviations that the two seeds may differ by.
+        let (long, widest) = LONG;
         let apart = match model.scale {
-            Scale::Metric => WITHIN * (length / (LONG * sigma)).clamp(1.0, WIDEST),
+            Scale::Metric => WITHIN * (length / (long * sigma)).clamp(1.0, widest),
             Scale::Free => WITHIN,
         };
         let (mut runs, mut hits) = (Vec::new(), Vec::new());
@@ -88,8 +133,7 @@ impl Search<'_> {
 ///
 /// They bend more between visits, and where the noise is larger than expected they are found still. It costs little
 /// where the length tells: a long seed has few lookalikes.
-const LONG: f64 = 24.0;
-const WIDEST: f64 = 2.0;
+const LONG: (f64, f64) = (24.0, 2.0);
 
 /// Seeds whose code has more neighbours in the map than this are passed over.
 const COMMON: usize = 48;

@@ -4,9 +4,10 @@
 //! it. Four fruits survive occlusion far more often than five (0.55^4 against 0.55^5 at 45 %), and verification is
 //! cheap enough to sort out the additional false candidates.
 
-use super::codes::{Code, CodeGrid};
 use super::landscape::Landscape;
 use crate::geometry::Scale;
+use crate::neighbours::code_grid::{Code, CodeGrid};
+use crate::random::shuffled;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -61,13 +62,7 @@ fn oriented(points: &[Vector3<f64>], [a, b, c, d]: Quad) -> Quad {
 
 /// Unit axes of a seed: along AB, towards C, and their cross product. `None` for near-collinear seeds.
 #[inline]
-pub(crate) fn frame(points: &[Vector3<f64>], quad: &Quad) -> Option<[Vector3<f64>; 3]> {
-    frame_of(&quad.map(|row| points[row as usize]))
-}
-
-/// The same of its fruits.
-#[inline]
-pub(super) fn frame_of(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 3]> {
+pub(crate) fn frame(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 3]> {
     let [origin, ..] = *fruits;
     let ab = fruits[1] - origin;
     let ac = fruits[2] - origin;
@@ -82,9 +77,13 @@ pub(super) fn frame_of(fruits: &[Vector3<f64>; STARS]) -> Option<[Vector3<f64>; 
     Some([e1, e2, e1.cross(&e2)])
 }
 
+/// Length of AB, then C (along, across) and D (along, across, above) in the frame of the seed, metres.
+///
+/// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
 fn code(points: &[Vector3<f64>], quad: Quad) -> Option<Code> {
-    let [e1, e2, e3] = frame(points, &quad)?;
-    let [ab, ac, ad] = [1, 2, 3].map(|i| points[quad[i] as usize] - points[quad[0] as usize]);
+    let fruits = quad.map(|row| points[row as usize]);
+    let [e1, e2, e3] = frame(&fruits)?;
+    let [ab, ac, ad] = [1, 2, 3].map(|i| fruits[i] - fruits[0]);
     Some([ab.dot(&e1), ac.dot(&e1), ac.dot(&e2), ad.dot(&e1), ad.dot(&e2), ad.dot(&e3)].map(|x| x as f32))
 }
 
@@ -208,14 +207,6 @@ impl SeedIndex {
     pub(super) fn empty() -> Self {
         Self { quads: Vec::new(), codes: CodeGrid::new(0, |_| Code::default()).0 }
     }
-}
-
-/// A fixed shuffle of 64-bit keys (Steele's splitmix): which seeds are tried first must not follow the input's order.
-pub(crate) fn shuffled(key: u64) -> u64 {
-    let mut z = key.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

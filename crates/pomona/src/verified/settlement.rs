@@ -10,17 +10,16 @@
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
-use super::beliefs::Beliefs;
-use super::cut::{Cell, surroundings};
+use super::cut::Cell;
 use super::evidence::evidence;
 use super::footing::Footing;
 use super::growth::{Growth, HOLD};
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::overlap::Overlap;
-use super::pairing::Laid;
-use super::patches::{Patchwork, next_to};
+use super::patches::{ALL, NEXT, Patchwork};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, scatter};
 use super::size::Cue;
+use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
 
 /// A prediction loses at most this share of its fit when its own partner is left out.
@@ -59,23 +58,17 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>) -> Settled {
         settlement.refit(&beliefs);
         beliefs = settlement.paired(cue.as_ref());
     }
-    let evidence = settlement.evidence();
+    let evidence = evidence(&settlement.patches);
     let Patchwork { pose, sigma, predictions, .. } = settlement.patches;
     Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence }
 }
 
 impl Settlement<'_> {
-    fn laid(&self) -> Laid<'_> {
-        let Patchwork { query, map, predictions, pose, .. } = &self.patches;
-        Laid { query, map, predictions, pose }
-    }
-
     /// Where each fruit should lie by all partners but its own, and how surely.
     fn predict(&mut self) {
         let [hold, hold_around] = self.holds;
         let footings = |patches: &Patchwork, cell: &Cell| {
-            let near = patches.footing(&next_to(&patches.cells, cell), hold, cell);
-            [near, patches.footing(&surroundings(&patches.cells, cell), hold_around, cell)]
+            [patches.footing(cell, NEXT, hold), patches.footing(cell, ALL, hold_around)]
         };
         let landing = |patches: &Patchwork, row: usize, [near, wide]: [Footing; 2]| {
             let p = &patches.query.points[row];
@@ -94,7 +87,7 @@ impl Settlement<'_> {
 
     /// Noise from the distances; the predictions' variances follow.
     fn measure(&mut self) {
-        let found = scatter(&self.laid(), self.expected);
+        let found = scatter(&self.patches, self.expected);
         let both = self.patches.predictions.iter().zip(&self.patches.targets);
         let (sum, weights) = both
             .filter_map(|(prediction, target)| Some((prediction.as_ref()?.variance, (*target)?.1)))
@@ -121,13 +114,7 @@ impl Settlement<'_> {
         self.predict();
         self.measure();
         let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
-        Beliefs::of(&self.laid(), self.share, &size)
-    }
-
-    /// What the overlap says for the pose, nats.
-    fn evidence(&self) -> f64 {
-        let there: Vec<f64> = (0..self.patches.map.len()).map(|row| self.patches.looked_at(row)).collect();
-        evidence(&self.laid(), &there)
+        Beliefs::of(&self.patches, self.share, &size)
     }
 
     /// Common pose, surroundings and patches from the mean partners.

@@ -4,10 +4,10 @@
 //! have shown, and they say nothing against a pose. How far each sees is told by the pose itself: in a depth of the row
 //! where one visit shows many fruits and the other hardly any, the other does not see.
 
-use super::hypothesis::gaussian;
 use super::landscape::Landscape;
-use super::placement::Placement;
 use super::votes::row_axes;
+use crate::geometry::Similarity;
+use crate::statistics::gaussian;
 use nalgebra::Vector3;
 
 /// A visit that shows less than this share of the other's fruits in a depth does not see there.
@@ -16,20 +16,15 @@ const LEAST: f64 = 0.1;
 /// Standard deviation of the depths over which fruits are counted, in spacings: 7 cm in an orchard.
 const WIDTH: f64 = 0.25;
 
-/// Whether a fruit is told to be one of some; of no fruits none is.
-pub(super) fn is_among(rows: &[bool], row: usize) -> bool {
-    rows.get(row).is_some_and(|&told| told)
-}
-
 /// Fruits of the query, and of the map, that hang where the other visit does not see; none where the map is no row.
-pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Placement) -> [Vec<bool>; 2] {
+pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Similarity) -> [Vec<bool>; 2] {
     let Some(axes) = row_axes(map) else { return [vec![false; query.len()], vec![false; map.len()]] };
     let depth = |place: &Vector3<f64>| place.dot(&axes.column(2));
-    let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.apply(p)).collect();
+    let here: Vec<Vector3<f64>> = query.points.iter().map(|p| pose.image(p)).collect();
     // Trees that only one visit shows say nothing about how far the other sees.
     let both = [
         here.iter().filter(|place| map.support.at(place) > 0.0).map(depth).collect::<Vec<f64>>(),
-        map.points.iter().filter(|p| query.support.at(&pose.apply_inverse(p)) > 0.0).map(depth).collect(),
+        map.points.iter().filter(|p| query.support.at(&pose.preimage(p)) > 0.0).map(depth).collect(),
     ];
     let variance = (WIDTH * map.spacing).powi(2);
     let shown =

@@ -1,7 +1,8 @@
 //! Diameters as a soft cue, once the growth that all fruits share is removed.
 
-use super::beliefs::Edge;
-use super::landscape::{Landscape, median};
+use super::landscape::Landscape;
+use crate::beliefs::Edge;
+use crate::statistics::upper_median;
 
 /// Pairs needed before diameters are believed: growth and its spread are two numbers.
 const MIN_PAIRS: usize = 6;
@@ -59,7 +60,7 @@ const TAILS: f64 = 4.0;
 
 /// Median and 1.48 times the median absolute deviation.
 fn centre_and_spread(values: &mut [f64]) -> (f64, f64) {
-    let centre = median(values);
+    let centre = upper_median(values);
     let mut deviations: Vec<f64> = values.iter().map(|x| (x - centre).abs()).collect();
-    (centre, (1.4826 * median(&mut deviations)).max(LEAST_SPREAD))
+    (centre, (1.4826 * upper_median(&mut deviations)).max(LEAST_SPREAD))
 }

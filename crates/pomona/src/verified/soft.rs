@@ -3,9 +3,11 @@
 //! The nearest fruit is a stranger where few are seen again. The likelihood of all of them together has a wide basin, and one
 //! step of expectation and maximisation climbs most of it (coherent point drift, Myronenko and Song 2010, with a rigid pose).
 
-use super::hypothesis::{Evidence, Model, gaussian};
+use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::placement::{Moments, Placement};
+use crate::geometry::Similarity;
+use crate::moments::Moments;
+use crate::statistics::{Evidence, gaussian};
 use nalgebra::Vector3;
 
 /// Standard deviations beyond which a fruit pulls no more.
@@ -17,9 +19,9 @@ pub(super) fn pulled(
     query: &Landscape,
     map: &Landscape,
     model: &Model,
-    start: &Placement,
+    start: &Similarity,
     widths: &[f64],
-) -> (Placement, f64) {
+) -> (Similarity, f64) {
     let (mut pose, mut nats) = (*start, 0.0);
     for width in widths {
         let sigma = width * map.spacing;
@@ -31,10 +33,10 @@ pub(super) fn pulled(
 }
 
 /// Where the fruits of the query are pulled when a pair has the noise `sigma`, and what they say for the pose, nats.
-fn pulls_at(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement, sigma: f64) -> (Moments, f64) {
+fn pulls_at(query: &Landscape, map: &Landscape, model: &Model, pose: &Similarity, sigma: f64) -> (Moments, f64) {
     let (mut pulls, mut evidence) = (Moments::default(), Evidence::default());
     for p in &query.points {
-        let place = pose.apply(p);
+        let place = pose.image(p);
         let (mut sum, mut total) = (Vector3::zeros(), 0.0);
         map.near(&place, REACH * sigma, |row| {
             let partner = map.points[row as usize];
@@ -55,7 +57,7 @@ fn pulls_at(query: &Landscape, map: &Landscape, model: &Model, pose: &Placement,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Scale;
+    use crate::geometry::{Scale, Similarity};
     use crate::verified::fixture::visits;
     use nalgebra::Rotation3;
 
@@ -64,11 +66,12 @@ mod tests {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
         let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None };
-        let truth = Placement { translation: query.centre - map.centre, ..Placement::identity() };
-        let moved = Placement { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
+        let truth = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
+        let moved = Similarity { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
         let start = moved.turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.02, -0.03, 0.03)));
-        let off =
-            |pose: &Placement| query.points.iter().map(|p| (pose.apply(p) - truth.apply(p)).norm()).fold(0.0, f64::max);
+        let off = |pose: &Similarity| {
+            query.points.iter().map(|p| (pose.image(p) - truth.image(p)).norm()).fold(0.0, f64::max)
+        };
         let (pose, nats) = pulled(&query, &map, &model, &start, &[0.3, 0.2, 0.15, 0.15]);
         let (_, before) = pulled(&query, &map, &model, &start, &[0.15]);
         assert!(off(&start) > 0.1 && off(&pose) < 0.03, "{} {}", off(&start), off(&pose));

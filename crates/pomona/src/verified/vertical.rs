@@ -1,7 +1,7 @@
 //! A vertical that is known in both clouds: what it leaves of a pose.
 
-use super::placement::Placement;
 use super::seeds::WITHIN;
+use crate::geometry::Similarity;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// How far the vertical of the true pose leans from the one given, radians: 4 degrees, one standard deviation. 10 are admitted.
@@ -30,23 +30,23 @@ impl Vertical {
     }
 
     /// How a pose stands whose turn about each axis has the `variance` (rad^2).
-    pub(crate) fn stand(&self, pose: &Placement, variance: f64) -> Stands {
+    pub(crate) fn stand(&self, pose: &Similarity, variance: f64) -> Stands {
         let within = gate(variance).min(std::f64::consts::FRAC_PI_2);
         let inverted = f64::from(u8::from(std::f64::consts::PI - self.lean(pose) < within));
         Stands { all: 1.0, inverted, by_chance: cap(within) }
     }
 
-    pub(crate) fn admits(&self, pose: &Placement) -> bool {
+    pub(crate) fn admits(&self, pose: &Similarity) -> bool {
         self.lean(pose) < gate(0.0)
     }
 
-    fn lean(&self, pose: &Placement) -> f64 {
+    fn lean(&self, pose: &Similarity) -> f64 {
         (pose.rotation * self.query).dot(&self.map).clamp(-1.0, 1.0).acos()
     }
 
     /// A pose whose turn about each axis has the `variance` (rad^2), pulled upright about `middle` as far as the
     /// vertical is surer than the pose; `None` where the two contradict each other.
-    pub(crate) fn straightened(&self, pose: &Placement, middle: &Vector3<f64>, variance: f64) -> Option<Placement> {
+    pub(crate) fn straightened(&self, pose: &Similarity, middle: &Vector3<f64>, variance: f64) -> Option<Similarity> {
         let precision = Matrix3::identity() / variance.max(f64::MIN_POSITIVE);
         (self.lean(pose) <= gate(variance)).then(|| self.upheld(pose, middle, &precision))
     }
@@ -54,7 +54,7 @@ impl Vertical {
     /// The pose that pairs, which fix its turn with the `precision` (rad^-2), and the vertical say together.
     ///
     /// A cordon fixes its own roll badly and all else well: it is the roll that is pulled upright.
-    pub(crate) fn upheld(&self, pose: &Placement, middle: &Vector3<f64>, precision: &Matrix3<f64>) -> Placement {
+    pub(crate) fn upheld(&self, pose: &Similarity, middle: &Vector3<f64>, precision: &Matrix3<f64>) -> Similarity {
         let Some(axis) = Unit::try_new((pose.rotation * self.query).cross(&self.map), f64::EPSILON) else {
             return *pose;
         };
@@ -118,13 +118,13 @@ mod tests {
     fn a_sure_pose_stays_and_an_unsure_one_is_pulled_upright() {
         let up = Vertical::new([Vector3::z(), Vector3::z() * 2.0]);
         let middle = Vector3::new(0.4, -0.2, 1.0);
-        let leaning = Placement::identity().turned(&middle, &Rotation3::new(Vector3::x() * 0.15));
+        let leaning = Similarity::identity().turned(&middle, &Rotation3::new(Vector3::x() * 0.15));
         let kept = up.straightened(&leaning, &middle, 1e-6).expect("within reach");
         assert!((up.lean(&kept) - 0.15).abs() < 1e-3);
         let pulled = up.straightened(&leaning, &middle, 0.1).expect("within reach");
         assert!(up.lean(&pulled) < 0.02);
-        assert!((pulled.apply(&middle) - leaning.apply(&middle)).norm() < 1e-12);
-        let fallen = Placement::identity().turned(&middle, &Rotation3::new(Vector3::x() * 1.0));
+        assert!((pulled.image(&middle) - leaning.image(&middle)).norm() < 1e-12);
+        let fallen = Similarity::identity().turned(&middle, &Rotation3::new(Vector3::x() * 1.0));
         assert!(up.straightened(&fallen, &middle, 0.01).is_none());
         assert!(up.admits(&leaning) && !up.admits(&fallen));
     }
@@ -132,10 +132,10 @@ mod tests {
     #[test]
     fn pairs_along_a_line_keep_its_direction_and_give_up_its_roll() {
         let up = Vertical::new([Vector3::z(); 2]);
-        let leaning = Placement::identity().turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.1, 0.1, 0.1)));
-        let precision = leaning.seen_from_map(&Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
+        let leaning = Similarity::identity().turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.1, 0.1, 0.1)));
+        let precision = leaning.image_of_covariance(&Matrix3::from_diagonal(&Vector3::new(1.0, 1e8, 1e8)));
         let held = up.upheld(&leaning, &Vector3::zeros(), &precision);
-        let along = |pose: &Placement| pose.rotation * Vector3::x();
+        let along = |pose: &Similarity| pose.rotation * Vector3::x();
         assert!((along(&held) - along(&leaning)).norm() < 0.01);
         assert!(up.lean(&held) < 0.12 && (up.lean(&leaning) - 0.141).abs() < 0.01);
         assert!((held.rotation * Vector3::y()).z.abs() < 0.02 && (leaning.rotation * Vector3::y()).z > 0.09);
@@ -145,7 +145,7 @@ mod tests {
     fn a_pose_that_does_not_lean_is_kept_exactly() {
         let up = Vertical::new([Vector3::z(); 2]);
         let middle = Vector3::new(0.4, -0.2, 1.0);
-        let pose = Placement::identity().turned(&middle, &Rotation3::new(Vector3::z() * 0.7));
+        let pose = Similarity::identity().turned(&middle, &Rotation3::new(Vector3::z() * 0.7));
         assert_eq!(up.straightened(&pose, &middle, 0.1), Some(pose));
     }
 
@@ -153,7 +153,7 @@ mod tests {
     fn counted(turn_of: impl Fn(&mut Dice) -> Rotation3<f64>) -> Stands {
         let (up, mut dice) = (Vertical::new([Vector3::z(); 2]), Dice(5));
         let stand = |_| {
-            let pose = Placement { rotation: turn_of(&mut dice).into_inner(), ..Placement::identity() };
+            let pose = Similarity { rotation: turn_of(&mut dice), ..Similarity::identity() };
             up.stand(&pose, 0.01)
         };
         (0..2000).map(stand).fold(Stands::default(), std::ops::Add::add)

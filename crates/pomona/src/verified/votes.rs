@@ -4,9 +4,10 @@
 //! counted in cells. Crowns on crowns raise whole regions of them; fruits on fruits raise one.
 
 use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
+use super::hypothesis::Model;
 use super::landscape::Landscape;
-use super::placement::Placement;
-use super::seeds::shuffled;
+use crate::geometry::Similarity;
+use crate::random::shuffled;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
@@ -14,11 +15,9 @@ use rayon::prelude::*;
 /// which.
 const LEAST_RATIO: f64 = 1.2;
 
-/// Pairs of fruits that are counted for each turn; of larger clouds some fruits are taken.
-const MOST_PAIRS: usize = 60_000;
-
-/// Clouds with more pairs than this are left alone: with so few of their fruits too little in common would be asked.
-const TOO_MANY_PAIRS: usize = 16 * MOST_PAIRS;
+/// Pairs of fruits that are counted for each turn, of larger clouds those of some fruits; and pairs of clouds that
+/// are left alone: with so few of their fruits too little in common would be asked.
+const MOST_PAIRS: [usize; 2] = [60_000, 960_000];
 
 /// Visits to one row show fruits that hang at most so many times as far apart in one as in the other: one fruit in 27. Cells
 /// count by the cube of it, so that a query in millimetres would ask for more of them than there is memory.
@@ -27,8 +26,7 @@ const ALIKE: f64 = 3.0;
 /// Radians between turns that are tried, 3 degrees, and steps either way about the axis across the row and about the one along
 /// it: the parts of the crowns that each visit sees tilt its axes by 15 degrees across and 4 along.
 const STEP_RAD: f64 = 0.05;
-const ACROSS: i32 = 5;
-const ALONG: i32 = 1;
+const STEPS: [i32; 2] = [5, 1];
 
 /// Edges of a cell along the row, up and in depth, in spacings: the noise, and what half a step of the turns moves.
 const CELL: [f64; 3] = [0.45, 0.45, 0.6];
@@ -77,13 +75,13 @@ struct Counts {
 impl Rows {
     /// `None` where the clouds are no rows, not alike, or too large.
     pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
-        let pairs = query.len() * map.len();
+        let (pairs, [counted, too_many]) = (query.len() * map.len(), MOST_PAIRS);
         let alike = query.spacing.max(map.spacing) <= ALIKE * query.spacing.min(map.spacing);
-        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > TOO_MANY_PAIRS {
+        if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > too_many {
             return None;
         }
         let axes = [row_axes(query)?, row_axes(map)?];
-        let share = (MOST_PAIRS as f64 / pairs as f64).sqrt().min(1.0);
+        let share = (counted as f64 / pairs as f64).sqrt().min(1.0);
         let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
         let edges = Vector3::from(CELL) * map.spacing;
         let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
@@ -95,9 +93,9 @@ impl Rows {
     }
 
     /// Poses whose cells stand out, with the standard deviations by which, turn by turn, of those that are admitted.
-    pub(super) fn peaks(&self, admits: &(impl Fn(&Placement) -> bool + Sync)) -> Vec<(f64, Placement)> {
+    pub(super) fn peaks(&self, model: &Model) -> Vec<(f64, Similarity)> {
         let turns: Vec<Matrix3<f64>> =
-            turns().filter(|turn| admits(&self.placement(turn, &Vector3::zeros()))).collect();
+            turns().filter(|turn| model.admits(&self.placement(turn, &Vector3::zeros()))).collect();
         turns
             .par_iter()
             .map_init(|| self.no_counts(), |counts, turn| self.peaks_of(turn, counts))
@@ -105,9 +103,9 @@ impl Rows {
             .collect()
     }
 
-    fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Placement {
+    fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Similarity {
         let [query, map] = &self.axes;
-        Placement { rotation: map * turn * query.transpose(), translation: map * offset, scale: 1.0 }
+        Similarity::rigid(Rotation3::from_matrix_unchecked(map * turn * query.transpose()), map * offset)
     }
 
     fn no_counts(&self) -> Counts {
@@ -115,7 +113,7 @@ impl Rows {
         Counts { cells: vec![0; all], voted: vec![0; self.map[0].len()] }
     }
 
-    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Placement)> {
+    fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Similarity)> {
         self.count(turn, counts);
         let expected = self.expected(&counts.cells);
         let asked: Vec<f64> =
@@ -200,10 +198,11 @@ fn cell(parts: i32) -> u32 {
 
 /// Turns of a row laid along a row, in the frames of their axes.
 fn turns() -> impl Iterator<Item = Matrix3<f64>> {
+    let [most_across, most_along] = STEPS;
     let steps = |count: i32| (-count..=count).map(|i| f64::from(i) * STEP_RAD);
     let of = move |signs: [f64; 3]| {
-        steps(ACROSS).flat_map(move |across| {
-            steps(ALONG).map(move |along| {
+        steps(most_across).flat_map(move |across| {
+            steps(most_along).map(move |along| {
                 let turn = Rotation3::new(Vector3::x() * along) * Rotation3::new(Vector3::z() * across);
                 turn.into_inner() * Matrix3::from_diagonal(&Vector3::from(signs))
             })

@@ -1,14 +1,15 @@
 //! A closer look at a contender: its pose refined on the places in the index, and what the fruits around its seed say then.
 //!
-//! It does what [`crate::verified::hypothesis::refine`] does, without the map's side of the evidence and without what only a
-//! prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
+//! It does what [`crate::verified::hypothesis::refined`] does, without the map's side of the evidence and without
+//! what only a prepared part of the map knows: to prepare one takes longer than hundreds of closer looks.
 
+use crate::geometry::Similarity;
+use crate::moments::{FIXING, Moments};
+use crate::statistics::Evidence;
 use crate::verified::contender::{Contender, by_evidence};
 use crate::verified::footing::Footing;
-use crate::verified::hypothesis::{Evidence, GATE, Model};
+use crate::verified::hypothesis::{GATE, Model};
 use crate::verified::landscape::Landscape;
-use crate::verified::nearest::single;
-use crate::verified::placement::{FIXING, Moments, Placement};
 use crate::verified::proposal::Terrain;
 use crate::verified::search::REACH;
 use nalgebra::Vector3;
@@ -36,7 +37,7 @@ pub(super) fn closer<M: Terrain + Sync>(
     model: &Model,
     contenders: &[Contender],
 ) -> Vec<Contender> {
-    let from = |one: &Contender, starts: &mut dyn Iterator<Item = Placement>| {
+    let from = |one: &Contender, starts: &mut dyn Iterator<Item = Similarity>| {
         let region = Region::around(query, one.place);
         let refined = starts.filter_map(|start| region.refined(map, model, start));
         let best = refined.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -64,14 +65,13 @@ struct Region {
 
 impl Region {
     fn around(query: &Landscape, place: Vector3<f64>) -> Self {
-        let (reach, mut rows) = (REACH * query.spacing, Vec::new());
-        query.tree.within(&single(&place), reach as f32, |row, _| rows.push(row));
-        rows.sort_unstable();
+        let reach = REACH * query.spacing;
+        let rows = query.within(&place, reach);
         Self { place, fruits: rows.iter().map(|&row| query.points[row as usize]).collect(), reach }
     }
 
     /// A pose improved on the fruits, and their evidence.
-    fn refined(&self, map: &impl Terrain, model: &Model, start: Placement) -> Option<(Placement, f64)> {
+    fn refined(&self, map: &impl Terrain, model: &Model, start: Similarity) -> Option<(Similarity, f64)> {
         let mut pose = start;
         let mut footing = Footing::of_seed(&self.place, self.reach);
         for _ in 0..STEPS {
@@ -86,11 +86,11 @@ impl Region {
     }
 
     /// Sums over the pairs of a pose, and the evidence of all fruits.
-    fn paired(&self, map: &impl Terrain, model: &Model, pose: &Placement, footing: &Footing) -> (Moments, f64) {
+    fn paired(&self, map: &impl Terrain, model: &Model, pose: &Similarity, footing: &Footing) -> (Moments, f64) {
         let (mut moments, mut evidence) = (Moments::default(), Evidence::default());
         for p in &self.fruits {
             let variance = model.sigma * model.sigma * (1.0 + footing.looseness(p));
-            let Some((row, d2)) = map.nearest(&pose.apply(p), GATE * variance.sqrt()) else {
+            let Some((row, d2)) = map.nearest(&pose.image(p), GATE * variance.sqrt()) else {
                 evidence.multiply(model.missed(1.0));
                 continue;
             };

@@ -10,7 +10,7 @@ use super::seed_blocks::LANES;
 use super::{CompactMap, Facts, MOST};
 use crate::cloud::FruitCloud;
 use crate::error::{Error, Result};
-use crate::verified::codes::{Axis, Cells};
+use crate::neighbours::code_grid::{Axis, Cells};
 use crate::verified::seeds::COMPANIONS;
 use nalgebra::Vector3;
 use rayon::prelude::*;

@@ -58,12 +58,12 @@ impl<'a, M: Terrain> Glance<'a, M> {
             let Some(place) = near.place(number) else { return Some(f64::INFINITY) };
             *fruit = place;
         }
-        let fitted = self.proposer.fit_on(fruits).filter(|(_, residual)| *residual <= self.most);
+        let fitted = self.proposer.fit(fruits).filter(|(_, residual)| *residual <= self.most);
         let pose = fitted.and_then(|(pose, _)| self.proposer.upright(pose))?;
         let anchor = which.iter().position(|&number| number == 0).unwrap_or_default();
         let mut around = 1.0;
         for beside in &self.beside[anchor] {
-            let place = pose.apply(&beside.place);
+            let place = pose.image(&beside.place);
             if place.norm() + beside.gate <= near.radius {
                 around *= self.ratio(beside, near.nearest(&place), near.density);
             }
@@ -72,7 +72,7 @@ impl<'a, M: Terrain> Glance<'a, M> {
             }
         }
         let apart = |(one, fruit): (&Beside, &Vector3<f64>)| {
-            self.ratio(one, (pose.apply(&one.place) - fruit).norm_squared(), near.density)
+            self.ratio(one, (pose.image(&one.place) - fruit).norm_squared(), near.density)
         };
         Some(around * self.seed.iter().zip(&fruits).map(apart).product::<f64>())
     }

@@ -12,10 +12,9 @@ use crate::matching::Request;
 use crate::verified::acceptance::VerifiedConfig;
 use crate::verified::case::{Search, VerifiedMap, model_of};
 use crate::verified::contender::{Contender, by_evidence, distinct};
-use crate::verified::decision::{self, MIN_FRUITS};
+use crate::verified::decision::{self, MIN_FRUITS, RIVAL_SEED};
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
-use crate::verified::placement::Placement;
 use crate::verified::proposal::Effort;
 use crate::verified::search::REACH;
 use nalgebra::Vector3;
@@ -43,9 +42,6 @@ const WHOLE: usize = 12;
 
 /// Nats by which the best contender has to stand out of those of other poses to be verified before the last round.
 const STANDS_OUT: f64 = 6.0;
-
-/// Share of its evidence from which on others are verified with it there: as in [`decision`], less grow to no rival.
-const RIVAL: f64 = 0.3;
 
 /// Poses are one where they put the seed of one of them within so many spacings of one place, turned by less than that.
 const SAME_PLACE: f64 = 1.0;
@@ -157,7 +153,7 @@ impl Case<'_> {
         let spot = REACH * self.landscape.spacing;
         let mut kept: Vec<Contender> = Vec::new();
         for one in contenders {
-            let apart = |other: &Contender| (one.pose.apply(&one.place) - other.pose.apply(&one.place)).norm();
+            let apart = |other: &Contender| (one.pose.image(&one.place) - other.pose.image(&one.place)).norm();
             let same = |other: &Contender| {
                 apart(other) < SAME_PLACE * self.index.facts.spacing && one.pose.turn_to(&other.pose) < SAME_TURN_RAD
             };
@@ -183,7 +179,7 @@ impl Case<'_> {
     fn rows_around(&self, contenders: &[Contender]) -> Vec<u32> {
         let places = |one: &Contender| {
             let pose = one.pose;
-            self.landscape.points.iter().map(move |p| pose.apply(p))
+            self.landscape.points.iter().map(move |p| pose.image(p))
         };
         let mut rows: Vec<u32> = contenders.iter().flat_map(|one| self.ground.around(places(one), MARGIN)).collect();
         rows.sort_unstable();
@@ -196,7 +192,7 @@ impl Case<'_> {
 fn outstanding(contenders: &[Contender]) -> Option<&[Contender]> {
     let best = contenders.first()?.log_odds;
     let second = contenders.get(1).map_or(0.0, |one| one.log_odds.max(0.0));
-    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL * best).count();
+    let rivals = contenders.iter().take_while(|one| one.log_odds >= RIVAL_SEED * best).count();
     (best > STANDS_OUT + second).then(|| &contenders[..rivals])
 }
 
@@ -215,7 +211,7 @@ fn in_map(mut found: Match, rows: &[u32]) -> Match {
 impl Contender {
     /// The same where the map's origin is elsewhere.
     fn moved(&self, by: Vector3<f64>) -> Self {
-        let pose = Placement { translation: self.pose.translation + by, ..self.pose };
+        let pose = Similarity { translation: self.pose.translation + by, ..self.pose };
         Self { pose, ..*self }
     }
 }

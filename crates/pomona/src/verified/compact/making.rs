@@ -13,13 +13,14 @@ use super::surroundings::{Surroundings, packed, step_of};
 use super::{CompactMap, Facts, fingerprint};
 use crate::cloud::FruitCloud;
 use crate::conditioning::Conditioned;
-use crate::neighbours::tree::Tree;
+use crate::neighbours::code_grid::{Cells, Code};
+use crate::neighbours::others::{Neighbours, each_row};
+use crate::neighbours::tree::{Tree, single};
+use crate::random::shuffled;
 use crate::verified::chance::local_density;
-use crate::verified::codes::{Cells, Code};
 use crate::verified::landscape::{floor_of, spacing_of};
-use crate::verified::nearest::{Neighbours, SHARE_OF_ROWS, single};
 use crate::verified::seeds::{COMPANIONS, canonical, sets_of};
-use crate::verified::{SEED_SIGMA, SHORTEST, shuffled};
+use crate::verified::{SEED_SIGMA, SHORTEST};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -191,7 +192,7 @@ fn surroundings(points: &[Vector3<f64>], neighbours: &Neighbours, density: &[f64
         let offsets = neighbours.of(row).iter().map(|&other| points[other as usize] - points[row]);
         packed(offsets, density[row], step)
     };
-    (0..points.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).map(of).collect()
+    each_row(points.len(), of)
 }
 
 /// The largest count of a cell such that all cells with no more have at most `most` together.

@@ -33,7 +33,7 @@ pub use columns::Bytes;
 pub(crate) use format::fingerprint;
 pub(crate) use judging::{pairs_under, search};
 
-use super::codes::Cells;
+use crate::neighbours::code_grid::Cells;
 use columns::Column;
 use nalgebra::Vector3;
 use seed_blocks::Block;

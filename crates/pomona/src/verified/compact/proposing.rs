@@ -5,12 +5,13 @@ use super::ground::Ground;
 use super::seed_blocks::Anchored;
 use super::shapes::{Scratch, Shape, Shapes, in_steps, rounded};
 use super::surroundings::Neighbourhood;
-use crate::verified::codes::Code;
+use crate::neighbours::code_grid::Code;
+use crate::random::shuffled;
 use crate::verified::contender::Contender;
 use crate::verified::hypothesis::Model;
 use crate::verified::landscape::Landscape;
-use crate::verified::proposal::{Effort, Proposer};
-use crate::verified::seeds::{Quad, SHORTEST, Seed, WITHIN, enumerate, near_ties, shuffled};
+use crate::verified::proposal::{Effort, Proposer, Terrain};
+use crate::verified::seeds::{Quad, SHORTEST, Seed, WITHIN, enumerate, near_ties};
 use rayon::prelude::*;
 
 /// Reach of the code search in standard deviations of one axis: a third less than where the map is small. It holds half of
@@ -142,7 +143,7 @@ pub(super) fn proposals(
         let proposer = Proposer::new(query, ground, model, quad);
         let proposed = |one: &Glanced| {
             let (proposer, target) = (proposer.as_ref()?, shapes.quad(one.seed)?);
-            let pose = proposer.upright(proposer.fit(&target)?.0)?;
+            let pose = proposer.upright(proposer.fit(target.map(|row| ground.place(row)))?.0)?;
             let log_odds = proposer.first_look(&pose);
             (log_odds > 0.0).then_some(Contender { pose, log_odds, place: proposer.centroid, key: (quad, target) })
         };

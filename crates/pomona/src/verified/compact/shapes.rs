@@ -3,7 +3,7 @@
 use super::seed_blocks::{Anchored, Block, LANES, anchored, squared_distances};
 use super::surroundings::{Surroundings, step_of};
 use super::{CompactMap, Facts};
-use crate::verified::codes::{Code, Run};
+use crate::neighbours::code_grid::{Code, Run};
 use crate::verified::seeds::{Quad, STARS};
 use std::ops::Range;
 

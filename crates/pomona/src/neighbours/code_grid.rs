@@ -9,9 +9,7 @@ use std::ops::Range;
 /// Numbers of a code.
 const NUMBERS: usize = 6;
 
-/// Length of AB, then C (along, across) and D (along, across, above) in the frame of the seed, metres.
-///
-/// The closed form of the STaR-i code without the division by |AB| and the fixed turn by (1,1,1).
+/// A code; what its numbers are is the caller's.
 pub(crate) type Code = [f32; NUMBERS];
 
 /// Codes in the order of a grid's cells.
@@ -25,10 +23,10 @@ pub(crate) struct CodeGrid {
 
 /// The space of codes, cut into cubes.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cells {
+pub(crate) struct Cells {
     /// Axes by their number of cells; along the last, cells are next to each other.
-    pub(super) axes: [Axis; NUMBERS],
-    pub(super) edge: f32,
+    pub(crate) axes: [Axis; NUMBERS],
+    pub(crate) edge: f32,
 }
 
 /// Codes that are measured at once, number by number; the last block is filled up with codes that are near nothing.
@@ -39,11 +37,11 @@ const LANES: usize = 8;
 
 /// One number of the code, cut into cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     /// Which number of the code.
-    pub(super) number: usize,
-    pub(super) low: f32,
-    pub(super) cells: u32,
+    pub(crate) number: usize,
+    pub(crate) low: f32,
+    pub(crate) cells: u32,
 }
 
 impl Axis {
@@ -68,7 +66,7 @@ const ROUNDING: f32 = 1e-3;
 
 impl Cells {
     /// Cuts the space of `count` codes into `most` cubes at the most.
-    pub(super) fn cut(count: usize, most: f64, code: &impl Fn(usize) -> Code) -> Self {
+    pub(crate) fn cut(count: usize, most: f64, code: &impl Fn(usize) -> Code) -> Self {
         let sample: Vec<Code> = (0..count).step_by(count.div_ceil(SAMPLE).max(1)).map(code).collect();
         let extents: [(f32, f32); NUMBERS] = std::array::from_fn(|number| {
             let mut values: Vec<f32> = sample.iter().map(|code| code[number]).collect();
@@ -100,13 +98,13 @@ impl Cells {
 
     /// The cell of a code.
     #[inline]
-    pub(super) fn of(&self, code: &Code) -> u32 {
+    pub(crate) fn of(&self, code: &Code) -> u32 {
         let inverse_edge = 1.0 / self.edge;
         self.axes.iter().fold(0, |cell, axis| cell * axis.cells + axis.cell(code[axis.number], inverse_edge))
     }
 
     /// Whether the numbers, out of a file, are those of cells.
-    pub(super) fn is_sound(&self) -> bool {
+    pub(crate) fn is_sound(&self) -> bool {
         let mut numbers = self.axes.map(|axis| axis.number);
         numbers.sort_unstable();
         let cells = self.axes.iter().try_fold(1u32, |all, axis| all.checked_mul(axis.cells));
@@ -118,12 +116,12 @@ impl Cells {
     }
 
     /// How many there are.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.axes.iter().map(|axis| axis.cells as usize).product()
     }
 
     /// Calls `visit` for rows of cells next to each other that hold all codes within `radius` of `code`.
-    pub(super) fn near(&self, code: &Code, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Range<usize>)) {
+    pub(crate) fn near(&self, code: &Code, radius: f32, runs: &mut Vec<Run>, mut visit: impl FnMut(Range<usize>)) {
         let limit = radius * radius;
         let inverse_edge = 1.0 / self.edge;
         runs.clear();
@@ -232,7 +230,7 @@ pub(crate) struct Run {
 /// Codes of which the extent of a grid is taken.
 const SAMPLE: usize = 1024;
 
-/// Share of the sample beyond either end of an axis: a few large seeds shall not make the cells of all others coarse.
+/// Share of the sample beyond either end of an axis: a few large codes shall not make the cells of all others coarse.
 const BEYOND: f64 = 0.02;
 
 /// Written number by number: a sum over the numbers in the order of memory is compiled lane by lane.

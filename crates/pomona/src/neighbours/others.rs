@@ -1,7 +1,6 @@
-//! The nearest other fruits of every fruit.
+//! The nearest other fruits of every fruit, looked up once.
 
-use crate::neighbours::tree::Tree;
-use nalgebra::Vector3;
+use super::tree::Tree;
 use rayon::prelude::*;
 
 /// Neighbours kept per fruit: enough for the seeds (the nearest ten) and for the first look at a hypothesis.
@@ -9,13 +8,13 @@ pub(crate) const NEIGHBOURS: usize = 24;
 
 /// The nearest other fruits of every fruit, the same number for each.
 #[derive(Debug, Clone)]
-pub(super) struct Neighbours {
-    pub(super) each: usize,
+pub(crate) struct Neighbours {
+    pub(crate) each: usize,
     rows: Vec<u32>,
 }
 
 impl Neighbours {
-    pub(super) fn new(points: &[[f32; 3]], tree: &Tree) -> Self {
+    pub(crate) fn new(points: &[[f32; 3]], tree: &Tree) -> Self {
         let each = NEIGHBOURS.min(points.len().saturating_sub(1));
         let mut rows = vec![0; points.len() * each];
         if each > 0 {
@@ -32,15 +31,15 @@ impl Neighbours {
     }
 
     #[inline]
-    pub(super) fn of(&self, row: usize) -> &[u32] {
+    pub(crate) fn of(&self, row: usize) -> &[u32] {
         &self.rows[row * self.each..(row + 1) * self.each]
     }
 }
 
+/// What `of` makes of each row, in order.
+pub(crate) fn each_row<T: Send>(count: usize, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..count).into_par_iter().with_min_len(SHARE_OF_ROWS).map(of).collect()
+}
+
 /// Rows at the least that are worth a thread of their own.
 pub(crate) const SHARE_OF_ROWS: usize = 256;
-
-#[inline]
-pub(crate) fn single(p: &Vector3<f64>) -> [f32; 3] {
-    [p.x as f32, p.y as f32, p.z as f32]
-}

@@ -1,24 +1,25 @@
 //! Who belongs to whom where several claim one: all one-to-one sets of pairs at once, by belief propagation (Williams and
 //! Lau 2014).
 
+use crate::assignment::assign;
+
 /// A fruit of the query and one of the map that may be the same.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Edge {
-    pub(super) query: u32,
-    pub(super) map: u32,
+    pub(crate) query: u32,
+    pub(crate) map: u32,
     /// Likelihood ratio of "the same fruit" against both being alone.
-    pub(super) ratio: f64,
-    pub(super) distance: f64,
+    pub(crate) ratio: f64,
 }
 
 /// What all one-to-one sets of pairs say, each weighing the product of its edges' ratios.
 #[derive(Debug, Clone)]
 pub(crate) struct Beliefs {
-    pub(super) edges: Vec<Edge>,
+    pub(crate) edges: Vec<Edge>,
     /// Of each edge: the share of the sets that hold it.
-    pub(super) probabilities: Vec<f64>,
+    pub(crate) probabilities: Vec<f64>,
     /// Logarithm of the sum over all sets, by Bethe's approximation (Vontobel 2013): exact where no edges form a loop.
-    pub(super) log_sum: f64,
+    pub(crate) log_sum: f64,
 }
 
 /// Rounds at the most, and the change of a message below which the rounds end.
@@ -26,7 +27,7 @@ const ROUNDS: usize = 40;
 const SETTLED: f64 = 1e-5;
 
 impl Beliefs {
-    pub(super) fn new(edges: Vec<Edge>, n_query: usize, n_map: usize) -> Self {
+    pub(crate) fn new(edges: Vec<Edge>, n_query: usize, n_map: usize) -> Self {
         let mut to_query = vec![1.0; edges.len()];
         let mut to_map = vec![0.0; edges.len()];
         let mut of_map = vec![1.0; n_map];
@@ -60,8 +61,20 @@ impl Beliefs {
         }
     }
 
+    /// The one-to-one edges that gain most expected right answers, by rows of the query, with their probabilities: a
+    /// wrong one costs as much as one of `least` is worth.
+    pub(crate) fn chosen(&self, n_query: usize, n_map: usize, least: f64) -> Vec<(Edge, f64)> {
+        let gain = |(edge, p): (&Edge, f64)| (edge.query as usize, edge.map as usize, p - least);
+        let partners = assign(n_query, n_map, &self.links().map(gain).collect::<Vec<_>>());
+        let is_chosen = |(edge, _): &(&Edge, f64)| partners[edge.query as usize] == Some(edge.map as usize);
+        let mut chosen: Vec<_> = self.links().filter(is_chosen).map(|(edge, p)| (*edge, p)).collect();
+        chosen.sort_unstable_by_key(|(edge, _)| (edge.query, edge.map));
+        chosen.dedup_by_key(|(edge, _)| (edge.query, edge.map));
+        chosen
+    }
+
     /// The edges with their probabilities.
-    pub(super) fn links(&self) -> impl Iterator<Item = (&Edge, f64)> {
+    pub(crate) fn links(&self) -> impl Iterator<Item = (&Edge, f64)> {
         self.edges.iter().zip(self.probabilities.iter().copied())
     }
 }
@@ -110,7 +123,7 @@ mod tests {
 
     #[test]
     fn beliefs_are_exact_on_a_tree_and_close_on_a_loop() {
-        let edge = |query, map, ratio| Edge { query, map, ratio, distance: 0.0 };
+        let edge = |query, map, ratio| Edge { query, map, ratio };
         assert_close(&[edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)], 1e-5);
         assert_close(&[edge(0, 0, 5.0), edge(0, 1, 2.0), edge(1, 0, 1.0), edge(1, 1, 3.0)], 0.05);
     }

@@ -1,4 +1,4 @@
-//! Ranks and tails.
+//! Ranks and tails, densities and products of likelihood ratios.
 
 /// Quantile of sorted numbers, linear between ranks.
 pub(crate) fn quantile_of_sorted(sorted: &[f64], part: f64) -> f64 {
@@ -17,6 +17,64 @@ pub(crate) fn median(numbers: &mut [f64]) -> f64 {
     let is_even = numbers.len().is_multiple_of(2);
     let (below, &mut upper, _) = numbers.select_nth_unstable_by(middle, f64::total_cmp);
     if is_even { f64::midpoint(below.iter().copied().fold(f64::NEG_INFINITY, f64::max), upper) } else { upper }
+}
+
+/// The larger of the two middle numbers where there are two; reorders the numbers. 0 of none.
+pub(crate) fn upper_median(numbers: &mut [f64]) -> f64 {
+    if numbers.is_empty() {
+        return 0.0;
+    }
+    let middle = numbers.len() / 2;
+    *numbers.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Density of an isotropic normal distribution in space at squared distance `d2`, per cubic metre.
+#[inline]
+pub(crate) fn gaussian(d2: f64, variance: f64) -> f64 {
+    const NORM: f64 = 0.063_493_635_934_240_97; // (2 pi)^(-3/2)
+    NORM / (variance * variance.sqrt()) * (-0.5 * d2 / variance).exp()
+}
+
+/// A product of likelihood ratios. Its logarithm is taken when it leaves the numbers' range and in the end, not of
+/// every factor.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Evidence {
+    product: f64,
+    nats: f64,
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self { product: 1.0, nats: 0.0 }
+    }
+}
+
+impl Evidence {
+    #[inline]
+    pub(crate) fn multiply(&mut self, ratio: f64) {
+        self.product *= ratio;
+        if !(1e-200..1e200).contains(&self.product) {
+            *self = Self { product: 1.0, nats: self.log_odds() };
+        }
+    }
+
+    #[inline]
+    pub(crate) fn log_odds(&self) -> f64 {
+        self.nats + self.product.ln()
+    }
+}
+
+/// Distribution of the length of a vector of three standard normal numbers (Maxwell's).
+pub(crate) fn maxwell(x: f64) -> f64 {
+    erf(x / std::f64::consts::SQRT_2) - (2.0 / std::f64::consts::PI).sqrt() * x * (-0.5 * x * x).exp()
+}
+
+/// Error function of x >= 0 to 1.5e-7 (Abramowitz and Stegun 7.1.26).
+fn erf(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.327_591_1 * x);
+    let polynomial =
+        ((((1.061_405_429 * t - 1.453_152_027) * t + 1.421_413_741) * t - 0.284_496_736) * t + 0.254_829_592) * t;
+    1.0 - polynomial * (-x * x).exp()
 }
 
 /// Logarithm of the normal distribution function, to 13 digits in both tails.
@@ -72,6 +130,21 @@ mod tests {
             let found = log_normal_cdf(x);
             assert!((found / expected - 1.0).abs() < 1e-12, "log Phi({x}) = {found}, expected {expected}");
         }
+    }
+
+    #[test]
+    fn the_distribution_of_lengths_is_that_of_maxwell() {
+        assert!(maxwell(0.0).abs() < 1e-6);
+        assert!((maxwell(1.538_17) - 0.5).abs() < 1e-4); // its median
+        assert!((maxwell(6.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_product_beyond_the_range_of_numbers_keeps_its_logarithm() {
+        let mut product = Evidence::default();
+        (0..1000).for_each(|_| product.multiply(1e-3));
+        (0..1000).for_each(|_| product.multiply(2e3));
+        assert!((product.log_odds() - 1000.0 * 2f64.ln()).abs() < 1e-8);
     }
 
     #[test]
