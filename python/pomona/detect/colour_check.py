@@ -18,7 +18,7 @@ LOOKED_AT = 5
 
 GREY_STEPS = 12
 """Steps of 255 by which the channels of a grey picture may differ: H.264 leaves up to 6. The dullest of 437 photographs
-and rendered pictures of fruit trees in colour has pixels that differ by 92."""
+and rendered pictures of fruit trees in colour has pixels that differ by 90."""
 
 
 def check_colour(recording: Recording) -> None:
