@@ -1,5 +1,8 @@
 """Labels of pictures as a table, and the crops and targets that training makes of them; no torch is needed."""
 
+import csv
+import io
+
 import cv2
 import numpy as np
 import pytest
@@ -36,6 +39,12 @@ def test_what_is_written_is_read(tmp_path):
     assert {name: [box.corners_px for box in rows] for name, rows in boxes.items()} == {
         "a, b.png": [(1.25, 2.0, 30.0, 40.0)]
     }
+
+
+def test_a_name_with_a_carriage_return_is_one_cell():
+    found = Detections(np.array([[1.25, 2, 30, 40]]), np.array([0.5]))
+    lines = csv.reader(io.StringIO(table_of([("a\rb.png", found)]), newline=""))
+    assert [line[0] for line in lines] == ["image", "a\rb.png"]
 
 
 @pytest.mark.parametrize(

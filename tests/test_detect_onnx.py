@@ -286,6 +286,27 @@ def test_inputs_that_are_no_picture_are_told(tmp_path):
         OnnxDetector.open(path)
 
 
+@pytest.mark.parametrize(
+    ("picture", "found"),
+    [
+        (np.zeros((9, 9, 3), np.float32), "(9, 9, 3) float32"),
+        (np.zeros((9, 9, 3), np.uint16), "(9, 9, 3) uint16"),
+        (np.zeros((9, 9, 3), bool), "(9, 9, 3) bool"),
+        (np.zeros((9, 9, 4), np.uint8), "(9, 9, 4) uint8"),
+        (np.zeros((3, 9, 9), np.uint8), "(3, 9, 9) uint8"),
+        (np.zeros((9, 9), np.uint8), "(9, 9) uint8"),
+        (np.zeros((0, 9, 3), np.uint8), "(0, 9, 3) uint8"),
+        (None, "NoneType"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_arrays_that_are_no_pictures_are_told(tmp_path, picture, found):
+    detector = OnnxDetector.open(make("yolov8", tmp_path / "model.onnx"))
+    with pytest.raises(PomonaError) as caught:
+        detector.detect(picture)
+    assert str(caught.value) == f"picture: found {found}, expected a picture, (H, W, 3) uint8 in the order BGR"
+
+
 def test_a_frame_without_a_left_picture_is_told(tmp_path):
     detector = OnnxDetector.open(make("yolov8", tmp_path / "model.onnx"))
     with pytest.raises(PomonaError, match="frame 7: found no left picture"):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -64,6 +65,17 @@ def test_a_least_score_leaves_the_better_boxes(pomona, tmp_path):
     assert 0 < len(few) < len(many)
     assert set(few) < set(many)
     assert all(float(line.split(",")[-1]) >= 0.8 for line in few)
+
+
+def test_a_name_that_is_not_utf_8_is_one_line(pomona, tmp_path):
+    picture = tmp_path / os.fsdecode(b"caf\xe9.jpg")
+    shutil.copy(PICTURES / NAMES[0], picture)
+    code, out, told = pomona("detect", picture, "-o", tmp_path / "boxes.csv")
+    assert (code, out) == (2, "")
+    assert told.splitlines() == [
+        f"pomona: {tmp_path}/caf\\udce9.jpg: found a name that is not UTF-8, expected one that can be in a table"
+    ]
+    assert not (tmp_path / "boxes.csv").exists()
 
 
 def test_boxes_are_drawn_and_json_counts_them(pomona, tmp_path):

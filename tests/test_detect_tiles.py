@@ -80,6 +80,20 @@ def test_the_whole_box_counts_and_not_the_higher_score():
     assert scores.tolist() == [0.6]
 
 
+def test_thousands_of_boxes_come_out_each_once():
+    """As noise has them: compared one by one, box with box, they took minutes."""
+    x, y = (40.0 * side.ravel() for side in np.meshgrid(np.arange(200), np.arange(50)))
+    whole = np.column_stack([x, y, x + 30, y + 30])
+    tiles = np.array([[0, 0, 4800, 2000], [3200, 0, 8000, 2000]], float)
+    seen = [(whole[:, 0] >= tile[0]) & (whole[:, 2] <= tile[2]) for tile in tiles]
+    boxes_px, parts = (
+        np.concatenate([np.broadcast_to(side[n], whole.shape)[seen[n]] for n in (0, 1)])
+        for side in ((whole, whole), tiles)
+    )
+    merged_px, _ = merge_tiles(boxes_px, np.full(len(boxes_px), 0.5), parts, (8000, 2000), margin_px=2.0)
+    assert sorted(map(tuple, merged_px.tolist())) == sorted(map(tuple, whole.tolist()))
+
+
 def test_two_boxes_of_one_tile_stay_two():
     tile = np.array([[0, 0, 100, 80]] * 2, float)
     pair = np.array([[10.0, 10, 40, 40], [12.0, 10, 42, 40]])

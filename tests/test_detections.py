@@ -111,6 +111,12 @@ def read_text(tmp_path, name, text, numbers=(0, 1)):
     return open_detections(path, CAMERA, numbers)
 
 
+@pytest.mark.parametrize("score", [-0.1, 1.5, np.nan])
+def test_scores_are_probabilities(score):
+    with pytest.raises(PomonaError, match=r"found scores from .* expected 0 to 1"):
+        Detections(np.array([[1.0, 2, 3, 4]] * 2), np.array([0.5, score]))
+
+
 def test_mot_text_counts_frames_from_one_and_pixels_from_the_corner(tmp_path):
     text = "1,3,10,20,20,25,0.9,-1,-1,-1\n2, 3, 11.5, 20, 20, 25, 0.8, -1, -1, -1\n2,4,50,60,20.5,12,-1,-1,-1,-1\n"
     detector = read_text(tmp_path, "tracks.txt", text, numbers=(100, 200))

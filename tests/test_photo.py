@@ -10,6 +10,7 @@ import pytest
 
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
+from pomona.render.filming import Filming, film
 from pomona.render.photo import BLENDER_PYTHON, PathTracer
 from pomona.render.scene_view import Weather
 from pomona.synth.row_geometry import FruitSolids, Leaves, Limbs, RowGeometry
@@ -134,13 +135,17 @@ def test_another_job_in_the_folder_is_refused(tmp_path):
         next(PathTracer(folder=tmp_path).render(geometry(), CAMERA, poses(1), SUN, seed=5))
 
 
-def test_without_blender_it_says_what_to_install(tmp_path):
+def test_without_blender_it_says_what_to_install_and_leaves_nothing(tmp_path, monkeypatch):
     # A Python without packages, so surely without Blender.
     bare = tmp_path / "bare"
     bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S -E "$@"\n')
     bare.chmod(0o755)
-    with pytest.raises(PomonaError, match="bpy, which is not installed: pip install bpy"):
+    with pytest.raises(PomonaError, match=r"bpy, which is not installed: pip install 'pomona\[render\]'"):
         next(PathTracer(interpreter=str(bare)).render(geometry(), CAMERA, poses(1), SUN, seed=5))
+    monkeypatch.setenv(BLENDER_PYTHON, str(bare))
+    with pytest.raises(PomonaError, match=r"not installed: pip install 'pomona\[render\]'"):
+        film(Filming(renderer="photo"), tmp_path / "row")
+    assert not (tmp_path / "row").exists()
 
 
 def test_an_interpreter_that_is_none_is_named(tmp_path):

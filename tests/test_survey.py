@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import threading
 from collections import Counter
@@ -107,7 +108,8 @@ def test_a_scan_that_is_stopped_keeps_what_it_has(row):
     assert survey.cloud.n_views.tolist() == [2, 2, 2]
 
 
-def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, monkeypatch):
+@pytest.fixture
+def interrupted(monkeypatch):
     from pomona.detect.from_file import FileDetector
 
     look = FileDetector.__call__
@@ -118,6 +120,9 @@ def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, monkey
         return look(self, frame)
 
     monkeypatch.setattr(FileDetector, "__call__", interrupting)
+
+
+def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, interrupted):
     before = signal.getsignal(signal.SIGINT)
     code, printed, _ = pomona("scan", row, "-o", tmp_path / "session.gpkg")
     assert code == 130
@@ -127,6 +132,25 @@ def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, monkey
     # Frames are looked at ahead, so the signal may come while the first is still followed.
     assert 1 <= len(session.trajectory) <= 2
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_replaces_nothing(pomona, row, tmp_path, request):
+    keep, session, preview = tmp_path / "keep", tmp_path / "session.gpkg", tmp_path / "seen.mp4"
+    whole = (with_left(row), "--keep", keep, "--preview", preview)
+    assert pomona("scan", *whole, "-o", session)[0] == 0
+    files = [session, preview, keep / "tracks.csv", keep / "poses_tum.txt"]
+    before = [file.read_bytes() for file in files]
+    shutil.rmtree(keep / "looks")
+    request.getfixturevalue("interrupted")
+    code, printed, told = pomona("scan", *whole, "-o", session)
+    assert (code, printed) == (130, "")
+    assert told.splitlines()[-1].endswith(f": {session} is left as it was")
+    shutil.rmtree(keep / "looks")
+    code, printed, told = pomona("scan", *whole, "-o", tmp_path / "new.gpkg")  # which writes it, and nothing else
+    assert code == 130
+    assert "stopped after frame" in printed
+    assert f"{preview} is left as it was" in told
+    assert [file.read_bytes() for file in files] == before
 
 
 def test_every_from_and_to(pomona, row, tmp_path):

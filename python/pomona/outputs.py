@@ -19,7 +19,7 @@ JOURNALS = ("-journal", "-wal", "-shm")
 FORCE = "--force to replace it"
 """What else there is to do, on the command line, about a file that is in the way."""
 
-__all__ = ["Output", "refuse_database", "refuse_inputs", "require_name", "require_outputs"]
+__all__ = ["Output", "holding", "refuse_database", "refuse_inputs", "require_name", "require_outputs"]
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,11 @@ def require_outputs(
     for one, other in combinations((output.path for output in outputs), 2):
         if _are_same(one, other):
             raise PomonaError(f"{one} and {other} are the same file, expected two to write")
+
+
+def holding(outputs: Iterable[Path]) -> list[Path]:
+    """Return those outputs that are files with something in them, which writing would replace."""
+    return [path for path in outputs if path.is_file() and path.stat().st_size > 0]
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

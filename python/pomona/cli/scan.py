@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import INTERRUPTED, Writes
 from pomona.likes import KEPT, SCANNED, VIDEO
 
@@ -84,7 +84,8 @@ def scan(
     """Find every fruit of RECORDING once, in 3D, with diameter and covariance, and write the session.
 
     Poses come with the recording, else from its pictures. Boxes with ids are taken for the fruits that they name,
-    others are tracked. Ctrl-C ends the scan early: the session of the frames so far is written, exit code 130.
+    others are tracked. Ctrl-C ends the scan early: the session of the frames so far is written where there was none,
+    exit code 130.
     """
     from pomona.cli import scan_output
     from pomona.cli.progress import first_interrupt
@@ -129,6 +130,8 @@ def scan(
         first_interrupt() as stop,
     ):
         survey = ready.run(progress, stop)
+    if _is_left(output, survey):
+        raise typer.Exit(INTERRUPTED)
     written = ready.write(output, survey, name=name, date=date)
     _write_extras(keep, preview, opened, survey)
     found = scan_output.summary(opened, survey, written)
@@ -147,13 +150,25 @@ def _classes(text: str | None) -> tuple[str | int, ...] | None:
 def _write_extras(keep: Path | None, preview: Path | None, recording: Recording, survey: Survey) -> None:
     from pomona.cli.progress import counting
     from pomona.survey import write_stages
+    from pomona.survey.files import STAGES
     from pomona.survey.preview import write_preview
 
-    if keep is not None:
+    if keep is not None and not any(_is_left(keep / name, survey) for name in STAGES):
         write_stages(keep, survey)
-    if preview is not None:
+    if preview is not None and not _is_left(preview, survey):
         with counting("drawing", len(recording)) as progress:
             write_preview(preview, recording, survey, progress)
+
+
+def _is_left(output: Path, survey: Survey) -> bool:
+    """Tell, and say, that an interrupted scan replaces nothing here: what is there may be of all frames."""
+    from pomona.outputs import holding
+    from pomona.survey.part_files import part_files
+
+    there = [] if survey.stopped is None else holding(part_files(output, survey).values())
+    if there:
+        tell(f"pomona: interrupted after frame {survey.stopped}: {there[0]} is left as it was")
+    return bool(there)
 
 
 def _require_drawable(recording: Recording, preview: Path | None) -> None:

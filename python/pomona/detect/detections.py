@@ -45,6 +45,10 @@ class Detections:
             raise PomonaError(f"detections: found shapes {boxes_px.shape}, {self.scores.shape}, expected (D, 4), (D,)")
         if not np.isfinite(boxes_px).all() or (boxes_px[:, :2] >= boxes_px[:, 2:]).any():
             raise PomonaError("detections: a box is not finite or has xmin >= xmax or ymin >= ymax")
+        if not ((self.scores >= 0) & (self.scores <= 1)).all():
+            raise PomonaError(
+                f"detections: found scores from {self.scores.min():g} to {self.scores.max():g}, expected 0 to 1"
+            )
         if self.ids is not None and (len(self.ids) != n or len(set(self.ids)) != n):
             raise PomonaError("detections: ids must be one for each box, each once in a frame")
 

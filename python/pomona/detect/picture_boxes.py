@@ -42,10 +42,13 @@ def table_of(found: Iterable[tuple[str, Detections]]) -> str:
     """Write boxes of named pictures as a table."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
+    # Python's csv takes a carriage return for the end of a line, but quotes it by itself only from 3.13 on.
+    quoted = csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL)
     writer.writerow(COLUMNS)
     for name, detections in found:
+        write = (quoted if "\r" in name else writer).writerow
         for corners, score in zip(detections.boxes_px, detections.scores, strict=True):
-            writer.writerow((name, *(f"{corner:.2f}" for corner in corners), f"{score:.4f}"))
+            write((name, *(f"{corner:.2f}" for corner in corners), f"{score:.4f}"))
     return text.getvalue()
 
 

@@ -24,15 +24,23 @@ def pictures_in(places: Iterable[Path]) -> dict[str, Path]:
     Raises
     ------
     PomonaError
-        A folder holds no picture, or two pictures have the same name.
+        A folder holds no picture, two pictures have the same name, or a name is not UTF-8, as tables of boxes are.
     """
     found: dict[str, Path] = {}
     for place in places:
         for path in _of_folder(place) if place.is_dir() else [place]:
+            _require_text(path)
             if path.name in found:
                 raise PomonaError(f"{path}: found the name of {found[path.name]}, expected names that differ")
             found[path.name] = path
     return found
+
+
+def _require_text(path: Path) -> None:
+    try:
+        path.name.encode()
+    except UnicodeEncodeError:
+        raise PomonaError(f"{path}: found a name that is not UTF-8, expected one that can be in a table") from None
 
 
 def _of_folder(folder: Path) -> list[Path]:

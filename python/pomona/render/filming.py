@@ -104,12 +104,14 @@ def film(filming: Filming, folder: Path, *, tell: Callable[[int, int], None] = l
     Raises
     ------
     PomonaError
-        When something is asked that cannot be, or the folder holds something else.
+        When something is asked that cannot be, the renderer is not installed, or the folder holds something else.
     """
     renderer, camera = renderer_called(filming.renderer), filming.camera
     weather = draw_weather(filming.weather, filming.visit_seed)
     geometry = grow(filming.design, filming.seed).on(filming.day)
     trajectory = _trajectory(filming, geometry.fruits)
+    if not folder.is_dir():
+        renderer.require_installed()
     writer = RecordingWriter(folder, _made_from(filming), filming.jpeg_quality)
     first = writer.first_missing(len(trajectory))
     tell(first, len(trajectory))
@@ -130,7 +132,7 @@ def renderer_called(name: str) -> Renderer:
     Raises
     ------
     PomonaError
-        If none has this name, or it is not installed.
+        If none has this name.
     """
     if name == "raster":
         from pomona.render.raster import RasterRenderer

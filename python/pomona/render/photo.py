@@ -74,6 +74,20 @@ class PathTracer:
     folder: Path | None = None
     interpreter: str | None = None
 
+    def require_installed(self) -> None:
+        """Refuse where Blender's module cannot be loaded.
+
+        Raises
+        ------
+        PomonaError
+            Saying what to install.
+        """
+        command = [_python(self.interpreter), "-c", "import bpy"]
+        with _started(command[0]):
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise PomonaError(_reason(NO_BLENDER, done.stderr))
+
     def render(
         self,
         geometry: RowGeometry,
@@ -164,18 +178,28 @@ def _without_threads(told: str) -> dict[str, Any]:
 @contextlib.contextmanager
 def _blender(interpreter: str | None, folder: Path, first: int) -> Iterator[Iterator[str]]:
     """Run the script; give its lines about pairs, and say in one line what went wrong."""
-    python = interpreter or os.environ.get(BLENDER_PYTHON, sys.executable)
+    python = _python(interpreter)
     with (folder / "blender.log").open("w") as log:
-        try:
-            command = [python, str(SCRIPT), str(folder), str(first)]
+        command = [python, str(SCRIPT), str(folder), str(first)]
+        with _started(python):
             process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
-        except OSError as error:
-            raise PomonaError(f"{python}: cannot be run: {error.strerror}") from None
         try:
             yield _lines(process, folder)
         finally:
             process.kill()
             process.communicate()
+
+
+def _python(interpreter: str | None) -> str:
+    return interpreter or os.environ.get(BLENDER_PYTHON, sys.executable)
+
+
+@contextlib.contextmanager
+def _started(python: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise PomonaError(f"{python}: cannot be run: {error.strerror}") from None
 
 
 def _lines(process: subprocess.Popen[str], folder: Path) -> Iterator[str]:
@@ -190,7 +214,7 @@ def _reason(code: int, log: str) -> str:
     if code != NO_BLENDER:
         return f"Blender: ended with {code}: {last}"
     if "bpy" in last:
-        return "photo-real pictures need Blender's module bpy, which is not installed: pip install bpy"
+        return "photo-real pictures need Blender's module bpy, which is not installed: pip install 'pomona[render]'"
     return f"photo-real pictures need a library of the system for bpy: {last}"
 
 

@@ -31,6 +31,9 @@ class RasterRenderer:
 
     name = "raster"
 
+    def require_installed(self) -> None:
+        """Say nothing: it is in Pomona."""
+
     def render(
         self,
         geometry: RowGeometry,

@@ -65,6 +65,10 @@ class RenderedPair:
 class Renderer(Protocol):
     """Whoever turns geometry into pictures."""
 
+    def require_installed(self) -> None:
+        """Raise a `PomonaError` where something that it needs is not installed."""
+        ...
+
     def render(
         self,
         geometry: RowGeometry,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from pomona.survey.part import Part
 from pomona.survey.part_files import part_files, tell_others
 from pomona.survey.story import Survey
 
-__all__ = ["hashes_of", "identity", "write_stages", "write_survey"]
+__all__ = ["STAGES", "hashes_of", "identity", "write_stages", "write_survey"]
 
 CHUNK_BYTES = 1 << 20
 
@@ -90,7 +90,7 @@ def _write_cloud(path: Path, cloud: FruitCloud) -> None:
 
 def write_stages(folder: Path, survey: Survey) -> None:
     """Write poses and tracks of the parts in formats that `pomona scan` reads: poses_tum.txt, tracks.csv."""
-    for name, write in {"poses_tum.txt": _write_poses, "tracks.csv": _write_tracks}.items():
+    for name, write in STAGES.items():
         files = part_files(folder / name, survey)
         tell_others(folder / name, files.values())
         for number, path in files.items():
@@ -107,6 +107,10 @@ def _write_tracks(path: Path, part: Part) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
         writer.writerows(_tracks(part))
+
+
+STAGES: Mapping[str, Callable[[Path, Part], None]] = {"poses_tum.txt": _write_poses, "tracks.csv": _write_tracks}
+"""What `write_stages` leaves, by name."""
 
 
 def _tracks(part: Part) -> Iterable[tuple[object, ...]]:

@@ -161,7 +161,13 @@ class OnnxDetector:
         -------
         Detections
             Without ids, best first; boxes end at the edge of the picture.
+
+        Raises
+        ------
+        PomonaError
+            When it is anything else than such an array, or an empty one.
         """
+        _require_picture(picture)
         picture_px = (picture.shape[1], picture.shape[0])
         tiles = lay_tiles(picture_px, self.signature.size_px, self.tiling)
         found = [self._in_tile(picture, tile) for tile in tiles]
@@ -192,9 +198,22 @@ class OnnxDetector:
         return CUT_PX * max((tile.xmax - tile.xmin) / width, (tile.ymax - tile.ymin) / height)
 
 
+def _require_picture(picture: object) -> None:
+    """Refuse other numbers and other axes, of which a network makes boxes all the same."""
+    expected = "expected a picture, (H, W, 3) uint8 in the order BGR"
+    if not isinstance(picture, np.ndarray):
+        raise PomonaError(f"picture: found {type(picture).__name__}, {expected}")
+    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
+        raise PomonaError(f"picture: found {picture.shape} {picture.dtype}, {expected}")
+
+
 def _within(boxes_px: NDArray[np.float64], scores: NDArray[np.float64], picture_px: tuple[int, int]) -> Detections:
-    """Cut boxes at the picture's edge; without what is outside, or no box at all (a network may give NaN)."""
+    """Cut boxes at the picture's edge; without what is outside or no box (a network may give NaN)."""
     cut_px = np.clip(boxes_px, 0, np.tile(picture_px, 2))
     rows = np.argsort(-scores, kind="stable")
-    rows = rows[np.isfinite(boxes_px[rows]).all(axis=1) & (cut_px[rows, :2] < cut_px[rows, 2:]).all(axis=1)]
+    rows = rows[
+        ~np.isnan(scores[rows])
+        & np.isfinite(boxes_px[rows]).all(axis=1)
+        & (cut_px[rows, :2] < cut_px[rows, 2:]).all(axis=1)
+    ]
     return Detections(cut_px[rows], np.clip(scores[rows], 0, 1))

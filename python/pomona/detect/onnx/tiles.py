@@ -119,43 +119,51 @@ def merge_tiles(
         Boxes and scores, best first.
     """
     cut = _cut(boxes_px, tiles, picture_px, margin_px)
-    kept: list[_Merged] = []
+    kept = _Merged(len(boxes_px))
     for row in np.lexsort((-scores, cut)):
-        box = _Merged(boxes_px[row], scores[row], tiles[row], [tiles[row]], bool(cut[row]))
-        twin = next((other for other in kept if other.is_same(box)), None)
+        twin = kept.twin_of(boxes_px[row], tiles[row])
         if twin is None:
-            kept.append(box)
-        elif twin.cut:
-            twin.grow(box)
-            twin.cut = bool(_cut(twin.box_px[None], twin.seen_px[None], picture_px, margin_px)[0])
-    whole = sorted((box for box in kept if not box.cut), key=lambda box: -box.score)
-    return np.array([box.box_px for box in whole]).reshape(-1, 4), np.array([box.score for box in whole])
+            kept.add(boxes_px[row], scores[row], tiles[row], cut=bool(cut[row]))
+        elif kept.cut[twin]:
+            kept.grow(twin, boxes_px[row], scores[row], tiles[row])
+            kept.cut[twin] = _cut(kept.boxes_px[twin, None], kept.seen_px[twin, None], picture_px, margin_px)[0]
+    whole = np.flatnonzero(~kept.cut[: len(kept.tiles)])
+    best_first = whole[np.argsort(-kept.scores[whole], kind="stable")]
+    return kept.boxes_px[best_first], kept.scores[best_first]
 
 
-@dataclass(eq=False)
 class _Merged:
-    """A box with what was seen of the picture to get it."""
+    """Boxes with what was seen of the picture to get each, as arrays: one look finds a twin among thousands."""
 
-    box_px: NDArray[np.float64]
-    score: float
-    seen_px: NDArray[np.float64]
-    tiles: list[NDArray[np.float64]]
-    cut: bool
+    def __init__(self, most: int) -> None:
+        self.boxes_px, self.seen_px = np.empty((most, 4)), np.empty((most, 4))
+        self.scores, self.cut = np.empty(most), np.zeros(most, bool)
+        self.tiles: list[set[tuple[float, ...]]] = []
 
-    def is_same(self, other: _Merged) -> bool:
-        # Two boxes of one tile are two fruits: the network has decided that.
-        if any((mine == theirs).all() for mine in self.tiles for theirs in other.tiles):
-            return False
-        both_px = _intersection(self.seen_px, other.seen_px)
-        mine, theirs = _intersection(self.box_px, both_px), _intersection(other.box_px, both_px)
+    def twin_of(self, box_px: NDArray[np.float64], tile: NDArray[np.float64]) -> int | None:
+        """Find the first that agrees with a box of a tile in what both tiles see."""
+        kept_px = self.boxes_px[: len(self.tiles)]
+        (xmin, ymin, xmax, ymax), (low_x, low_y, high_x, high_y) = kept_px.T, box_px
+        near = np.flatnonzero((xmin < high_x) & (ymin < high_y) & (xmax > low_x) & (ymax > low_y))
+        both_px = _intersection(self.seen_px[near], tile)
+        mine, theirs = _intersection(kept_px[near], both_px), _intersection(box_px, both_px)
         shared = _area(_intersection(mine, theirs))
-        return shared > SAME_IOU * (_area(mine) + _area(theirs) - shared)
+        same = near[shared > SAME_IOU * (_area(mine) + _area(theirs) - shared)]
+        # Two boxes of one tile are two fruits: the network has decided that.
+        return next((row for row in same.tolist() if tuple(tile.tolist()) not in self.tiles[row]), None)
 
-    def grow(self, other: _Merged) -> None:
-        self.box_px = _union(self.box_px, other.box_px)
-        self.seen_px = _union(self.seen_px, other.seen_px)
-        self.score = max(self.score, other.score)
-        self.tiles += other.tiles
+    def add(self, box_px: NDArray[np.float64], score: float, tile: NDArray[np.float64], *, cut: bool) -> None:
+        """Keep a box that is no other's twin."""
+        row = len(self.tiles)
+        self.boxes_px[row], self.seen_px[row], self.scores[row], self.cut[row] = box_px, tile, score, cut
+        self.tiles.append({tuple(tile.tolist())})
+
+    def grow(self, row: int, box_px: NDArray[np.float64], score: float, tile: NDArray[np.float64]) -> None:
+        """Join a twin to the box that it is of."""
+        self.boxes_px[row] = _union(self.boxes_px[row], box_px)
+        self.seen_px[row] = _union(self.seen_px[row], tile)
+        self.scores[row] = max(self.scores[row], score)
+        self.tiles[row].add(tuple(tile.tolist()))
 
 
 def _cut(
@@ -168,12 +176,13 @@ def _cut(
 
 
 def _intersection(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.concatenate([np.maximum(one[:2], two[:2]), np.minimum(one[2:], two[2:])])
+    low, high = np.maximum(one[..., :2], two[..., :2]), np.minimum(one[..., 2:], two[..., 2:])
+    return np.concatenate([low, high], axis=-1)
 
 
 def _union(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([np.minimum(one[:2], two[:2]), np.maximum(one[2:], two[2:])])
 
 
-def _area(box_px: NDArray[np.float64]) -> float:
-    return float(np.prod(np.maximum(box_px[2:] - box_px[:2], 0)))
+def _area(boxes_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.prod(np.maximum(boxes_px[..., 2:] - boxes_px[..., :2], 0), axis=-1))
