@@ -6,8 +6,8 @@ use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Standard deviations that an edge reaches: as far as a branch may have moved for itself. Five lose one of forty true pairs
-/// of a real tree that bent by its load (`benchmarks season`, nothing hidden); what is beyond and crowded is not likely enough.
+/// Standard deviations that an edge reaches: as far as a branch may have moved for itself. Five lose three of a hundred
+/// pairs of a real tree that bent under its load (`benchmarks season`, nothing hidden).
 const GATE: f64 = 7.0;
 
 /// Share of the fruits that moved otherwise than their neighbours, and how many times wider they scatter.
