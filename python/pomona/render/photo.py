@@ -214,7 +214,7 @@ def _reason(code: int, log: str) -> str:
     if code != NO_BLENDER:
         return f"Blender: ended with {code}: {last}"
     if "bpy" in last:
-        return "photo-real pictures need Blender's module bpy, which is not installed: pip install 'pomona[render]'"
+        return "photo-real pictures need Blender's module bpy, which is not installed: pip install bpy"
     return f"photo-real pictures need a library of the system for bpy: {last}"
 
 
