@@ -22,7 +22,7 @@ and rendered pictures of fruit trees in colour has pixels that differ by 90."""
 
 
 def check_colour(recording: Recording) -> None:
-    """Warn where the first picture is grey: the detector that is inside then finds a third of the fruits."""
+    """Warn where the first picture is grey: the detector that is inside then may find few of the fruits."""
     for frame in islice(recording.frames(), LOOKED_AT):
         try:
             picture = frame.read_left() if frame.read_left is not None else None
