@@ -54,14 +54,19 @@ def page(browser: Any, report: Path) -> Iterator[Any]:
 
 
 def shown_rows(page: Any) -> list[list[str]]:
-    return [line.locator("[role=cell]").all_inner_texts() for line in page.locator(".lines .line").all()]
+    """The texts of the rows that stand there, read in one go: the table draws its rows anew as it likes."""
+    texts_of = "lines => lines.map(line => Array.from(line.querySelectorAll('[role=cell]'), cell => cell.innerText))"
+    rows: list[list[str]] = page.locator(".lines .line").evaluate_all(texts_of)
+    return rows
 
 
 def lefts_of(page: Any, role: str) -> list[float]:
-    """Where the first cells of that role begin, one for each column."""
+    """Where the first cells of that role begin, one for each column, read in one go."""
     n_columns = page.locator("[role=columnheader]").count()
-    boxes = [cell.bounding_box() for cell in page.locator(f"[role=table] [role={role}]").all()[:n_columns]]
-    return [round(box["x"]) for box in boxes]
+    cells = page.locator(f"[role=table] [role={role}]")
+    cells.first.wait_for()
+    lefts: list[float] = cells.evaluate_all("cells => cells.map(cell => Math.round(cell.getBoundingClientRect().x))")
+    return lefts[:n_columns]
 
 
 def wait_for(locator: Any, text: str) -> None:
