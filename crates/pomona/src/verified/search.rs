@@ -110,8 +110,9 @@ impl Search<'_> {
             hits.clear();
             index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
             effort.candidates += hits.len() as u64;
-            if hits.len() > COMMON {
-                return; // a shape that every cluster shows says nothing about the place
+            // A shape that every cluster shows says nothing about the place.
+            if hits.is_empty() || hits.len() > COMMON {
+                return;
             }
             let Some(proposer) = Proposer::new(query, map, &model, quad) else { return };
             let most = 2.0 * (apart * model.sigma).powi(2);

@@ -116,27 +116,30 @@ impl Rows {
     fn peaks_of(&self, turn: &Matrix3<f64>, counts: &mut Counts) -> Vec<(f64, Similarity)> {
         self.count(turn, counts);
         let expected = self.expected(&counts.cells);
-        let asked: Vec<f64> =
-            expected.iter().map(|votes| WEIGHTS * (votes + OUTSTANDING * (votes + LEAST_EXPECTED).sqrt())).collect();
+        // Of whole numbers; more than they hold is beyond every cell.
+        let asked = |votes: &f64| (WEIGHTS * (votes + OUTSTANDING * (votes + LEAST_EXPECTED).sqrt())) as u16;
+        let asked: Vec<u16> = expected.iter().map(asked).collect();
         let [long, high, deep] = self.size;
-        let mut peaks = Vec::new();
+        let (mut sums, mut peaks) = (vec![0u16; deep], Vec::new());
         for (x, y) in (1..long - 1).flat_map(|x| (1..high - 1).map(move |y| (x, y))) {
             let line = |x: usize, y: usize| &counts.cells[(x * high + y) * deep..][..deep];
             let [here, before, after, below, above] =
                 [line(x, y), line(x - 1, y), line(x + 1, y), line(x, y - 1), line(x, y + 1)];
-            let (blocks, expected) = (&asked[self.block(x, y)..], &expected[self.block(x, y)..]);
+            // A processor adds many cells at once. Where one has a fourth of all votes the clouds are no rows.
             for z in 1..deep - 1 {
+                sums[z] = [before[z], after[z], below[z], above[z], here[z - 1], here[z + 1]]
+                    .into_iter()
+                    .fold(here[z].wrapping_mul(4), u16::wrapping_add);
+            }
+            let (asked, expected) = (&asked[self.block(x, y)..], &expected[self.block(x, y)..]);
+            for z in (1..deep - 1).filter(|z| sums[*z] > asked[z / BLOCK[2]]) {
+                let (sum, expected) = (f64::from(sums[z]), expected[z / BLOCK[2]]);
+                let height = (sum / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
                 let beside = [[before[z], after[z]], [below[z], above[z]], [here[z - 1], here[z + 1]]];
-                // Sums of whole numbers; where one cell has a fourth of all votes the clouds are no rows.
-                let sum = beside.iter().flatten().fold(here[z].wrapping_mul(4), |sum, &votes| sum.wrapping_add(votes));
-                if f64::from(sum) > blocks[z / BLOCK[2]] {
-                    let expected = expected[z / BLOCK[2]];
-                    let height = (f64::from(sum) / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
-                    let aside = Vector3::from(beside.map(|[less, more]| f64::from(more) - f64::from(less)));
-                    let cell = Vector3::new(x as f64, y as f64, z as f64) - Vector3::from(self.half.map(f64::from));
-                    let offset = (cell + aside / f64::from(sum)).component_mul(&self.edges);
-                    peaks.push((height, self.placement(turn, &offset)));
-                }
+                let aside = Vector3::from(beside.map(|[less, more]| f64::from(more) - f64::from(less)));
+                let cell = Vector3::new(x as f64, y as f64, z as f64) - Vector3::from(self.half.map(f64::from));
+                let offset = (cell + aside / sum).component_mul(&self.edges);
+                peaks.push((height, self.placement(turn, &offset)));
             }
         }
         peaks
