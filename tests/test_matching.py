@@ -37,7 +37,7 @@ def as_tuple(match: Match) -> tuple[object, ...]:
     return match.status, match.map_from_query.tolist(), match.pairs.tolist(), match.probabilities.tolist()
 
 
-def test_outlines_that_lie_on_each_other_by_chance_are_no_answer() -> None:
+def test_rows_that_lie_on_each_other_by_chance_are_no_answer() -> None:
     """Two rows without a common fruit."""
     query, map = (FruitCloud.read(TESTDATA / f"matching/outline_of_strangers_{name}.csv") for name in ("query", "map"))
     match = pomona.match(query, map, up=UP)

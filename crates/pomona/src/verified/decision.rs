@@ -4,7 +4,6 @@ use super::acceptance::{KEPT, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
-use super::extent;
 use super::growth::{grow, hold, lay};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
@@ -12,6 +11,7 @@ use super::offsets;
 use super::proposal::Effort;
 use super::search::{FIRST_FRUITS, of_some_fruits};
 use super::seeds::Seed;
+use super::soft;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
@@ -76,7 +76,7 @@ impl Match {
 }
 
 impl<'a> Search<'a> {
-    /// Rounds of seeds until a pose is accepted, with the outline and the offsets where they find none.
+    /// Rounds of seeds until a pose is accepted, and the offsets after the short ones, before the long ones.
     fn run(&self) -> Findings<'a> {
         let mut findings = Findings::none(Effort::default(), self.threshold(Vertical::share_of_turns()));
         for (round, (seeds, keep)) in self.rounds().enumerate() {
@@ -86,17 +86,11 @@ impl<'a> Search<'a> {
                 self.doubt(&mut findings, &rest);
             } else if round == 1 {
                 // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
-                findings.accepted.extend(self.by_outline());
-                // Of the half-turns about a row's axes a known vertical leaves one half.
-                findings.log.threshold = self.threshold(0.5);
-                self.sift(&mut findings);
+                self.lay_along(&mut findings);
             }
             if !findings.accepted.is_empty() {
                 break;
             }
-        }
-        if findings.accepted.is_empty() {
-            self.lay_along(&mut findings);
         }
         if findings.accepted.is_empty() {
             findings.others.extend(self.upside_down_poses());
@@ -231,16 +225,21 @@ impl<'a> Search<'a> {
         laid.retain(|finding| self.is_pose(finding));
         let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
         if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
-            accepted.push(answer);
+            accepted.push(self.laid_again(&answer, &few));
             others.extend(laid);
         }
     }
 
-    fn by_outline(&self) -> Option<Finding<'a>> {
-        let seed = extent::hypothesis(self.query, self.map, &self.model)?;
-        let model = Model { sigma: seed.sigma, ..self.model };
-        let mut finding = Finding::new(hold(self.query, self.map, &seed, &model), seed);
-        finding.overlap.log_odds = finding.overlap.log_odds.max(seed.log_odds);
-        Some(finding)
+    /// An answer laid once more, as holding everywhere, under the noise that suits the pull best: the nearest fruits, which it
+    /// was found by, are often strangers.
+    fn laid_again(&self, found: &Finding, few: &Model) -> Finding<'a> {
+        let sigma = soft::sharpest(self.query, self.map, few, &[found.overlap.pose]);
+        let seed = Hypothesis { pose: found.overlap.pose, sigma, ..found.seed };
+        let mut growth = lay(self.query, self.map, &seed, &Model { sigma, ..*few });
+        growth.whole = true;
+        let mut again = Finding::new(growth, seed);
+        again.overlap.log_odds = again.overlap.log_odds.max(found.overlap.log_odds);
+        self.settle(&mut again);
+        again
     }
 }

@@ -9,9 +9,9 @@
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
 //!    stands out of all others of the search (`outlier`).
-//! 5. Where no constellation survives the noise, the outline of the clouds may still tell (`axes`, `extent`).
-//!    Where too few fruits are in common for any, the offsets of all fruits of two rows are counted (`offsets`, `votes`), and
-//!    what only one visit sees is left out (`sight`). All fruits at once pull both into place (`soft`).
+//! 5. Where no constellation survives, for the noise or for want of fruits in common, the offsets of all fruits of two rows are
+//!    counted under the turns that their axes leave (`offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
+//!    (`soft`), and what only one visit sees is left out (`sight`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`), one-to-one pairs with
 //!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 //!
@@ -31,7 +31,6 @@ mod displacement;
 mod doubts;
 mod evidence;
 mod expected;
-mod extent;
 #[cfg(test)]
 mod fixture;
 mod footing;

@@ -4,15 +4,17 @@
 //! neighbours hardly ever all, and no seed survives. But rows lie along rows. Their principal axes give the turn up to
 //! half-turns and some degrees, and under the right turn every fruit in common has the same offset from its partner. So the
 //! offsets between all fruits are counted ([`super::votes`]). What stands out is pulled into place by all fruits at once
-//! ([`super::soft`]) and refined, under the share that is seen again where ordinary shares have found nothing. Most of it is
-//! wrong, and shows what the right pose must stand out of.
+//! ([`super::soft`]) and refined, under the noise that suits the pull best and the share that is seen again where ordinary
+//! shares have found nothing. Most of it is wrong, and shows what the right pose must stand out of.
+//!
+//! Noise as large as the gaps inside a cluster leaves no constellation either, but the same trees still lie on themselves.
 
 use super::contender::first_of_each;
 use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
 use super::soft;
 use super::votes::Rows;
-use crate::geometry::{Scale, Similarity};
+use crate::geometry::Similarity;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -29,10 +31,7 @@ const SAME: (f64, f64) = (0.5, 0.06);
 /// Poses by what the fruits under them say, most evidence first.
 pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> Vec<Hypothesis> {
     let model = Model { detection: FEW_AGAIN, ..*model };
-    if model.scale == Scale::Free {
-        return Vec::new();
-    }
-    let Some(rows) = Rows::new(query, map) else { return Vec::new() };
+    let Some(rows) = Rows::new(query, map, model.scale) else { return Vec::new() };
     let mut peaks = rows.peaks(&model);
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut poses: Vec<Similarity> = peaks.into_iter().map(|(_, pose)| pose).collect();
@@ -44,8 +43,12 @@ pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> V
     }
     let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
     let apart = distinct(poses, usize::MAX, map.spacing);
-    let starts: Vec<_> = apart.into_iter().map(|pose| (pose, Vector3::zeros())).collect();
-    refined([query, map], &model, reach, &starts)
+    // Visits have one noise: under one of its own every pose would look its best, and few would show what chance reaches.
+    let sigma = soft::sharpest(query, map, &model, &apart);
+    let widths = [sigma / map.spacing; 3];
+    let pulled = |pose: &Similarity| (soft::pulled(query, map, &model, pose, &widths).0, Vector3::zeros());
+    let starts: Vec<_> = apart.par_iter().map(pulled).collect();
+    refined([query, map], &Model { sigma, ..model }, reach, &starts)
 }
 
 /// The first poses, one of those that are the same.
@@ -61,6 +64,7 @@ fn distinct(poses: Vec<Similarity>, most: usize, spacing: f64) -> Vec<Similarity
 mod tests {
     use super::*;
     use crate::cloud::FruitCloud;
+    use crate::geometry::Scale;
     use crate::verified::fixture::Dice;
     use crate::verified::vertical::Vertical;
     use nalgebra::{Point3, Rotation3};
@@ -86,19 +90,21 @@ mod tests {
 
     #[test]
     fn opposite_sides_are_laid_on_each_other_by_what_the_middle_shows() {
-        let [query, map] = sides().map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: 0.55, scale: Scale::Metric, vertical: None };
-        let found = hypotheses(&query, &map, &model);
         let turn = Rotation3::new(Vector3::new(0.7, -1.9, 0.4)).inverse();
-        let best = found.first().expect("something stands out").pose;
-        for p in &query.points {
-            let place = turn * (p + query.centre - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
-            assert!((best.image(p) - place).norm() < 0.1);
+        for (scale, times) in [(Scale::Metric, 1.0), (Scale::Free, 1.7)] {
+            let [mut query, map] = sides();
+            query.positions.iter_mut().for_each(|p| *p *= times);
+            let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+            let model = Model { sigma: 0.02, detection: 0.55, scale, vertical: None };
+            let found = hypotheses(&query, &map, &model);
+            let best = found.first().expect("something stands out").pose;
+            for p in &query.points {
+                let place = turn * ((p + query.centre) / times - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
+                assert!((best.image(p) - place).norm() < 0.1);
+            }
+            // What is up in the query is in depth in the map: no row laid along a row does that.
+            let lying = Model { vertical: Some(Vertical::new([turn.inverse() * Vector3::y(), Vector3::z()])), ..model };
+            assert!(hypotheses(&query, &map, &lying).is_empty());
         }
-        let free = Model { scale: Scale::Free, ..model };
-        assert!(hypotheses(&query, &map, &free).is_empty());
-        // What is up in the query is in depth in the map: no row laid along a row does that.
-        let lying = Model { vertical: Some(Vertical::new([turn.inverse() * Vector3::y(), Vector3::z()])), ..model };
-        assert!(hypotheses(&query, &map, &lying).is_empty());
     }
 }

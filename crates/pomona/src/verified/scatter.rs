@@ -25,8 +25,8 @@ pub(super) struct KnownNoise {
     pub(super) width: f64,
 }
 
-/// Width of a noise that is guessed by the spacing, within a factor of two; and of one that the caller or the outline gives,
-/// within a tenth, for sag that is not followed adds to it.
+/// Width of a noise that is guessed by the spacing, within a factor of two; and of one that the caller gives or the pull of all
+/// fruits, within a tenth, for sag that is not followed adds to it.
 pub(super) const GUESSED: f64 = 0.7;
 pub(super) const GIVEN: f64 = 0.1;
 

@@ -4,11 +4,12 @@
 //! have shown, and they say nothing against a pose. How far each sees is told by the pose itself: in a depth of the row
 //! where one visit shows many fruits and the other hardly any, the other does not see.
 
+use super::axes::row_axes;
 use super::landscape::Landscape;
-use super::votes::row_axes;
 use crate::geometry::Similarity;
 use crate::statistics::gaussian;
 use nalgebra::Vector3;
+use std::collections::HashMap;
 
 /// A visit that shows less than this share of the other's fruits in a depth does not see there.
 const LEAST: f64 = 0.1;
@@ -29,12 +30,16 @@ pub(super) fn unseen(query: &Landscape, map: &Landscape, pose: &Similarity) -> [
     let variance = (WIDTH * map.spacing).powi(2);
     let shown =
         |depths: &[f64], at: f64| depths.iter().map(|depth| gaussian((depth - at).powi(2), variance)).sum::<f64>();
-    let hidden = |place: &Vector3<f64>, own: &[f64], other: &[f64]| {
-        let at = depth(place);
-        shown(other, at) < LEAST * shown(own, at)
+    // Fruits within a quarter of that width share what is shown there.
+    let (step, mut sums) = (WIDTH * map.spacing / 4.0, HashMap::new());
+    let mut sums_at = |place: &Vector3<f64>| {
+        let steps = (depth(place) / step).round();
+        let at = || [0, 1].map(|side: usize| shown(&both[side], steps * step));
+        *sums.entry(steps as i64).or_insert_with(at)
     };
-    [
-        here.iter().map(|place| hidden(place, &both[0], &both[1])).collect(),
-        map.points.iter().map(|place| hidden(place, &both[1], &both[0])).collect(),
-    ]
+    let mut hidden = |place: &Vector3<f64>, own: usize| {
+        let sums = sums_at(place);
+        sums[1 - own] < LEAST * sums[own]
+    };
+    [here.iter().map(|place| hidden(place, 0)).collect(), map.points.iter().map(|place| hidden(place, 1)).collect()]
 }

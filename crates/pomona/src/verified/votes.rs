@@ -3,17 +3,13 @@
 //! A generalised Hough transform. For each turn that the principal axes of two rows leave, the offsets of all fruits are
 //! counted in cells. Crowns on crowns raise whole regions of them; fruits on fruits raise one.
 
-use super::axes::{HALF_TURNS, MIN_FRUITS, axes_of};
+use super::axes::{HALF_TURNS, MIN_FRUITS, row_axes};
 use super::hypothesis::Model;
 use super::landscape::Landscape;
-use crate::geometry::Similarity;
+use crate::geometry::{Scale, Similarity};
 use crate::random::shuffled;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
-
-/// A row is so many times as long as it is high, and as high as it is deep, at the least: else the axes do not say which is
-/// which.
-const LEAST_RATIO: f64 = 1.2;
 
 /// Pairs of fruits that are counted for each turn, of larger clouds those of some fruits; and pairs of clouds that
 /// are left alone: with so few of their fruits too little in common would be asked.
@@ -54,6 +50,9 @@ const LEAST_EXPECTED: f64 = 0.3;
 /// Two rows, each in the frame of its axes: along, up, in depth.
 pub(super) struct Rows {
     axes: [Matrix3<f64>; 2],
+    /// Of the query to the map.
+    scale: f64,
+    /// Of the size that it has in the map.
     query: Vec<Vector3<f64>>,
     /// In parts of a cell, number by number: whole numbers, of which a processor adds many at once.
     map: [Vec<i32>; 3],
@@ -74,22 +73,29 @@ struct Counts {
 
 impl Rows {
     /// `None` where the clouds are no rows, not alike, or too large.
-    pub(super) fn new(query: &Landscape, map: &Landscape) -> Option<Self> {
+    pub(super) fn new(query: &Landscape, map: &Landscape, scale: Scale) -> Option<Self> {
         let (pairs, [counted, too_many]) = (query.len() * map.len(), MOST_PAIRS);
-        let alike = query.spacing.max(map.spacing) <= ALIKE * query.spacing.min(map.spacing);
+        let scale = match scale {
+            Scale::Metric => 1.0,
+            // Visits to the same trees are as long as these.
+            Scale::Free => radius(&map.points) / radius(&query.points),
+        };
+        let spacing = scale * query.spacing;
+        let alike = spacing.max(map.spacing) <= ALIKE * spacing.min(map.spacing);
         if !alike || query.len().min(map.len()) < MIN_FRUITS || pairs > too_many {
             return None;
         }
         let axes = [row_axes(query)?, row_axes(map)?];
         let share = (counted as f64 / pairs as f64).sqrt().min(1.0);
-        let [query, map_points] = [(query, &axes[0]), (map, &axes[1])].map(|(cloud, axes)| some_of(cloud, axes, share));
+        let [query, map_points] =
+            [(query, axes[0] * scale), (map, axes[1])].map(|(cloud, axes)| some_of(cloud, &axes, share));
         let edges = Vector3::from(CELL) * map.spacing;
         let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
         let half = [0, 1, 2].map(|i| reach(i).ceil() as f32 + 1.0);
         let size = half.map(|half| 2 * half as usize + 1);
         let blocks = [0, 1, 2].map(|i| size[i].div_ceil(BLOCK[i]));
         let map = [0, 1, 2].map(|i| map_points.iter().map(|p| parts(p[i] / edges[i])).collect());
-        Some(Self { axes, query, map, edges, half, size, blocks })
+        Some(Self { axes, scale, query, map, edges, half, size, blocks })
     }
 
     /// Poses whose cells stand out, with the standard deviations by which, turn by turn, of those that are admitted.
@@ -105,7 +111,8 @@ impl Rows {
 
     fn placement(&self, turn: &Matrix3<f64>, offset: &Vector3<f64>) -> Similarity {
         let [query, map] = &self.axes;
-        Similarity::rigid(Rotation3::from_matrix_unchecked(map * turn * query.transpose()), map * offset)
+        let rotation = Rotation3::from_matrix_unchecked(map * turn * query.transpose());
+        Similarity { rotation, translation: map * offset, scale: self.scale }
     }
 
     fn no_counts(&self) -> Counts {
@@ -228,16 +235,14 @@ fn smooth(values: &mut [f64], stride: usize, count: usize) {
     }
 }
 
-/// Axes of a row; `None` where they do not say which is which.
-pub(super) fn row_axes(cloud: &Landscape) -> Option<Matrix3<f64>> {
-    let (axes, extents) = axes_of(cloud)?;
-    let told = (0..2).all(|i| extents[i] > LEAST_RATIO * extents[i + 1]);
-    told.then_some(axes)
-}
-
 /// Standard deviation along an axis.
 fn extent(points: &[Vector3<f64>], axis: usize) -> f64 {
     (points.iter().map(|p| p[axis] * p[axis]).sum::<f64>() / points.len().max(1) as f64).sqrt()
+}
+
+/// Root mean square distance from the mean.
+fn radius(points: &[Vector3<f64>]) -> f64 {
+    (points.iter().map(Vector3::norm_squared).sum::<f64>() / points.len().max(1) as f64).sqrt()
 }
 
 /// A share of the fruits in the frame of the axes, in a fixed shuffled order.
