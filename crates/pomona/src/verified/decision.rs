@@ -76,21 +76,21 @@ impl Match {
 }
 
 impl<'a> Search<'a> {
-    /// Rounds of seeds until a pose is accepted, and the offsets after the short ones, before the long ones.
+    /// Rounds of seeds until a pose is accepted, and the offsets where they find none.
     fn run(&self) -> Findings<'a> {
         let mut findings = Findings::none(Effort::default(), self.threshold(Vertical::share_of_turns()));
-        for (round, (seeds, keep)) in self.rounds().enumerate() {
+        for (seeds, keep) in self.rounds() {
             let rest = self.try_seeds(&seeds, keep, &mut findings);
             self.sift(&mut findings);
             if !findings.accepted.is_empty() {
                 self.doubt(&mut findings, &rest);
-            } else if round == 1 {
-                // After the short rounds, before the long ones: what shows the same trees is found here at any noise.
-                self.lay_along(&mut findings);
             }
             if !findings.accepted.is_empty() {
                 break;
             }
+        }
+        if findings.accepted.is_empty() {
+            self.lay_along(&mut findings);
         }
         if findings.accepted.is_empty() {
             findings.others.extend(self.upside_down_poses());
