@@ -5,7 +5,7 @@ use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::growth::{grow, hold, lay};
-use super::hypothesis::{Hypothesis, Model};
+use super::hypothesis::{Hypothesis, Model, SHARES};
 use super::landscape::Landscape;
 use super::offsets;
 use super::proposal::Effort;
@@ -224,8 +224,12 @@ impl<'a> Search<'a> {
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
         let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
-        if let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) {
-            accepted.push(self.laid_again(&answer, &few));
+        let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) else { return };
+        let answer = self.laid_again(&answer, &few);
+        let shown = answer.settled.as_ref().map_or(0.0, |settled| settled.beliefs.probabilities.iter().sum());
+        // Rows that lie on each other all along and have hardly a fruit in common are strangers.
+        if shown > SHARES.0 * self.query.len() as f64 {
+            accepted.push(answer);
             others.extend(laid);
         }
     }
