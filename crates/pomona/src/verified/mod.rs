@@ -27,6 +27,7 @@ mod conclusion;
 mod contender;
 mod cut;
 mod decision;
+mod direction;
 mod displacement;
 mod doubts;
 mod evidence;

@@ -1,9 +1,10 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
+use super::direction::longest;
 use super::patches::{Landing, Patchwork};
 use crate::beliefs::{Beliefs, Edge};
 use crate::neighbours::others::SHARE_OF_ROWS;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Cholesky, Matrix3, U3, Vector3};
 use rayon::prelude::*;
 
 /// Standard deviations that an edge reaches: as far as a branch may have moved for itself. Five lose three of a hundred
@@ -31,7 +32,9 @@ impl Beliefs {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = share * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
-            let new = (1.0 - seen) * (laid.companions(distance) * crowding).max(map.floor);
+            // As many others as the two visits laid on each other have, where the map shows as much as it does here.
+            let others = laid.companions(distance) * crowding * laid.strangers * support;
+            let new = (1.0 - seen) * others.max(map.floor);
             meeting.edge(seen / (1.0 - seen) * density / new * size(row, partner))
         };
         Self::new(laid.meetings(edge), query.len(), map.len())
@@ -76,10 +79,11 @@ impl Patchwork<'_> {
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
         let (map, pose) = (self.map, &self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
-        let support = map.support.at(&place);
+        let (support, shape) = (map.support.at(&place), self.direction.without(row));
+        let common = Spread::new(&(shape * variance), variance);
         let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));
         // No axis has more than the trace, three times the mean.
-        let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { 1.0 };
+        let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { longest(&shape) };
         let reach = GATE * (widest * variance).sqrt();
         // Cells of the grid have more than what is within reach, which no covariance brings within the gate.
         let mut partners = Vec::new();
@@ -93,8 +97,9 @@ impl Patchwork<'_> {
         partners.dedup();
         let meeting = |partner: u32| {
             let offset = map.points[partner as usize] - place;
-            let uncertain = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
-            let (mahalanobis2, density) = likelihood(&offset, variance, uncertain);
+            let told = own.zip(map.covariances.as_ref()).map(|(own, all)| own + all[partner as usize]);
+            let own = told.map(|told| Spread::new(&(as_told(&told, variance, &shape) * variance), variance));
+            let (mahalanobis2, density) = own.as_ref().unwrap_or(&common).at(&offset);
             let distance = offset.norm();
             (mahalanobis2 <= GATE * GATE).then_some(Meeting {
                 query: row as u32,
@@ -108,30 +113,43 @@ impl Patchwork<'_> {
     }
 }
 
-/// Squared Mahalanobis distance of a residual, and its density per cubic metre.
+/// Shape of the noise of a pair whose own covariances come to `told`, square metres; `shape` is that of all.
 ///
 /// The residuals of all pairs say how large the noise is, the fruits' own covariances which way it points: stereo
-/// centroids are long along the viewing ray. `uncertain` is the sum of the two covariances; a tenth of the variance
-/// stays isotropic, for what the recording does not know of (sag, growth).
-fn likelihood(offset: &Vector3<f64>, variance: f64, uncertain: Option<Matrix3<f64>>) -> (f64, f64) {
-    // Density by the squared Mahalanobis distance, times the product of the three standard deviations.
-    let tailed = |d2: f64| {
-        let (share, width) = LOOSE;
-        let loose = (-0.5 * d2 / (width * width)).exp() / width.powi(3);
-        (2.0 * std::f64::consts::PI).powf(-1.5) * ((1.0 - share) * (-0.5 * d2).exp() + share * loose)
-    };
-    let isotropic = || {
-        let d2 = offset.norm_squared() / variance;
-        (d2, tailed(d2) / (variance * variance.sqrt()))
-    };
-    let Some(shape) = uncertain else { return isotropic() };
-    let mean = shape.trace() / 3.0;
+/// centroids are long along the viewing ray. A tenth of the variance stays as that of all pairs, for what the recording
+/// does not know of (sag, growth).
+fn as_told(told: &Matrix3<f64>, variance: f64, shape: &Matrix3<f64>) -> Matrix3<f64> {
+    let mean = told.trace() / 3.0;
     if mean <= 0.0 {
-        return isotropic();
+        return *shape;
     }
     let share = (mean / variance).min(0.9);
-    let covariance = shape * (share * variance / mean) + Matrix3::identity() * ((1.0 - share) * variance);
-    let Some(factor) = covariance.cholesky() else { return isotropic() };
-    let mahalanobis2 = offset.dot(&factor.solve(offset));
-    (mahalanobis2, tailed(mahalanobis2) / factor.l().diagonal().product())
+    told * (share / mean) + shape * (1.0 - share)
+}
+
+/// Normal noise with the tails of [`LOOSE`].
+struct Spread {
+    factor: Cholesky<f64, U3>,
+    /// Density at the middle of a normal distribution, per cubic metre.
+    peak: f64,
+}
+
+impl Spread {
+    /// Of a covariance, or of as much round noise where it is none.
+    fn new(covariance: &Matrix3<f64>, variance: f64) -> Self {
+        let factor = covariance.cholesky().unwrap_or_else(|| {
+            let round = Matrix3::from_diagonal_element(variance.sqrt());
+            Cholesky::pack_dirty(round)
+        });
+        let peak = (2.0 * std::f64::consts::PI).powf(-1.5) / factor.l_dirty().diagonal().product();
+        Self { factor, peak }
+    }
+
+    /// Squared Mahalanobis distance of a residual, and its density per cubic metre.
+    fn at(&self, offset: &Vector3<f64>) -> (f64, f64) {
+        let (share, width) = LOOSE;
+        let d2 = offset.dot(&self.factor.solve(offset));
+        let loose = (-0.5 * d2 / (width * width)).exp() / width.powi(3);
+        (d2, self.peak * ((1.0 - share) * (-0.5 * d2).exp() + share * loose))
+    }
 }

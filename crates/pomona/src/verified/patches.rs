@@ -7,6 +7,7 @@
 //! fruit ([`super::displacement`]).
 
 use super::cut::{Cell, Cut};
+use super::direction::Direction;
 use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
@@ -49,6 +50,9 @@ pub(crate) struct Patchwork<'a> {
     pub(super) pose: Similarity,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     pub(super) sigma: f64,
+    pub(super) direction: Direction,
+    /// Fruits of the map around those of the query that are others, over those that each visit shows around its own.
+    pub(super) strangers: f64,
     /// Variance that neighbours' residuals about the patches share, square metres.
     pub(super) shared: f64,
     pub(super) targets: Vec<Target>,
@@ -72,6 +76,8 @@ impl<'a> Patchwork<'a> {
             cells,
             pose,
             sigma,
+            direction: Direction::default(),
+            strangers: 1.0,
             shared: 0.0,
             targets: vec![None; query.len()],
             left_over: vec![None; query.len()],

@@ -47,27 +47,38 @@ const STEADY: f64 = 200.0;
 /// Rounds of expectation and maximisation of the share.
 const ROUNDS: usize = 20;
 
-/// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
-pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> f64 {
+/// What distances say of an overlap.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scatter {
+    /// Noise under the predictions: standard deviation per axis of the distance to the partner, metres of the map.
+    pub(super) sigma: f64,
+    /// Companions across the visits, over those within them: b.
+    pub(super) strangers: f64,
+}
+
+/// Noise and companions under the predictions.
+pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> Scatter {
     let counts = Counts::new(laid);
     // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
-    let tried: Vec<(f64, f64)> = (0..8 * BINS as i32)
+    let tried: Vec<(f64, f64, f64)> = (0..8 * BINS as i32)
         .map(|step| 0.5 * counts.bin * 2f64.powf(f64::from(step) / 8.0))
         .take_while(|&sigma| sigma < 0.5 * counts.bin * BINS as f64)
         .map(|sigma| {
             let off = (sigma / expected.sigma).ln() / expected.width;
             // Cauchy's prior lets go of a noise that the counts contradict; a normal one would not.
-            (counts.likelihood(sigma) - (off * off).ln_1p(), sigma)
+            let (likelihood, density) = counts.likelihood(sigma);
+            (likelihood - (off * off).ln_1p(), sigma, density)
         })
         .collect();
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, tried| best.max(tried.0));
-    let (mut total, mut logarithm) = (0.0, 0.0);
-    for (likelihood, sigma) in tried {
+    let [mut total, mut logarithm, mut dense] = [0.0; 3];
+    for (likelihood, sigma, density) in tried {
         let weight = (likelihood - best).exp();
         total += weight;
         logarithm += weight * sigma.ln();
+        dense += weight * density;
     }
-    (logarithm / total).exp()
+    Scatter { sigma: (logarithm / total).exp(), strangers: dense / total }
 }
 
 impl Counts {
@@ -99,8 +110,8 @@ impl Counts {
         Self { bin, across, companions, due }
     }
 
-    /// Log-likelihood of the counts under the noise, with the share that suits it.
-    fn likelihood(&self, sigma: f64) -> f64 {
+    /// Log-likelihood of the counts under the noise, with the share that suits it; and the density of companions that does.
+    fn likelihood(&self, sigma: f64) -> (f64, f64) {
         let cumulative: [f64; BINS + 1] = std::array::from_fn(|i| maxwell(i as f64 * self.bin / sigma));
         let bins = || {
             let found = cumulative.windows(2).map(|ends| self.due * (ends[1] - ends[0]));
@@ -124,7 +135,7 @@ impl Counts {
             count * mean.ln() - mean
         });
         let prior = share.ln() + (1.0 - share).ln() + STEADY * (density.ln() - density);
-        likelihoods.sum::<f64>() + prior
+        (likelihoods.sum::<f64>() + prior, density)
     }
 }
 
@@ -149,7 +160,7 @@ mod tests {
             laid.predictions = query.points.iter().map(place).collect();
             // A guess, and what a caller says and is wrong by a factor of two.
             for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
-                let found = scatter(&laid, KnownNoise { sigma: told, width });
+                let found = scatter(&laid, KnownNoise { sigma: told, width }).sigma;
                 assert!((found / sigma - 1.0).abs() < off, "{found} for {sigma}, told {told}");
             }
         }

@@ -6,18 +6,20 @@
 //!
 //! 1. Every fruit is predicted without its own partner (leave-one-out).
 //! 2. The noise comes from distances, nobody said to be who ([`super::scatter`]).
-//! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn.
+//! 3. Every pair gets its probability ([`super::pairing`]); their sum says the share of the next turn, and how they lie off
+//!    which way the noise points ([`super::direction`]).
 //! 4. Patches are fitted to the mean partners under these probabilities, each held to its surroundings and these to
 //!    the common pose as firmly as the clouds show that they move together.
 
 use super::cut::Cell;
+use super::direction::Direction;
 use super::evidence::evidence;
 use super::footing::Footing;
 use super::growth::{Growth, HOLD};
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::overlap::Overlap;
 use super::patches::{ALL, NEXT, Patchwork};
-use super::scatter::{GIVEN, GUESSED, KnownNoise, scatter};
+use super::scatter::{GIVEN, GUESSED, KnownNoise, Scatter, scatter};
 use super::size::Cue;
 use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
@@ -55,6 +57,7 @@ pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>) -> Settled {
     for _ in 0..TURNS {
         let cue = Cue::new([growth.patches.query, growth.patches.map], beliefs.links());
         settlement.recount(&beliefs);
+        settlement.patches.direction = Direction::of(&settlement.patches, &beliefs);
         settlement.refit(&beliefs);
         beliefs = settlement.paired(cue.as_ref());
     }
@@ -85,9 +88,10 @@ impl Settlement<'_> {
         self.patches.predict(footings, landing);
     }
 
-    /// Noise from the distances; the predictions' variances follow.
+    /// Noise and strangers from the distances; the predictions' variances follow.
     fn measure(&mut self) {
-        let found = scatter(&self.patches, self.expected);
+        let Scatter { sigma: found, strangers } = scatter(&self.patches, self.expected);
+        self.patches.strangers = strangers;
         let both = self.patches.predictions.iter().zip(&self.patches.targets);
         let (sum, weights) = both
             .filter_map(|(prediction, target)| Some((prediction.as_ref()?.variance, (*target)?.1)))

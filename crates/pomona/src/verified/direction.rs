@@ -1,0 +1,111 @@
+//! Which way the noise points.
+//!
+//! Depth errs more than what a picture shows across it, branches sink more than they swing. How the pairs lie off shows
+//! that, and a pair that is off along that way is likelier one fruit than another that is as far off across it.
+
+use super::patches::{Landing, Patchwork};
+use crate::beliefs::Beliefs;
+use nalgebra::Matrix3;
+
+/// Squares of residuals over their variances, and the pairs that they are of.
+type Seen = (Matrix3<f64>, f64);
+
+/// What pairs show of the shape of the noise.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Direction {
+    all: Seen,
+    /// What each fruit of the query adds to that.
+    own: Vec<Seen>,
+}
+
+impl Direction {
+    /// As pairs show it by their probabilities.
+    pub(super) fn of(laid: &Patchwork, beliefs: &Beliefs) -> Self {
+        let mut direction = Self { all: Seen::default(), own: vec![Seen::default(); laid.query.len()] };
+        for (edge, probability) in beliefs.links() {
+            let Some(Landing { place, variance }) = laid.predictions[edge.query as usize] else { continue };
+            let off = laid.map.points[edge.map as usize] - place;
+            let squares = off * off.transpose() * (probability / variance);
+            for seen in [&mut direction.all, &mut direction.own[edge.query as usize]] {
+                seen.0 += squares;
+                seen.1 += probability;
+            }
+        }
+        direction
+    }
+
+    /// Covariance of the noise over its mean variance per axis, as all fruits but one of the query show it.
+    ///
+    /// A stranger that is paired lies off some way; with it the shape would turn to it, and it would look likelier than it is. And
+    /// few pairs are long some way by chance: so what they show is drawn to a sphere by the share that chance has in it (Ledoit
+    /// and Wolf 2004). Of n normal pairs the squared Frobenius distance of their shape S from the true one is `(7 + |S|^2) / n`
+    /// in the mean, its trace held at 3.
+    pub(super) fn without(&self, row: usize) -> Matrix3<f64> {
+        let (squares, count) = self.own.get(row).map_or(self.all, |own| (self.all.0 - own.0, self.all.1 - own.1));
+        let (shape, round) = (squares * (3.0 / squares.trace()), Matrix3::identity());
+        let (chance, off) =
+            ((7.0 + shape.norm_squared()) / count.max(f64::MIN_POSITIVE), (shape - round).norm_squared());
+        if off > chance { shape + (round - shape) * (chance / off) } else { round }
+    }
+}
+
+/// A bound of the largest eigenvalue of a shape, whose trace is 3: the shape's own where it has an axis of symmetry.
+pub(super) fn longest(shape: &Matrix3<f64>) -> f64 {
+    1.0 + (2.0 / 3.0 * (shape - Matrix3::identity()).norm_squared()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::fixture::Dice;
+    use nalgebra::Vector3;
+
+    /// What so many pairs show whose noise has these standard deviations.
+    fn seen(count: usize, deviations: [f64; 3]) -> Direction {
+        let mut dice = Dice(5);
+        let own: Vec<Seen> = (0..count)
+            .map(|_| {
+                let off = dice.normal().component_mul(&Vector3::from(deviations));
+                (off * off.transpose(), 1.0)
+            })
+            .collect();
+        let all = own.iter().fold(Seen::default(), |all, own| (all.0 + own.0, all.1 + own.1));
+        Direction { all, own }
+    }
+
+    #[test]
+    fn few_pairs_of_round_noise_show_no_way_and_many_that_are_long_show_theirs() {
+        let nobody = usize::MAX;
+        let off_round = |count: usize| (seen(count, [1.0; 3]).without(nobody) - Matrix3::identity()).norm();
+        assert!([10, 30, 100, 300].into_iter().all(|count| off_round(count) < 0.4));
+        let long = seen(400, [1.0, 1.0, 2.0]).without(nobody);
+        assert!((long - Matrix3::from_diagonal(&Vector3::new(0.5, 0.5, 2.0))).norm() < 0.25, "{long}");
+        assert!((long.trace() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_fruit_is_not_asked_about_its_own_partner() {
+        let mut direction = seen(40, [1.0; 3]);
+        let far = Vector3::z() * 6.0;
+        for seen in [&mut direction.all, &mut direction.own[7]] {
+            seen.0 += far * far.transpose();
+        }
+        assert!(direction.without(8)[(2, 2)] > 1.2 && direction.without(7)[(2, 2)] < 1.1);
+    }
+
+    #[test]
+    fn one_pair_or_none_shows_nothing() {
+        assert_eq!(Direction::default().without(0), Matrix3::identity());
+        assert_eq!(seen(1, [1.0; 3]).without(0), Matrix3::identity());
+        assert_eq!(seen(1, [1.0; 3]).without(1), Matrix3::identity());
+    }
+
+    #[test]
+    fn no_eigenvalue_exceeds_the_bound() {
+        for shape in [[1.0; 3], [0.5, 0.5, 2.0], [0.1, 1.2, 1.7], [1.4, 1.4, 0.2]] {
+            let most = shape.into_iter().fold(0.0, f64::max);
+            let bound = longest(&Matrix3::from_diagonal(&Vector3::from(shape)));
+            assert!(bound > most - 1e-12 && bound < 1.3 * most, "{bound} {most}");
+        }
+    }
+}
