@@ -6,7 +6,7 @@ use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::proposal::Effort;
-use super::seeds::{SHORTEST, SeedIndex};
+use super::seeds::{SHORTEST, STARS, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::vertical::Vertical;
 use crate::cloud::FruitCloud;
@@ -173,11 +173,15 @@ impl<'a> Search<'a> {
         settled > least && grown.max(settled) > log.threshold && grown * self.believed(finding) > least
     }
 
-    /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where there is none.
+    /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where they are fewer than a seed and one
+    /// that speaks for it.
     fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
         let pairs = settled.beliefs.chosen(self.query.len(), self.map.len(), WORTH_IT);
-        pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len().max(1) as f64
+        if pairs.len() <= STARS {
+            return 0.0;
+        }
+        pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len() as f64
     }
 
     /// Looks closely at a finding, over all that it reaches; returns its evidence.

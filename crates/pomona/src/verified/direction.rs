@@ -10,6 +10,9 @@ use nalgebra::Matrix3;
 /// Squares of residuals over their variances, and the pairs that they are of.
 type Seen = (Matrix3<f64>, f64);
 
+/// Pairs that a pose takes up: it has six numbers, a pair three.
+const FITTED: f64 = 2.0;
+
 /// What pairs show of the shape of the noise.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Direction {
@@ -37,14 +40,14 @@ impl Direction {
     /// Covariance of the noise over its mean variance per axis, as all fruits but one of the query show it.
     ///
     /// A stranger that is paired lies off some way; with it the shape would turn to it, and it would look likelier than it is. And
-    /// few pairs are long some way by chance: so what they show is drawn to a sphere by the share that chance has in it (Ledoit
-    /// and Wolf 2004). Of n normal pairs the squared Frobenius distance of their shape S from the true one is `(7 + |S|^2) / n`
-    /// in the mean, its trace held at 3.
+    /// few pairs are long some way by chance: so what they show is drawn to a sphere by the share that chance has in it, for n
+    /// normal pairs, less those that the pose takes up, of the shape S `(9 + |S|^2 / 3) / (n + 1 / 3)` of the squared distance from it (Chen et al. 2010, in three
+    /// dimensions, with a trace of 3).
     pub(super) fn without(&self, row: usize) -> Matrix3<f64> {
         let (squares, count) = self.own.get(row).map_or(self.all, |own| (self.all.0 - own.0, self.all.1 - own.1));
         let (shape, round) = (squares * (3.0 / squares.trace()), Matrix3::identity());
-        let (chance, off) =
-            ((7.0 + shape.norm_squared()) / count.max(f64::MIN_POSITIVE), (shape - round).norm_squared());
+        let chance = (9.0 + shape.norm_squared() / 3.0) / ((count - FITTED).max(0.0) + 1.0 / 3.0);
+        let off = (shape - round).norm_squared();
         if off > chance { shape + (round - shape) * (chance / off) } else { round }
     }
 }

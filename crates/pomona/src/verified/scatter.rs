@@ -36,12 +36,15 @@ struct Counts {
     across: [f64; BINS],
     companions: [f64; BINS],
     due: f64,
+    /// How surely the map would show one that it would show, in the mean.
+    usual: f64,
 }
 
 /// Up to 1.25 spacings.
 const BINS: usize = 30;
 
-/// Companions are as dense across the visits as within, as if this many had been counted so.
+/// Companions are as dense across the visits as within, where the map shows as much as is usual, as if this many had been
+/// counted so.
 const STEADY: f64 = 200.0;
 
 /// Rounds of expectation and maximisation of the share.
@@ -86,9 +89,10 @@ impl Counts {
         let Patchwork { query, map, predictions, pose, .. } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
-            let (mut across, mut due) = ([0.0; BINS], 0.0);
+            let (mut across, mut due) = ([0.0; BINS], [0.0; 2]);
             for at in predictions[first..query.len().min(first + SHARE_OF_ROWS)].iter().flatten() {
-                due += map.support.at(&at.place);
+                let support = map.support.at(&at.place);
+                due = [due[0] + support, due[1] + support * support];
                 map.tree.within(&single(&at.place), (BINS as f64 * bin) as f32, |_, d2| {
                     if let Some(count) = across.get_mut((f64::from(d2).sqrt() / bin) as usize) {
                         *count += 1.0;
@@ -97,17 +101,17 @@ impl Counts {
             }
             (across, due)
         };
-        let parts: Vec<([f64; BINS], f64)> =
+        let parts: Vec<([f64; BINS], [f64; 2])> =
             (0..query.len()).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
         let across = std::array::from_fn(|i| parts.iter().map(|part| part.0[i]).sum());
-        let due: f64 = parts.iter().map(|part| part.1).sum();
+        let [due, squares] = [0, 1].map(|power: usize| parts.iter().map(|part| part.1[power]).sum::<f64>());
         let companions = std::array::from_fn(|i| {
             let (inner, outer) = (i as f64 * bin, (i + 1) as f64 * bin);
             let seen = query.companions.between(inner / pose.scale, outer / pose.scale);
             let both = 0.5 * (seen + map.companions.between(inner, outer));
             due * both.max(map.floor * shell(inner, outer))
         });
-        Self { bin, across, companions, due }
+        Self { bin, across, companions, due, usual: if due > 0.0 { squares / due } else { 1.0 } }
     }
 
     /// Log-likelihood of the counts under the noise, with the share that suits it; and the density of companions that does.
@@ -127,14 +131,14 @@ impl Counts {
                 other += count * b / (a + b);
             }
             share = (own + 1.0) / (self.due + 2.0);
-            density = (other + STEADY) / (companions + STEADY);
+            density = (other + STEADY) / (companions + STEADY * self.usual);
         }
         let share = share.clamp(SHARES.0, SHARES.1);
         let likelihoods = bins().map(|((count, companions), found)| {
             let mean = share * found + density * companions;
             count * mean.ln() - mean
         });
-        let prior = share.ln() + (1.0 - share).ln() + STEADY * (density.ln() - density);
+        let prior = share.ln() + (1.0 - share).ln() + STEADY * (density.ln() - self.usual * density);
         (likelihoods.sum::<f64>() + prior, density)
     }
 }
