@@ -12,8 +12,8 @@
 //! 5. Where no constellation survives, for the noise or for want of fruits in common, the offsets of all fruits of two rows are
 //!    counted under the turns that their axes leave (`offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
 //!    (`soft`), and what only one visit sees is left out (`sight`).
-//! 6. What is reported is settled: the noise from distances alone (`scatter`), one-to-one pairs with
-//!    probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
+//! 6. What is reported is settled: the noise from distances alone (`scatter`) and which way it points from the pairs
+//!    (`direction`), one-to-one pairs with probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 //!
 //! Where it is known about where the query lies, seeds are looked up there in place of steps 1 and 5 (`expected`).
 
