@@ -206,27 +206,44 @@ fn sizes_raise_precision_where_positions_are_blind() {
     assert!(with > without + 0.2, "sum of four precisions: {with} with diameters, {without} without");
 }
 
-#[test]
-fn covariances_say_which_way_the_noise_points() {
-    // Long along y by 8 cm, 1 cm across: with the shape known, neighbours across are told apart.
-    let (mut with, mut without) = (0, 0);
+/// Right pairs under the true pose with covariances and without, of visits whose noise is 8 cm along one of these axes of the
+/// map, in turns, and 1 cm across.
+fn right_pairs_with_and_without_covariances(axes: &[Vector3<f64>]) -> [usize; 2] {
+    let mut right = [0; 2];
     for seed in 0..4 {
         let mut scene = visits(40 + seed, 3, 0.2, 0.01);
         let mut random = Random::new(seed);
-        let depth = scene.map_from_query.rotation.inverse() * Vector3::y();
-        for p in &mut scene.query.positions {
-            *p += depth * (0.08 * random.normal());
+        let into_query = scene.map_from_query.rotation.inverse();
+        let along: Vec<Vector3<f64>> =
+            axes.iter().cycle().take(scene.query.len()).map(|axis| into_query * axis).collect();
+        for (p, along) in scene.query.positions.iter_mut().zip(&along) {
+            *p += along * (0.08 * random.normal());
         }
-        let pose = scene.map_from_query;
-        let index = MapIndex::new(&scene.map, Method::Verified, Scale::Metric, Config::default()).expect("valid");
-        without += score(&scene, &index.pairs_under(&scene.query, &pose, Some(0.05)).expect("valid")).0;
+        let under_pose = |scene: &Scene| {
+            let index = MapIndex::new(&scene.map, Method::Verified, Scale::Metric, Config::default()).expect("valid");
+            score(scene, &index.pairs_under(&scene.query, &scene.map_from_query, Some(0.05)).expect("valid")).0
+        };
+        right[1] += under_pose(&scene);
         let across = Matrix3::identity() * 1e-4;
-        scene.query.covariances = Some(vec![across + depth * depth.transpose() * 0.0064; scene.query.len()]);
+        let covariance = |along: &Vector3<f64>| across + along * along.transpose() * 0.0064;
+        scene.query.covariances = Some(along.iter().map(covariance).collect());
         scene.map.covariances = Some(vec![across; scene.map.len()]);
-        let index = MapIndex::new(&scene.map, Method::Verified, Scale::Metric, Config::default()).expect("valid");
-        with += score(&scene, &index.pairs_under(&scene.query, &pose, Some(0.05)).expect("valid")).0;
+        right[0] += under_pose(&scene);
     }
+    right
+}
+
+#[test]
+fn covariances_say_which_way_the_noise_of_each_fruit_points() {
+    let [with, without] = right_pairs_with_and_without_covariances(&[Vector3::x(), Vector3::y(), Vector3::z()]);
     assert!(with as f64 > 1.05 * without as f64, "{with} right pairs with covariances, {without} without");
+}
+
+#[test]
+fn pairs_show_which_way_the_noise_of_all_points() {
+    // With the shape known, neighbours across are told apart; round noise of the same size leaves a twentieth of them.
+    let [with, without] = right_pairs_with_and_without_covariances(&[Vector3::y()]);
+    assert!(without as f64 > 0.98 * with as f64, "{with} right pairs with covariances, {without} without");
 }
 
 #[test]
