@@ -74,7 +74,7 @@ def searched(cell: Cell, seed: int) -> dict[str, object] | None:
 
 
 def law_in_the_code() -> Law:
-    """Ask the matcher for thresholds at two rates and two numbers of poses."""
+    """Ask the matcher for thresholds at two rates and two numbers of poses, so strict that no pose stands out of others."""
     places = np.random.Generator(np.random.PCG64(0)).uniform(0.0, 1.0, (20, 3))
 
     def threshold(fruits: int, rate: float) -> float:
@@ -82,10 +82,11 @@ def law_in_the_code() -> Law:
         match = pomona.match(FruitCloud(places[:5]), FruitCloud(places[-fruits:]), config=config, threads=1)
         return dict(match.stages)["threshold_nats"]
 
-    few, strict, many = threshold(5, 0.1), threshold(5, 0.01), threshold(10, 0.1)
+    rate = 1e-6
+    few, strict, many = threshold(5, rate), threshold(5, 0.1 * rate), threshold(10, rate)
     width = (strict - few) / math.log(10.0)
     growth = (many - few) / math.log(2.0)
-    return few + width * math.log(0.1) - growth * math.log(25.0), width, growth
+    return few + width * math.log(rate) - growth * math.log(25.0), width, growth
 
 
 def fitted(sizes: NDArray[np.str_], poses: NDArray[np.float64], nats: NDArray[np.float64]) -> Law:
