@@ -74,7 +74,7 @@ def searched(cell: Cell, seed: int) -> dict[str, object] | None:
 
 
 def law_in_the_code() -> Law:
-    """Ask the matcher for thresholds at two rates and two numbers of poses, so strict that no pose stands out of others."""
+    """Ask the matcher for thresholds at two rates and numbers of poses, so strict that no pose stands out of others."""
     places = np.random.Generator(np.random.PCG64(0)).uniform(0.0, 1.0, (20, 3))
 
     def threshold(fruits: int, rate: float) -> float:
