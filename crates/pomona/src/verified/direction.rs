@@ -39,10 +39,10 @@ impl Direction {
 
     /// Covariance of the noise over its mean variance per axis, as all fruits but one of the query show it.
     ///
-    /// A stranger that is paired lies off some way; with it the shape would turn to it, and it would look likelier than it is. And
-    /// few pairs are long some way by chance: so what they show is drawn to a sphere by the share that chance has in it, for n
-    /// normal pairs, less those that the pose takes up, of the shape S `(9 + |S|^2 / 3) / (n + 1 / 3)` of the squared distance from it (Chen et al. 2010, in three
-    /// dimensions, with a trace of 3).
+    /// A stranger that is paired lies off some way; with it the shape would turn to it, and it would look likelier than it
+    /// is. And few pairs are long some way by chance. So what n normal pairs show, S, is drawn to a sphere by the share that
+    /// chance has in its squared distance from one, `(9 + |S|^2 / 3) / (n + 1 / 3)` of it (Chen et al. 2010, in three
+    /// dimensions, with a trace of 3); n is less what the pose takes up.
     pub(super) fn without(&self, row: usize) -> Matrix3<f64> {
         let (squares, count) = self.own.get(row).map_or(self.all, |own| (self.all.0 - own.0, self.all.1 - own.1));
         let (shape, round) = (squares * (3.0 / squares.trace()), Matrix3::identity());
