@@ -50,7 +50,13 @@ pub(super) fn model_of(spacing: f64, scale: Scale, request: &Request) -> Model {
     // A smaller noise than is common does not narrow the search: nothing that is found without it may be lost.
     let common = SEED_SIGMA * spacing;
     let sigma = request.noise_m.unwrap_or(common).max(common);
-    Model { sigma: sigma.min(2.0 * common), detection: DETECTION, scale, vertical: request.up.map(Vertical::new) }
+    Model {
+        sigma: sigma.min(2.0 * common),
+        detection: DETECTION,
+        scale,
+        vertical: request.up.map(Vertical::new),
+        row: None,
+    }
 }
 
 /// An overlap with the region it was found from.

@@ -211,12 +211,12 @@ impl<'a> Search<'a> {
     /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
     /// much more the other poses of this search show: the answer must stand out of them.
     fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
-        let hypotheses = offsets::hypotheses(self.query, self.map, &self.model);
+        let few = offsets::few_again(self.map, &self.model);
+        let hypotheses = offsets::hypotheses(self.query, self.map, &few);
         log.refined += hypotheses.len();
         if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
             return;
         }
-        let few = Model { detection: offsets::FEW_AGAIN, ..self.model };
         let laid = |seed: &Hypothesis| {
             Finding::new(lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few }), *seed)
         };

@@ -14,7 +14,7 @@
 
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::pairing::Meeting;
-use super::patches::Patchwork;
+use super::patches::{Landing, Patchwork};
 use crate::beliefs::Beliefs;
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
@@ -25,7 +25,8 @@ const SEEN_AGAIN: (f64, f64) = (0.35, 0.9);
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let map = laid.map;
     let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
-    let here: Vec<f64> = laid.predictions.iter().map(|at| at.map_or(0.0, |at| map.support.at(&at.place))).collect();
+    let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| laid.shown(row, &at.place));
+    let here: Vec<f64> = laid.predictions.iter().enumerate().map(shown).collect();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
@@ -72,7 +73,6 @@ mod tests {
     use crate::verified::fixture::visits;
     use crate::verified::hypothesis::Model;
     use crate::verified::landscape::Landscape;
-    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
     fn the_true_pose_has_evidence_and_the_same_pose_moved_along_has_less_than_none() {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None };
+        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
         let at = |shift: Vector3<f64>| {
             let pose = Similarity { translation: query.centre - map.centre + shift, ..Similarity::identity() };
             let mut laid = Patchwork::new(&query, &map, pose, model.sigma, &model);

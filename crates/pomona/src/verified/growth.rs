@@ -10,7 +10,6 @@ use super::hypothesis::{GATE, Hypothesis, Model, TURNS};
 use super::landscape::Landscape;
 use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::search::REACH;
-use super::sight::unseen;
 use crate::neighbours::others::each_row;
 
 /// How many times further than the noise the first rounds look. They fit one rigid pose: patches would bend towards a
@@ -68,11 +67,11 @@ pub(crate) fn hold<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothe
     growth
 }
 
-/// Pairs under a pose of the whole query that few of its fruits say: those that only one visit sees are left out, and
+/// Pairs under a pose of the whole query that few of its fruits say: each counts as far as the other visit can have seen it, and
 /// cells that say nothing fall out in the end.
 pub(crate) fn lay<'a>(query: &'a Landscape, map: &'a Landscape, whole: &Hypothesis, model: &Model) -> Growth<'a> {
     let mut growth = hold(query, map, whole, model);
-    growth.patches.unseen = unseen(query, map, &growth.patches.pose);
+    growth.patches.sight = model.sight(query, map, &growth.patches.pose);
     growth.meet(1.0);
     growth.go_on();
     growth.whole = false;
@@ -101,7 +100,7 @@ impl<'a> Growth<'a> {
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
         let Patchwork { map, model, .. } = self.patches;
-        let met = each_row(self.partners.len(), |row| self.nearest(self.patches.predictions[row].as_ref()?));
+        let met = each_row(self.partners.len(), |row| self.nearest(row, self.patches.predictions[row].as_ref()?));
         let mut claims = Claims::on(map.len());
         for (row, met) in met.iter().enumerate() {
             if let Some((partner, ratio)) = *met {
@@ -113,6 +112,7 @@ impl<'a> Growth<'a> {
             let kept = met.filter(|met| claims.owner(met.0) == Some(row));
             gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
             self.partners[row] = kept.map(|(partner, _)| partner);
+            let model = model.of_share(self.patches.share_seen(row));
             let target =
                 |(partner, ratio): (u32, f64)| (map.points[partner as usize], model.no_stranger(ratio).max(0.0));
             self.patches.targets[row] = kept.map(target);
@@ -124,16 +124,17 @@ impl<'a> Growth<'a> {
     }
 
     /// The fruit of the map nearest to where one is expected, and the likelihood ratio of the two being one.
-    fn nearest(&self, Landing { place, variance }: &Landing) -> Option<(u32, f64)> {
+    fn nearest(&self, row: usize, Landing { place, variance }: &Landing) -> Option<(u32, f64)> {
         let Patchwork { map, model, .. } = self.patches;
         let (partner, d2) = map.nearest(place, GATE * variance.sqrt())?;
+        let model = model.of_share(self.patches.share_seen(row));
         Some((partner, model.met(d2, *variance, map.density[partner as usize])))
     }
 
     /// What a fruit without a partner says, nats.
     fn alone(&self, row: usize) -> f64 {
-        let Patchwork { map, model, predictions, .. } = &self.patches;
-        predictions[row].map_or(0.0, |at| model.missed(map.support.at(&at.place)).ln())
+        let Patchwork { model, predictions, .. } = &self.patches;
+        predictions[row].map_or(0.0, |at| model.missed(self.patches.shown(row, &at.place)).ln())
     }
 
     /// New poses, noise and shared displacement from the current pairs: one `rigid` pose, or patches.

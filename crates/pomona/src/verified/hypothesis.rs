@@ -3,12 +3,13 @@
 use super::claims::Claims;
 use super::footing::Footing;
 use super::landscape::Landscape;
+use super::sight::Sight;
 use super::vertical::Vertical;
 use crate::geometry::{Scale, Similarity};
 use crate::moments::{FIXING, Moments};
 use crate::neighbours::tree::single;
 use crate::statistics::{Evidence, gaussian};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Probability that a fruit is seen again, while poses are compared; the pairs estimate their own.
@@ -26,6 +27,8 @@ pub(crate) struct Model {
     pub(crate) detection: f64,
     pub(crate) scale: Scale,
     pub(crate) vertical: Option<Vertical>,
+    /// Axes of the map's row, where the visits may have looked at it from either side.
+    pub(crate) row: Option<Matrix3<f64>>,
 }
 
 impl Model {
@@ -43,6 +46,17 @@ impl Model {
     #[inline]
     pub(crate) fn no_stranger(&self, met: f64) -> f64 {
         1.0 - (1.0 - self.detection) / met
+    }
+
+    /// The same of fruits of which the other visit can have seen a `share`.
+    #[inline]
+    pub(crate) fn of_share(&self, share: f64) -> Self {
+        Self { detection: share * self.detection, ..*self }
+    }
+
+    /// What each visit can have seen of the other's fruits; `None` where both looked alike.
+    pub(super) fn sight(&self, query: &Landscape, map: &Landscape, pose: &Similarity) -> Option<Sight> {
+        self.row.map(|axes| Sight::new(query, map, &axes, pose))
     }
 
     /// One least-squares step from `start`, of pairs whose noise is `sigma` and of a vertical that is known.
@@ -106,8 +120,11 @@ struct Refiner<'a> {
     query: &'a Landscape,
     map: &'a Landscape,
     model: Model,
-    /// Fruits of the query around the place.
+    /// Fruits of the query around the place: rows and points.
+    rows: Vec<u32>,
     region: Vec<Vector3<f64>>,
+    /// Under the pose that the refinement starts from.
+    sight: Option<Sight>,
     /// Of each the variance of the prediction, and the nearest fruit of the map with its squared distance.
     nearest: Vec<(f64, Option<(u32, f64)>)>,
     claims: Claims,
@@ -124,13 +141,24 @@ pub(super) const TURNS: usize = 4;
 impl<'a> Refiner<'a> {
     fn new(query: &'a Landscape, map: &'a Landscape, model: &Model) -> Self {
         let claims = Claims::on(map.len());
-        Self { query, map, model: *model, region: Vec::new(), nearest: Vec::new(), claims }
+        Self {
+            query,
+            map,
+            model: *model,
+            rows: Vec::new(),
+            region: Vec::new(),
+            sight: None,
+            nearest: Vec::new(),
+            claims,
+        }
     }
 
     /// Improves a pose on the fruits within `reach` of `place` and weighs their evidence.
     fn refine(&mut self, start: &Similarity, place: &Vector3<f64>, reach: f64) -> Option<Hypothesis> {
         let query = self.query;
-        self.region = query.within(place, reach).iter().map(|&row| query.points[row as usize]).collect();
+        self.rows = query.within(place, reach);
+        self.region = self.rows.iter().map(|&row| query.points[row as usize]).collect();
+        self.sight = self.model.sight(query, self.map, start);
         let model = self.model;
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
@@ -175,17 +203,23 @@ impl<'a> Refiner<'a> {
     fn weigh(&self, pose: &Similarity) -> (Moments, f64, f64) {
         let (mut moments, mut residual, mut evidence) = (Moments::default(), 0.0, Evidence::default());
         for (at, (p, &(variance, nearest))) in self.region.iter().zip(&self.nearest).enumerate() {
+            let model = self.model.of_share(self.share(at));
             let Some((partner, d2)) = nearest.filter(|nearest| self.claims.owner(nearest.0) == Some(at)) else {
-                evidence.multiply(self.model.missed(self.map.support.at(&pose.image(p))));
+                evidence.multiply(model.missed(self.map.support.at(&pose.image(p))));
                 continue;
             };
-            let met = self.model.met(d2, variance, self.map.density[partner as usize]);
+            let met = model.met(d2, variance, self.map.density[partner as usize]);
             evidence.multiply(met);
-            let weight = self.model.no_stranger(met);
+            let weight = model.no_stranger(met);
             moments.add(p, &self.map.points[partner as usize], weight);
             residual += weight * d2;
         }
         (moments, residual, evidence.log_odds())
+    }
+
+    /// Share of the fruits in the depth of one of the region that the map can show.
+    fn share(&self, at: usize) -> f64 {
+        self.sight.as_ref().map_or(1.0, |sight| sight.shares[0][self.rows[at] as usize])
     }
 
     /// The other half of the evidence: fruits of the map that the query should have seen, and how many pairs were due.
@@ -194,12 +228,13 @@ impl<'a> Refiner<'a> {
     /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
     /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
     fn other_side(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64) -> f64 {
-        let support = |p: &Vector3<f64>| self.map.support.at(&pose.image(p));
-        let due = self.region.iter().map(support).sum::<f64>() * self.model.detection;
+        let seen = |(at, p): (usize, &Vector3<f64>)| self.share(at) * self.map.support.at(&pose.image(p));
+        let due = self.region.iter().enumerate().map(seen).sum::<f64>() * self.model.detection;
         let mut missing = Evidence::default();
         self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
             if self.claims.owner(row).is_none() {
-                let seen = self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
+                let share = self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row as usize]);
+                let seen = share * self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
                 missing.multiply(self.model.missed(seen));
             }
         });

@@ -9,6 +9,7 @@
 //!
 //! Noise as large as the gaps inside a cluster leaves no constellation either, but the same trees still lie on themselves.
 
+use super::axes::row_axes;
 use super::contender::first_of_each;
 use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
@@ -19,7 +20,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Share of fruits seen again, where ordinary shares have found nothing.
-pub(super) const FEW_AGAIN: f64 = 0.25;
+const FEW_AGAIN: f64 = 0.25;
 
 /// How many poses are looked at and then go on, and the widths, in spacings, at which fruits pull them into place:
 /// from half a cell down to what rows bend. Of 24 some 13 lie apart, which [`super::outlier`] asks for.
@@ -28,27 +29,31 @@ const PULLS: [(usize, &[f64]); 2] = [(1024, &[0.25, 0.25]), (24, &[0.2, 0.2, 0.1
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: (f64, f64) = (0.5, 0.06);
 
-/// Poses by what the fruits under them say, most evidence first.
+/// What is assumed of rows that may have been seen from opposite sides, where ordinary shares have found nothing.
+pub(super) fn few_again(map: &Landscape, model: &Model) -> Model {
+    Model { detection: FEW_AGAIN, row: row_axes(map), ..*model }
+}
+
+/// Poses by what the fruits under them say, most evidence first, under the assumptions of [`few_again`].
 pub(super) fn hypotheses(query: &Landscape, map: &Landscape, model: &Model) -> Vec<Hypothesis> {
-    let model = Model { detection: FEW_AGAIN, ..*model };
     let Some(rows) = Rows::new(query, map, model.scale) else { return Vec::new() };
-    let mut peaks = rows.peaks(&model);
+    let mut peaks = rows.peaks(model);
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut poses: Vec<Similarity> = peaks.into_iter().map(|(_, pose)| pose).collect();
     for (most, widths) in PULLS {
         let some = distinct(poses, most, map.spacing);
-        let mut found: Vec<_> = some.par_iter().map(|pose| soft::pulled(query, map, &model, pose, widths)).collect();
+        let mut found: Vec<_> = some.par_iter().map(|pose| soft::pulled(query, map, model, pose, widths)).collect();
         found.sort_by(|(_, a), (_, b)| b.total_cmp(a));
         poses = found.into_iter().map(|(pose, _)| pose).collect();
     }
     let reach = query.points.iter().fold(0.0f64, |far, p| far.max(p.norm()));
     let apart = distinct(poses, usize::MAX, map.spacing);
     // Visits have one noise: under one of its own every pose would look its best, and few would show what chance reaches.
-    let sigma = soft::sharpest(query, map, &model, &apart);
+    let sigma = soft::sharpest(query, map, model, &apart);
     let widths = [sigma / map.spacing; 3];
-    let pulled = |pose: &Similarity| (soft::pulled(query, map, &model, pose, &widths).0, Vector3::zeros());
+    let pulled = |pose: &Similarity| (soft::pulled(query, map, model, pose, &widths).0, Vector3::zeros());
     let starts: Vec<_> = apart.par_iter().map(pulled).collect();
-    refined([query, map], &Model { sigma, ..model }, reach, &starts)
+    refined([query, map], &Model { sigma, ..*model }, reach, &starts)
 }
 
 /// The first poses, one of those that are the same.
@@ -95,8 +100,8 @@ mod tests {
             let [mut query, map] = sides();
             query.positions.iter_mut().for_each(|p| *p *= times);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-            let model = Model { sigma: 0.02, detection: 0.55, scale, vertical: None };
-            let found = hypotheses(&query, &map, &model);
+            let model = Model { sigma: 0.02, detection: 0.55, scale, vertical: None, row: None };
+            let found = hypotheses(&query, &map, &few_again(&map, &model));
             let best = found.first().expect("something stands out").pose;
             for p in &query.points {
                 let place = turn * ((p + query.centre) / times - Vector3::new(3.0, -1.0, 2.0)) - map.centre;
@@ -104,7 +109,7 @@ mod tests {
             }
             // What is up in the query is in depth in the map: no row laid along a row does that.
             let lying = Model { vertical: Some(Vertical::new([turn.inverse() * Vector3::y(), Vector3::z()])), ..model };
-            assert!(hypotheses(&query, &map, &lying).is_empty());
+            assert!(hypotheses(&query, &map, &few_again(&map, &lying)).is_empty());
         }
     }
 }

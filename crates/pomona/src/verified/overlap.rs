@@ -42,13 +42,13 @@ impl Growth<'_> {
         // A fruit of the query that meets its partner has 1 + p x, x by how much that is likelier than a stranger; one that is alone
         // 1 - p u, u how surely it would be seen: -u is its x.
         let (mut terms, mut due) = (Vec::new(), 0.0);
-        for (at, partner) in self.patches.predictions.iter().zip(partners) {
+        for (row, (at, partner)) in self.patches.predictions.iter().zip(partners).enumerate() {
             let Some(at) = at else { continue };
-            let support = map.support.at(&at.place);
+            let support = self.patches.shown(row, &at.place);
             due += support;
             terms.push(partner.map_or(-support, |partner| {
                 let d2 = (map.points[partner as usize] - at.place).norm_squared();
-                gaussian(d2, at.variance) / map.density[partner as usize] - 1.0
+                self.patches.share_seen(row) * (gaussian(d2, at.variance) / map.density[partner as usize] - 1.0)
             }));
         }
         let mut found = vec![false; map.len()];

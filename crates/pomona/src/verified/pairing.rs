@@ -79,7 +79,7 @@ impl Patchwork<'_> {
     fn meetings_of(&self, row: usize) -> Vec<Meeting> {
         let (map, pose) = (self.map, &self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
-        let (support, shape) = (map.support.at(&place), self.direction.without(row));
+        let (support, shape) = (self.shown(row, &place), self.direction.without(row));
         let common = Spread::new(&(shape * variance), variance);
         let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));
         // No axis has more than the trace, three times the mean.

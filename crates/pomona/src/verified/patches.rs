@@ -12,6 +12,7 @@ use super::displacement::{Residual, carried_on, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
+use super::sight::Sight;
 use crate::geometry::{Scale, Similarity};
 use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
@@ -59,8 +60,8 @@ pub(crate) struct Patchwork<'a> {
     /// What patches left over when it was looked at last: from where they put a fruit to its partner.
     pub(super) left_over: Vec<Residual>,
     pub(super) predictions: Vec<Option<Landing>>,
-    /// Fruits of the query, and of the map, that hang where the other visit does not see.
-    pub(super) unseen: [Vec<bool>; 2],
+    /// What each visit can have seen of the other's fruits; `None` where both looked alike.
+    pub(super) sight: Option<Sight>,
 }
 
 impl<'a> Patchwork<'a> {
@@ -82,7 +83,7 @@ impl<'a> Patchwork<'a> {
             targets: vec![None; query.len()],
             left_over: vec![None; query.len()],
             predictions: vec![None; query.len()],
-            unseen: [vec![false; query.len()], vec![false; map.len()]],
+            sight: None,
         }
     }
 
@@ -97,7 +98,7 @@ impl<'a> Patchwork<'a> {
         targets.map(|(row, target)| target.map(|(target, weight)| (target - self.placed(row), weight))).collect()
     }
 
-    /// Predicts the fruits of the reached cells that are not `unseen`: `footing` says how firmly pairs hold the poses of a cell,
+    /// Predicts the fruits of the reached cells: `footing` says how firmly pairs hold the poses of a cell,
     /// `landing` what that makes of a fruit.
     pub(super) fn predict<F: Copy + Send + Sync>(
         &mut self,
@@ -107,7 +108,7 @@ impl<'a> Patchwork<'a> {
         let footing = |cell: &Cell| cell.reached.then(|| footing(self, cell));
         let footings: Vec<Option<F>> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(footing).collect();
         let at = |row: usize| {
-            let footing = footings[self.cut.cell_of[row] as usize].filter(|_| !self.unseen[0][row])?;
+            let footing = footings[self.cut.cell_of[row] as usize]?;
             Some(landing(self, row, footing))
         };
         self.predictions = each_row(self.query.len(), at);
@@ -218,13 +219,23 @@ impl<'a> Patchwork<'a> {
         self.cells.iter_mut().zip(poses).for_each(|(cell, pose)| cell.pose = pose);
     }
 
+    /// Share of the fruits in the depth of one of the query that the map's visit can have seen.
+    pub(super) fn share_seen(&self, row: usize) -> f64 {
+        self.sight.as_ref().map_or(1.0, |sight| sight.shares[0][row])
+    }
+
+    /// How surely the map's visit would have shown a fruit of the query that lies at `place`.
+    pub(super) fn shown(&self, row: usize, place: &Vector3<f64>) -> f64 {
+        self.share_seen(row) * self.map.support.at(place)
+    }
+
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.
     pub(super) fn looked_at(&self, row: usize) -> f64 {
-        if self.unseen[1][row] {
-            return 0.0;
-        }
         let place = self.pose.preimage(&self.map.points[row]);
         let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
-        if cell.is_some_and(|&cell| self.cells[cell].reached) { self.query.support.at(&place) } else { 0.0 }
+        if !cell.is_some_and(|&cell| self.cells[cell].reached) {
+            return 0.0;
+        }
+        self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row]) * self.query.support.at(&place)
     }
 }

@@ -223,7 +223,7 @@ mod tests {
     use nalgebra::Point3;
 
     fn model(scale: Scale) -> Model {
-        Model { sigma: 0.02, detection: 0.6, scale, vertical: None }
+        Model { sigma: 0.02, detection: 0.6, scale, vertical: None, row: None }
     }
 
     /// The row of the map that shows the fruit in `row` of the query, where both show the same cloud.

@@ -90,8 +90,9 @@ impl Counts {
         let bin = BIN * map.spacing;
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], [0.0; 2]);
-            for at in predictions[first..query.len().min(first + SHARE_OF_ROWS)].iter().flatten() {
-                let support = map.support.at(&at.place);
+            for (row, at) in predictions.iter().enumerate().skip(first).take(SHARE_OF_ROWS) {
+                let Some(at) = at else { continue };
+                let support = laid.shown(row, &at.place);
                 due = [due[0] + support, due[1] + support * support];
                 map.tree.within(&single(&at.place), (BINS as f64 * bin) as f32, |_, d2| {
                     if let Some(count) = across.get_mut((f64::from(d2).sqrt() / bin) as usize) {
@@ -159,7 +160,7 @@ mod tests {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
             let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
-            let model = Model { sigma, detection: DETECTION, scale: Scale::Metric, vertical: None };
+            let model = Model { sigma, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
             let mut laid = Patchwork::new(&query, &map, Similarity::identity(), sigma, &model);
             laid.predictions = query.points.iter().map(place).collect();
             // A guess, and what a caller says and is wrong by a factor of two.

@@ -18,7 +18,7 @@ use super::footing::Footing;
 use super::growth::{Growth, HOLD};
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::overlap::Overlap;
-use super::patches::{ALL, NEXT, Patchwork};
+use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, Scatter, scatter};
 use super::size::Cue;
 use crate::beliefs::Beliefs;
@@ -108,7 +108,8 @@ impl Settlement<'_> {
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
     fn recount(&mut self, beliefs: &Beliefs) {
-        let due: f64 = self.patches.predictions.iter().flatten().map(|at| self.patches.map.support.at(&at.place)).sum();
+        let shown = |(row, at): (usize, &Option<Landing>)| Some(self.patches.shown(row, &(*at)?.place));
+        let due: f64 = self.patches.predictions.iter().enumerate().filter_map(shown).sum();
         let found: f64 = beliefs.probabilities.iter().sum();
         self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
     }

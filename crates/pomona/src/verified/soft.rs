@@ -5,6 +5,7 @@
 
 use super::hypothesis::Model;
 use super::landscape::Landscape;
+use super::sight::Sight;
 use crate::geometry::Similarity;
 use crate::moments::Moments;
 use crate::statistics::{Evidence, gaussian};
@@ -24,10 +25,11 @@ pub(super) fn pulled(
     widths: &[f64],
 ) -> (Similarity, f64) {
     let (mut pose, mut nats) = (*start, 0.0);
+    let sight = model.sight(query, map, start);
     for width in widths {
         let sigma = width * map.spacing;
         let pulls;
-        (pulls, nats) = pulls_at(query, map, model, &pose, sigma);
+        (pulls, nats) = pulls_at([query, map], model, &pose, sigma, sight.as_ref());
         pose = model.step(&pulls, &pose, sigma).unwrap_or(pose);
     }
     (pose, nats)
@@ -38,18 +40,29 @@ const NOISES: [f64; 5] = [0.075, 0.11, 0.16, 0.23, 0.33];
 
 /// The noise, metres, under which the fruits say most for one of the poses.
 pub(super) fn sharpest(query: &Landscape, map: &Landscape, model: &Model, poses: &[Similarity]) -> f64 {
-    let tried: Vec<(&Similarity, f64)> =
-        poses.iter().flat_map(|pose| NOISES.map(|share| (pose, share * map.spacing))).collect();
-    let said = |&(pose, sigma): &(&Similarity, f64)| (pulls_at(query, map, model, pose, sigma).1, sigma);
-    let said: Vec<(f64, f64)> = tried.par_iter().map(said).collect();
-    said.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or(model.sigma, |(_, sigma)| sigma)
+    let said = |pose: &Similarity| {
+        let sight = model.sight(query, map, pose);
+        NOISES.map(|share| share * map.spacing).map(|sigma| {
+            let (_, nats) = pulls_at([query, map], model, pose, sigma, sight.as_ref());
+            (nats, sigma)
+        })
+    };
+    let said: Vec<[(f64, f64); 5]> = poses.par_iter().map(said).collect();
+    said.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0)).map_or(model.sigma, |(_, sigma)| sigma)
 }
 
 /// Where the fruits of the query are pulled when a pair has the noise `sigma`, and what they say for the pose, nats.
-fn pulls_at(query: &Landscape, map: &Landscape, model: &Model, pose: &Similarity, sigma: f64) -> (Moments, f64) {
+fn pulls_at(
+    [query, map]: [&Landscape; 2],
+    model: &Model,
+    pose: &Similarity,
+    sigma: f64,
+    sight: Option<&Sight>,
+) -> (Moments, f64) {
     let (mut pulls, mut evidence) = (Moments::default(), Evidence::default());
     let reach2 = (REACH * sigma).powi(2);
-    for p in &query.points {
+    for (row, p) in query.points.iter().enumerate() {
+        let model = model.of_share(sight.map_or(1.0, |sight| sight.shares[0][row]));
         let place = pose.image(p);
         let (mut sum, mut total) = (Vector3::zeros(), 0.0);
         map.near(&place, REACH * sigma, |row| {
@@ -83,7 +96,7 @@ mod tests {
     fn a_pose_that_is_off_by_the_width_of_a_gap_is_pulled_into_place() {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None };
+        let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None, row: None };
         let truth = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
         let moved = Similarity { translation: truth.translation + Vector3::new(0.04, -0.03, 0.02), ..truth };
         let start = moved.turned(&Vector3::zeros(), &Rotation3::new(Vector3::new(0.02, -0.03, 0.03)));
@@ -101,7 +114,7 @@ mod tests {
         for sigma in [0.02, 0.04, 0.08] {
             let (query, map) = visits(sigma);
             let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-            let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None };
+            let model = Model { sigma: 0.02, detection: 0.3, scale: Scale::Metric, vertical: None, row: None };
             let truth = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
             let aside = |x: f64| Similarity { translation: truth.translation + Vector3::new(x, 0.0, 0.0), ..truth };
             let found = sharpest(&query, &map, &model, &[aside(0.6), truth, aside(-0.9)]);

@@ -115,7 +115,7 @@ mod tests {
     fn true_candidates_pass_and_most_others_do_not() {
         let (query, map) = visits(0.02);
         let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None };
+        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
         let shift = query.centre - map.centre;
         let partner = |row: u32| map.nearest(&(query.points[row as usize] + shift), 0.05).map(|(row, _)| row);
         let (mut tried, mut passed, mut dropped) = (0, 0, 0);
