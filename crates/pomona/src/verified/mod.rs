@@ -11,7 +11,7 @@
 //!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives, for the noise or for want of fruits in common, the offsets of all fruits of two rows are
 //!    counted under the turns that their axes leave (`offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
-//!    (`soft`), and what only one visit sees is left out (`sight`).
+//!    (`soft`), and each counts as far as the other visit can have seen it (`sight`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`) and which way it points from the pairs
 //!    (`direction`), one-to-one pairs with probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 //!
