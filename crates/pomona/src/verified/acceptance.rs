@@ -84,7 +84,7 @@ pub(super) struct Kept {
     pub(super) laid: f64,
 }
 
-pub(super) const KEPT: Kept = Kept { threshold: 0.8, outlier: 0.9, laid: 0.7 };
+pub(super) const KEPT: Kept = Kept { threshold: 0.8, outlier: 0.9, laid: 0.6 };
 
 /// Rate of the log-odds from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
 /// in twenty.

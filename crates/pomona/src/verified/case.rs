@@ -84,6 +84,15 @@ impl<'a> Finding<'a> {
     }
 }
 
+impl Finding<'_> {
+    /// Share of the fruits of the query that are found, of those that the map can show in their depths all along the row.
+    pub(super) fn share_of_row(&self) -> f64 {
+        let found: f64 = self.settled.iter().flat_map(|settled| &settled.beliefs.probabilities).sum();
+        let due: f64 = (0..self.overlap.predictions.len()).map(|row| self.growth.patches.share_seen(row)).sum();
+        found / due
+    }
+}
+
 /// Most evidence first.
 pub(super) fn best_first(findings: &mut [Finding]) {
     findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));

@@ -20,11 +20,11 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Share of fruits seen again, where ordinary shares have found nothing.
-const FEW_AGAIN: f64 = 0.25;
+pub(super) const FEW_AGAIN: f64 = 0.25;
 
 /// How many poses are looked at and then go on, and the widths, in spacings, at which fruits pull them into place:
 /// from half a cell down to what rows bend. Of 24 some 13 lie apart, which [`super::outlier`] asks for.
-const PULLS: [(usize, &[f64]); 2] = [(1024, &[0.25, 0.25]), (24, &[0.2, 0.2, 0.16, 0.16])];
+const PULLS: [(usize, &[f64]); 2] = [(256, &[0.25, 0.25]), (24, &[0.2, 0.2, 0.16, 0.16])];
 
 /// Two poses within so many spacings, and turned by less than so many radians, are one.
 const SAME: (f64, f64) = (0.5, 0.06);

@@ -34,12 +34,13 @@ const REACHES: [f64; 3] = [1.5, 0.8, 2.0];
 /// A cell has 2 to the power of this many parts.
 const PARTS_BITS: u32 = 10;
 
-/// Cells of a block; its mean and that of the blocks around say what crowns on crowns give.
-const BLOCK: [usize; 3] = [4, 4, 2];
+/// Lines of cells, in depth, of a block along the row and up: its mean and that of the blocks around say what crowns on crowns
+/// give there.
+const BLOCK: [usize; 2] = [4, 4];
 
-/// Standard deviations by which a cell exceeds its surroundings at the least: of a row that is not there some hundred do, of one
-/// that is thousands.
-const OUTSTANDING: f64 = 5.2;
+/// Standard deviations by which a cell exceeds what crowns on crowns give at the least. More cells do than are looked at, for of a
+/// row that is not there these have to show what chance reaches.
+const OUTSTANDING: f64 = 4.0;
 
 /// Votes of a cell count four times, and those of the six next to it once.
 const WEIGHTS: f64 = 10.0;
@@ -60,7 +61,7 @@ pub(super) struct Rows {
     /// Cells to either side of no offset, and all of them.
     half: [f32; 3],
     size: [usize; 3],
-    blocks: [usize; 3],
+    blocks: [usize; 2],
 }
 
 /// Votes of all cells.
@@ -93,7 +94,7 @@ impl Rows {
         let reach = |i: usize| REACHES[i] * (extent(&query, i) + extent(&map_points, i)) / edges[i];
         let half = [0, 1, 2].map(|i| reach(i).ceil() as f32 + 1.0);
         let size = half.map(|half| 2 * half as usize + 1);
-        let blocks = [0, 1, 2].map(|i| size[i].div_ceil(BLOCK[i]));
+        let blocks = [0, 1].map(|i| size[i].div_ceil(BLOCK[i]));
         let map = [0, 1, 2].map(|i| map_points.iter().map(|p| parts(p[i] / edges[i])).collect());
         Some(Self { axes, scale, query, map, edges, half, size, blocks })
     }
@@ -139,8 +140,8 @@ impl Rows {
                     .fold(here[z].wrapping_mul(4), u16::wrapping_add);
             }
             let (asked, expected) = (&asked[self.block(x, y)..], &expected[self.block(x, y)..]);
-            for z in (1..deep - 1).filter(|z| sums[*z] > asked[z / BLOCK[2]]) {
-                let (sum, expected) = (f64::from(sums[z]), expected[z / BLOCK[2]]);
+            for z in (1..deep - 1).filter(|z| sums[*z] > asked[*z]) {
+                let (sum, expected) = (f64::from(sums[z]), expected[z]);
                 let height = (sum / WEIGHTS - expected) / (expected + LEAST_EXPECTED).sqrt();
                 let beside = [[before[z], after[z]], [below[z], above[z]], [here[z - 1], here[z + 1]]];
                 let aside = Vector3::from(beside.map(|[less, more]| f64::from(more) - f64::from(less)));
@@ -152,9 +153,9 @@ impl Rows {
         peaks
     }
 
-    /// The first block of a line in depth.
+    /// Where in what is expected the block of a line in depth begins.
     fn block(&self, x: usize, y: usize) -> usize {
-        (x / BLOCK[0] * self.blocks[1] + y / BLOCK[1]) * self.blocks[2]
+        (x / BLOCK[0] * self.blocks[1] + y / BLOCK[1]) * self.size[2]
     }
 
     /// Counts the offsets of all fruits of the map from all of the query.
@@ -179,21 +180,30 @@ impl Rows {
         }
     }
 
-    /// Votes of a cell of each block that these, each a mean with those around, let expect.
+    /// Votes that crowns on crowns give the cells of a line in each block: the mean of the lines in it and in the blocks around,
+    /// spread in depth as all votes are.
+    ///
+    /// A canopy is a few cells deep. What its votes fall by from one cell to the next is more than what its fruits add to one, so
+    /// that the mean of cells in several depths is no measure of either.
     fn expected(&self, cells: &[u16]) -> Vec<f64> {
-        let ([_, high, deep], [along, up, back]) = (self.size, self.blocks);
-        let mut votes = vec![0.0; along * up * back];
+        let ([_, high, deep], [along, up]) = (self.size, self.blocks);
+        let (mut lines, mut depths) = (vec![0.0; along * up], vec![0.0; deep]);
         for (at, line) in cells.chunks_exact(deep).enumerate() {
-            let blocks = &mut votes[self.block(at / high, at % high)..];
-            for (sum, votes) in blocks.iter_mut().zip(line.chunks(BLOCK[2])) {
-                *sum += f64::from(votes.iter().sum::<u16>());
+            let sum = &mut lines[self.block(at / high, at % high) / deep];
+            for (depth, &votes) in depths.iter_mut().zip(line) {
+                *sum += f64::from(votes);
+                *depth += f64::from(votes);
             }
         }
-        for (stride, count) in [(up * back, along), (back, up), (1, back)] {
-            smooth(&mut votes, stride, count);
+        for (stride, count) in [(up, along), (1, up)] {
+            smooth(&mut lines, stride, count);
         }
-        let cells = BLOCK.iter().product::<usize>() as f64;
-        votes.into_iter().map(|sum| sum / cells).collect()
+        // Of a mean by these weights, of which a line has eight, two cells have one each.
+        let beside = |z: usize| depths.get(z).copied().unwrap_or(0.0);
+        let weighed = |z: usize| (8.0 * depths[z] + beside(z.wrapping_sub(1)) + beside(z + 1)) / WEIGHTS;
+        let all = depths.iter().sum::<f64>().max(1.0) * BLOCK.iter().product::<usize>() as f64;
+        let shares: Vec<f64> = (0..deep).map(|z| weighed(z) / all).collect();
+        lines.iter().flat_map(|votes| shares.iter().map(move |share| votes * share)).collect()
     }
 }
 
@@ -251,4 +261,42 @@ fn some_of(cloud: &Landscape, axes: &Matrix3<f64>, share: f64) -> Vec<Vector3<f6
     rows.sort_unstable_by_key(|&row| shuffled(u64::from(row)));
     rows.truncate((share * cloud.len() as f64).round() as usize);
     rows.iter().map(|&row| axes.tr_mul(&cloud.points[row as usize])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows, the map's votes spread as `size` says.
+    fn rows(size: [usize; 3]) -> Rows {
+        Rows {
+            axes: [Matrix3::identity(); 2],
+            scale: 1.0,
+            query: Vec::new(),
+            map: [Vec::new(), Vec::new(), Vec::new()],
+            edges: Vector3::repeat(0.1),
+            half: size.map(|cells| (cells / 2) as f32),
+            size,
+            blocks: [0, 1].map(|i| size[i].div_ceil(BLOCK[i])),
+        }
+    }
+
+    #[test]
+    fn what_a_thin_canopy_gives_each_depth_is_expected_there_and_fruits_in_common_are_not() {
+        let size @ [long, high, deep] = [32, 24, 7];
+        let rows = rows(size);
+        // A bell two cells wide.
+        let bell = [0u16, 2, 10, 20, 10, 2, 0];
+        let mut cells: Vec<u16> = bell.iter().copied().cycle().take(long * high * deep).collect();
+        let at = |x: usize, y: usize, z: usize| (x * high + y) * deep + z;
+        cells[at(17, 13, 5)] += 9;
+        let expected = rows.expected(&cells);
+        let seen = |x, y, z| expected[rows.block(x, y) + z];
+        for (z, votes) in bell.iter().enumerate().skip(2).take(3) {
+            let beside = f64::from(bell[z - 1] + bell[z + 1]);
+            let weighed = 0.8 * f64::from(*votes) + 0.1 * beside;
+            assert!((seen(10, 10, z) - weighed).abs() < 0.02 * weighed, "{z}");
+        }
+        assert!((seen(17, 13, 5) - 2.6).abs() < 0.2);
+    }
 }
