@@ -266,6 +266,7 @@ FRAME_CELLS = (
 
 _OPPOSITE = replace(_BASE, name="opposite25", hidden=0.1, fade_m=0.1, depth_noise=2.0)
 _OPPOSITE8 = replace(_OPPOSITE, name="opposite8", fade_m=0.03)
+_OPPOSITE8FINE = replace(_OPPOSITE8, name="opposite8fine", noise_m=0.01, depth_noise=2.5)
 _SAG = replace(_BASE, name="sag5", sag_m=0.05)
 _GROWN = replace(_O45S4, name="grown175", sizes=True, growth=(1.75, 1.75), seeded_as="o45s4")
 
@@ -274,6 +275,10 @@ CHANGE_CELLS = (
     replace(_OPPOSITE, name="opposite15", fade_m=0.055),
     _OPPOSITE8,
     replace(_OPPOSITE8, name="opposite8up", upright=True, seeded_as="opposite8"),
+    replace(_OPPOSITE8FINE, name="opposite25fine", fade_m=0.1),
+    replace(_OPPOSITE8FINE, name="opposite15fine", fade_m=0.055),
+    _OPPOSITE8FINE,
+    replace(_OPPOSITE8FINE, name="opposite8fineup", upright=True, seeded_as="opposite8fine"),
     replace(_BASE, name="thinned30", thinned=0.3),
     replace(_BASE, name="thinned70", thinned=0.7),
     _SAG,

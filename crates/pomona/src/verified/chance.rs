@@ -140,6 +140,18 @@ impl Companions {
         self.up_to(outer) - self.up_to(inner)
     }
 
+    /// Mean number of fruits about a fruit, each weighed by a Gaussian of its distance that is 1 at none.
+    pub(super) fn within_noise(&self, sigma: f64) -> f64 {
+        let step = 0.25 * sigma;
+        let weighed = |i: u32| {
+            let inner = f64::from(i) * step;
+            let middle = (inner + 0.5 * step) / sigma;
+            (-0.5 * middle * middle).exp() * self.between(inner, inner + step)
+        };
+        // To four standard deviations.
+        (0..16).map(weighed).sum()
+    }
+
     /// Fruits per volume at a distance from a fruit.
     pub(super) fn density(&self, distance: f64) -> f64 {
         let half = Self::HALF * self.bin;
@@ -208,6 +220,18 @@ mod tests {
         assert!(row.companions.between(0.0, 0.06) == 0.0 && row.companions.between(0.11, 0.45) == 0.0);
         assert!((row.companions.density(0.09) * shell(0.06, 0.12) - 1.0).abs() < 0.1);
         assert!(row.companions.density(0.3) == 0.0);
+    }
+
+    #[test]
+    fn companions_within_the_noise_are_as_many_as_a_density_puts_there() {
+        let mut dice = Dice(3);
+        let fruits = (0..4000).map(|_| [4.0, 4.0, 4.0].map(|length| length * dice.uniform()).into()).collect();
+        let row = Landscape::new(&FruitCloud::from_positions(fruits));
+        for sigma in [0.05, 0.1] {
+            let volume = (2.0 * std::f64::consts::PI).powf(1.5) * f64::powi(sigma, 3);
+            let times = row.companions.within_noise(sigma) / (4000.0 / 64.0 * volume);
+            assert!((0.88..1.1).contains(&times), "{times}");
+        }
     }
 
     #[test]

@@ -29,12 +29,13 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let here: Vec<f64> = laid.predictions.iter().enumerate().map(shown).collect();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
+    let thinner = thinner(laid);
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..TURNS {
         let edge = |meeting: &Meeting| {
             let (seen, there) = (share * meeting.support, there[meeting.map as usize]);
-            let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
+            let strangers = thinner * map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
             meeting.edge(seen * meeting.density / strangers)
         };
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
@@ -43,6 +44,27 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
     }
     evidence
+}
+
+/// How many times as dense as the map's density says both visits are around their fruits, as their pairs show that are as close
+/// as the noise of the predictions, less one standard deviation; 1 at the least.
+///
+/// Where walls stand side by side, as the legs of a V, or wires hang above each other, the neighbours of a fruit do not show how
+/// thin its own is, and strangers on it meet more often than their density lets expect. The pairs show it.
+fn thinner(laid: &Patchwork) -> f64 {
+    let (sum, count) =
+        laid.predictions.iter().flatten().fold((0.0, 0.0), |(sum, count), at| (sum + at.variance, count + 1.0));
+    if sum == 0.0 {
+        return 1.0;
+    }
+    let sigma = f64::sqrt(sum / count);
+    let volume = (2.0 * std::f64::consts::PI).powf(1.5) * sigma.powi(3);
+    let clouds = [(laid.map, 1.0), (laid.query, laid.pose.scale)];
+    // Of both of a pair each counts the other.
+    let close = clouds.map(|(cloud, scale)| 0.5 * cloud.len() as f64 * cloud.companions.within_noise(sigma / scale));
+    let told = clouds.map(|(cloud, scale)| 0.5 * cloud.density.iter().sum::<f64>() * volume / scale.powi(3));
+    let [close, told] = [close, told].map(|both| both.iter().sum::<f64>());
+    ((close - close.sqrt()) / told).max(1.0)
 }
 
 /// The share under which evidence of this slope, which falls, is largest.
