@@ -35,8 +35,8 @@ const GROWN: usize = 6;
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
 const LEAST_LAID: f64 = 10.0;
 
-/// A row laid along a row whose visits both show less than this share of what either can have seen is a stranger: half of what
-/// is assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
+/// A row laid along a row of which less than this share is found, of what the map can show of it, is a stranger: half of what is
+/// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
 const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 
 /// A pose with this many times the evidence needed is no local optimum and has no rival.
