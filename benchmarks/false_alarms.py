@@ -8,6 +8,8 @@ where the last one stopped; `--anew` forgets what earlier builds did in the cell
 import argparse
 import sys
 import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
 
 import pomona
 from benchmarks.results import markdown, read_rows, write_rows, write_text
@@ -28,6 +30,8 @@ drawn, how many were `Found`, and how many were `Ambiguous`.
 """
 
 Key = tuple[str, float]
+Each = Callable[..., Iterable[str]]
+"""`map`, or that of a pool."""
 
 
 def main(arguments: list[str]) -> None:
@@ -36,14 +40,23 @@ def main(arguments: list[str]) -> None:
     counts = read_counts()
     for key in asked if options.anew else ():
         counts.pop(key, None)
+    if options.processes == 1:
+        _count_all(asked, counts, options, map)
+        return
+    with ProcessPoolExecutor(options.processes) as pool:
+        _count_all(asked, counts, options, pool.map)
+
+
+def _count_all(asked: list[Key], counts: dict[Key, dict[str, int]], options: argparse.Namespace, each: Each) -> None:
+    start_s = time.monotonic()
     for cell, rate in asked:
         pairs = options.pairs or MORE.get(cell, PAIRS)
         while (first := counts.get((cell, rate), {}).get("pairs", 0)) < pairs:
-            if time.process_time() > options.cpu_s:
-                sys.stderr.write(f"false_alarms: {options.cpu_s:g} s are spent, the next run goes on from here\n")
+            if time.monotonic() - start_s > options.most_s:
+                sys.stderr.write(f"false_alarms: {options.most_s:g} s are spent, the next run goes on from here\n")
                 return
             seeds = range(first, min(first + AT_ONCE, pairs))
-            counts[cell, rate] = counted(cell, rate, seeds, counts.get((cell, rate)))
+            counts[cell, rate] = counted(cell, rate, seeds, counts.get((cell, rate)), each)
             write(counts)
         sys.stderr.write(f"false_alarms: {cell} at {rate:g} done\n")
 
@@ -53,26 +66,26 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cells", nargs="+", choices=UNRELATED, default=UNRELATED, metavar="CELL")
     parser.add_argument("--rates", nargs="+", type=float, default=[NOMINAL], metavar="RATE")
     parser.add_argument("--pairs", type=int, help=f"of a cell; default {PAIRS}, of noov {MORE['noov']}")
-    parser.add_argument("--cpu-s", type=float, default=float("inf"), help="CPU seconds after which it stops")
+    parser.add_argument("--most-s", type=float, default=float("inf"), help="seconds after which it stops")
+    parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--anew", action="store_true", help="count from the first pair")
     return parser.parse_args(arguments)
 
 
-def counted(cell: str, rate: float, seeds: range, before: dict[str, int] | None) -> dict[str, int]:
+def counted(cell: str, rate: float, seeds: range, before: dict[str, int] | None, each: Each) -> dict[str, int]:
     """Add the verdicts of more pairs to those counted before."""
     counts = dict(before or {"pairs": 0, "found": 0, "ambiguous": 0})
-    for seed in seeds:
-        verdict = str(status(cell, seed, rate))
+    for verdict in each(status, [cell] * len(seeds), seeds, [rate] * len(seeds)):
         counts["pairs"] += 1
         counts["found"] += verdict == "Found"
         counts["ambiguous"] += verdict == "Ambiguous"
     return counts
 
 
-def status(cell: str, seed: int, rate: float) -> pomona.Verdict:
+def status(cell: str, seed: int, rate: float) -> str:
     pair = scene_pair(cell, seed)
     config = {"verified": {"false_alarm_rate": rate}}
-    return pomona.match(pair.query, pair.map, scale=pair.cell.scale, up=pair.up, config=config, threads=1).status
+    return str(pomona.match(pair.query, pair.map, scale=pair.cell.scale, up=pair.up, config=config, threads=1).status)
 
 
 def read_counts() -> dict[Key, dict[str, int]]:

@@ -160,7 +160,7 @@ def test_false_alarms_go_on_where_the_last_run_stopped(tmp_path, monkeypatch: py
     monkeypatch.setattr(results, "FOLDER", tmp_path)
     monkeypatch.setattr(false_alarms, "status", answered)
     monkeypatch.setattr(false_alarms, "AT_ONCE", 2)
-    false_alarms.main(["--cells", "noov", "--cpu-s", "0"])
+    false_alarms.main(["--cells", "noov", "--most-s", "0"])
     assert drawn == []
     false_alarms.main(["--cells", "noov", "vine-noov", "--pairs", "3"])
     false_alarms.main(["--cells", "noov", "--pairs", "5"])

@@ -222,6 +222,26 @@ PLANTINGS = {
         fruits_per_tree=(40, 70),
         height_m=2.3,
     ),
+    "vthin": RowShape(
+        wood="leaning",
+        wires_m=(0.5, 0.9, 1.3, 1.7, 2.1),
+        lean_rad=0.35,
+        spacing_m=1.0,
+        reach_along_m=0.5,
+        reach_depth_m=0.2,
+        scatter_m=(0.02, 0.03),
+        fruits_per_tree=(40, 70),
+        height_m=2.3,
+    ),
+    "wires": RowShape(
+        wood="arms",
+        wires_m=(0.7, 1.0, 1.3, 1.6),
+        reach_along_m=0.6,
+        scatter_m=(0.01, 0.02),
+        fruits_per_tree=(60, 90),
+        cluster_sizes=(0.7, 0.3),
+        height_m=2.0,
+    ),
     "cone": RowShape(
         wood="tiers",
         wires_m=(0.5, 0.85, 1.2, 1.55, 1.9, 2.25, 2.6),
@@ -234,8 +254,8 @@ PLANTINGS = {
         height_m=2.8,
     ),
 }
-"""How trees are trained: walls of wires, upright or as a V, a cordon with bunches below, roofs, thin trees, some with
-branches in tiers, and hedges."""
+"""How trees are trained: walls of wires, upright or as a V, both also as thin as the noise, a cordon with bunches below,
+roofs, thin trees, some with branches in tiers, and hedges."""
 
 PLANTING_CELLS = tuple(
     cell

@@ -1,5 +1,6 @@
 //! What chance puts at each place of a cloud: the density of strangers, near a fruit and at a distance from one.
 
+use super::layers::denser;
 use crate::neighbours::others::{Neighbours, each_row};
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,17 +9,19 @@ use nalgebra::{Matrix3, Vector3};
 /// Fruits hang in clusters: a wrong pose that lays one fruit on a cluster meets its other members for free. The
 /// narrow kernel prices that in. And they hang in walls and on wires: a wrong pose that lays a wall on itself, moved along,
 /// meets strangers within its thickness. A kernel that is wider than the wall would spread them to where none are, so it
-/// is as flat as the cloud around.
+/// is as flat as the cloud around; and where that is not as thin as what they hang on, the cloud moved along itself shows it.
 pub(super) fn local_density(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64, floor: f64) -> Vec<f64> {
     let flatness = flatness(points, neighbours, spacing);
-    each_row(points.len(), |row| {
+    let density = each_row(points.len(), |row| {
         let kernels = KERNELS.map(|width| Kernel::new(width * spacing, &flatness[row]));
         let from = |&other: &u32| {
             let apart = points[other as usize] - points[row];
             kernels.iter().map(|kernel| kernel.at(&apart)).sum::<f64>()
         };
         neighbours.of(row).iter().map(from).sum::<f64>() / KERNELS.len() as f64 + floor
-    })
+    });
+    let times = denser(points, neighbours, spacing, &density);
+    density.iter().map(|density| density * times).collect()
 }
 
 /// Widths of the kernels in spacings: of a cluster, and of a branch.
@@ -140,18 +143,6 @@ impl Companions {
         self.up_to(outer) - self.up_to(inner)
     }
 
-    /// Mean number of fruits about a fruit, each weighed by a Gaussian of its distance that is 1 at none.
-    pub(super) fn within_noise(&self, sigma: f64) -> f64 {
-        let step = 0.25 * sigma;
-        let weighed = |i: u32| {
-            let inner = f64::from(i) * step;
-            let middle = (inner + 0.5 * step) / sigma;
-            (-0.5 * middle * middle).exp() * self.between(inner, inner + step)
-        };
-        // To four standard deviations.
-        (0..16).map(weighed).sum()
-    }
-
     /// Fruits per volume at a distance from a fruit.
     pub(super) fn density(&self, distance: f64) -> f64 {
         let half = Self::HALF * self.bin;
@@ -220,18 +211,6 @@ mod tests {
         assert!(row.companions.between(0.0, 0.06) == 0.0 && row.companions.between(0.11, 0.45) == 0.0);
         assert!((row.companions.density(0.09) * shell(0.06, 0.12) - 1.0).abs() < 0.1);
         assert!(row.companions.density(0.3) == 0.0);
-    }
-
-    #[test]
-    fn companions_within_the_noise_are_as_many_as_a_density_puts_there() {
-        let mut dice = Dice(3);
-        let fruits = (0..4000).map(|_| [4.0, 4.0, 4.0].map(|length| length * dice.uniform()).into()).collect();
-        let row = Landscape::new(&FruitCloud::from_positions(fruits));
-        for sigma in [0.05, 0.1] {
-            let volume = (2.0 * std::f64::consts::PI).powf(1.5) * f64::powi(sigma, 3);
-            let times = row.companions.within_noise(sigma) / (4000.0 / 64.0 * volume);
-            assert!((0.88..1.1).contains(&times), "{times}");
-        }
     }
 
     #[test]

@@ -16,7 +16,6 @@ use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::pairing::Meeting;
 use super::patches::{Landing, Patchwork};
 use crate::beliefs::Beliefs;
-use crate::statistics::gaussian;
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
 /// misses: of rows with 15 % in common 4 of 100 were no longer found.
@@ -30,13 +29,12 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let here: Vec<f64> = laid.predictions.iter().enumerate().map(shown).collect();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
-    let denser = denser(laid);
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..TURNS {
         let edge = |meeting: &Meeting| {
             let (seen, there) = (share * meeting.support, there[meeting.map as usize]);
-            let strangers = denser * map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
+            let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
             meeting.edge(seen * meeting.density / strangers)
         };
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
@@ -45,27 +43,6 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
         share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
     }
     evidence
-}
-
-/// How many times as dense as the map's density says both visits are around their fruits, as their pairs show that are as close
-/// as the noise of the predictions, less one standard deviation; 1 at the least.
-///
-/// Where walls stand side by side, as the legs of a V, or wires hang above each other, the neighbours of a fruit do not show how
-/// thin its own is, and strangers on it meet more often than their density lets expect. The pairs show it.
-fn denser(laid: &Patchwork) -> f64 {
-    let (sum, count) =
-        laid.predictions.iter().flatten().fold((0.0, 0.0), |(sum, count), at| (sum + at.variance, count + 1.0));
-    if sum == 0.0 {
-        return 1.0;
-    }
-    let sigma = f64::sqrt(sum / count);
-    let volume = 1.0 / gaussian(0.0, sigma * sigma);
-    let clouds = [(laid.map, 1.0), (laid.query, laid.pose.scale)];
-    // Of both of a pair each counts the other.
-    let close = clouds.map(|(cloud, scale)| 0.5 * cloud.len() as f64 * cloud.companions.within_noise(sigma / scale));
-    let told = clouds.map(|(cloud, scale)| 0.5 * cloud.density.iter().sum::<f64>() * volume / scale.powi(3));
-    let [close, told] = [close, told].map(|both| both.iter().sum::<f64>());
-    ((close - close.sqrt()) / told).max(1.0)
 }
 
 /// The share under which evidence of this slope, which falls, is largest.
@@ -92,9 +69,8 @@ fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::FruitCloud;
     use crate::geometry::{Scale, Similarity};
-    use crate::verified::fixture::{Dice, visits};
+    use crate::verified::fixture::visits;
     use crate::verified::hypothesis::Model;
     use crate::verified::landscape::Landscape;
     use nalgebra::Vector3;
@@ -116,29 +92,6 @@ mod tests {
             assert!((likeliest_share(|share| turn - share) - turn).abs() < 0.002);
         }
         assert!((likeliest_share(|_| 1.0) - most).abs() < 0.002 && (likeliest_share(|_| -1.0) - least).abs() < 0.002);
-    }
-
-    #[test]
-    fn strangers_are_denser_than_they_look_where_fruits_hang_in_thin_walls_side_by_side() {
-        let model = Model { sigma: 0.04, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
-        let times = |spread: fn(Vector3<f64>, f64) -> Vector3<f64>| {
-            let mut dice = Dice(7);
-            let mut cloud = || {
-                let fruit = |_| {
-                    let place = Vector3::new(6.0 * dice.uniform(), dice.uniform() - 0.5, 0.4 + 2.0 * dice.uniform());
-                    spread(place, 0.02 * dice.normal().x).into()
-                };
-                Landscape::new(&FruitCloud::from_positions((0..300).map(fruit).collect()))
-            };
-            let (query, map) = (cloud(), cloud());
-            let mut laid = Patchwork::new(&query, &map, Similarity::identity(), model.sigma, &model);
-            laid.predictions =
-                query.points.iter().map(|&place| Some(Landing { place, variance: 0.04 * 0.04 })).collect();
-            denser(&laid)
-        };
-        // The legs of a V, two centimetres thick; and a box.
-        let legs = times(|p, off| Vector3::new(p.x, p.y.signum() * (0.1 + 0.36 * p.z) + off, p.z));
-        assert!(legs > 1.4 && times(|p, _| p) < 1.1, "{legs}");
     }
 
     #[test]

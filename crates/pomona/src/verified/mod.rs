@@ -38,6 +38,7 @@ mod footing;
 mod growth;
 mod hypothesis;
 mod landscape;
+mod layers;
 mod offsets;
 mod outlier;
 mod overlap;
