@@ -11,6 +11,7 @@ NAMES = (
     "cells",
     "false_alarms",
     "chance",
+    "sizes",
     "units",
     "detector",
     "stereo",

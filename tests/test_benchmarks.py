@@ -4,16 +4,19 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from benchmarks import cells, cells_report, chance, false_alarms, kinect, results, season
+from benchmarks import cells, cells_report, chance, false_alarms, kinect, results, season, sizes
 from benchmarks.disturb import dropped, moved, with_false_points
-from benchmarks.oracle import GATE_CHI2, assign_in_gate, gated_pairs, oracle_pairs
+from benchmarks.oracle import assign_in_gate, gated_pairs, oracle_pairs
 from benchmarks.pose import pose_error
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 import pomona
 from pomona.cloud import FruitCloud
 from pomona.evaluate import PairScore, score_pairs
 from pomona.synth.clouds import scene_pair
+
+GATE_CHI2 = {dimensions: float(chi2.ppf(0.99, df=dimensions)) for dimensions in (3, 4)}
 
 
 def pose(rotvec=(0.0, 0.0, 0.0), shift=(0.0, 0.0, 0.0), scale=1.0) -> np.ndarray:
@@ -26,19 +29,21 @@ def pose(rotvec=(0.0, 0.0, 0.0), shift=(0.0, 0.0, 0.0), scale=1.0) -> np.ndarray
 def best_gain(query: np.ndarray, map_: np.ndarray, sigma_m: float) -> float:
     """Likelihood gained over leaving everything alone, by trying every assignment."""
     cost = (np.linalg.norm(query[:, None] - map_[None], axis=2) / sigma_m) ** 2
-    gains = np.maximum(0.0, (GATE_CHI2 - cost) / 2.0)
+    gains = np.maximum(0.0, (GATE_CHI2[query.shape[1]] - cost) / 2.0)
     return max(sum(gains[row, column] for row, column in enumerate(order)) for order in permutations(range(len(map_))))
 
 
+@pytest.mark.parametrize("dimensions", [3, 4])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_oracle_assigns_with_the_greatest_likelihood(seed: int) -> None:
+def test_the_oracle_assigns_with_the_greatest_likelihood(seed: int, dimensions: int) -> None:
     rng = np.random.default_rng(seed)
-    query, map_ = rng.uniform(0.0, 0.15, (6, 3)), rng.uniform(0.0, 0.15, (6, 3))
+    query, map_ = rng.uniform(0.0, 0.15, (2, 6, dimensions))
+    gate_chi2 = GATE_CHI2[dimensions]
     pairs = assign_in_gate(query, map_, 0.03)
     assert len(np.unique(pairs[:, 0])) == len(np.unique(pairs[:, 1])) == len(pairs)
     distances = np.linalg.norm(query[pairs[:, 0]] - map_[pairs[:, 1]], axis=1) / 0.03
-    assert (distances**2 < GATE_CHI2).all()
-    assert ((GATE_CHI2 - distances**2) / 2.0).sum() == pytest.approx(best_gain(query, map_, 0.03))
+    assert (distances**2 < gate_chi2).all()
+    assert ((gate_chi2 - distances**2) / 2.0).sum() == pytest.approx(best_gain(query, map_, 0.03))
 
 
 def test_the_oracle_finds_nothing_between_clouds_far_apart() -> None:
@@ -55,6 +60,13 @@ def test_the_oracles_reach_what_the_cells_were_described_with(cell: str, precisi
     assert gated.precision == pytest.approx(precision, abs=0.03)
     assert gated.recall == pytest.approx(recall, abs=0.03)
     assert oracle.precision + oracle.recall > gated.precision + gated.recall - 0.02
+
+
+def test_sizes_that_all_grew_alike_bring_the_oracle_and_the_matcher_pairs() -> None:
+    verified, likelihood = sizes.of_cell("grown175", 2)
+    assert verified["R with sizes"] > verified["R"] + 0.08
+    assert likelihood["P with sizes"] > likelihood["P"] + 0.08
+    assert likelihood["gain of F1"] > 0.08
 
 
 def test_pose_errors_are_angle_shift_at_the_centre_and_ratio() -> None:
