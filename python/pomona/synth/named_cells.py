@@ -254,8 +254,8 @@ PLANTINGS = {
         height_m=2.8,
     ),
 }
-"""How trees are trained: walls of wires, upright or as a V, both also as thin as the noise, a cordon with bunches below,
-roofs, thin trees, some with branches in tiers, and hedges."""
+"""How trees are trained: walls of wires, upright or as a V, both also as thin as the noise, a cordon with bunches
+below, roofs, thin trees, some with branches in tiers, and hedges."""
 
 PLANTING_CELLS = tuple(
     cell
