@@ -7,6 +7,7 @@ and recall. Writes sizes.csv and sizes.md.
 """
 
 import argparse
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -61,7 +62,7 @@ def _sized(pair: ScenePair) -> NDArray[np.int64]:
     return gated_pairs(pair, ((sizes[0] + grown.mean()) / grown.std(), sizes[1] / grown.std()))
 
 
-def _scores(pairs: list[ScenePair], answers: "map[NDArray[np.int64]]") -> tuple[float, float]:
+def _scores(pairs: list[ScenePair], answers: Iterable[NDArray[np.int64]]) -> tuple[float, float]:
     """Precision and recall over all pairs of visits."""
     scores = [
         score_pairs(answer.tolist(), pair.query.ids or (), pair.map.ids or ())

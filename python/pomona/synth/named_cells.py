@@ -148,6 +148,19 @@ ROW_CELLS = tuple(
     )
 )
 
+_V_TRELLIS = RowShape(
+    wood="leaning",
+    wires_m=(0.5, 0.9, 1.3, 1.7, 2.1),
+    lean_rad=0.35,
+    spacing_m=1.0,
+    reach_along_m=0.5,
+    reach_depth_m=0.2,
+    scatter_m=(0.05, 0.06),
+    flatness=(1.0, 1.0, 0.6),
+    fruits_per_tree=(40, 70),
+    height_m=2.3,
+)
+
 PLANTINGS = {
     "trellis": RowShape(
         wood="arms",
@@ -210,29 +223,8 @@ PLANTINGS = {
         scatter_m=(0.06, 0.09),
         fruits_per_tree=(50, 90),
     ),
-    "vtrellis": RowShape(
-        wood="leaning",
-        wires_m=(0.5, 0.9, 1.3, 1.7, 2.1),
-        lean_rad=0.35,
-        spacing_m=1.0,
-        reach_along_m=0.5,
-        reach_depth_m=0.2,
-        scatter_m=(0.05, 0.06),
-        flatness=(1.0, 1.0, 0.6),
-        fruits_per_tree=(40, 70),
-        height_m=2.3,
-    ),
-    "vthin": RowShape(
-        wood="leaning",
-        wires_m=(0.5, 0.9, 1.3, 1.7, 2.1),
-        lean_rad=0.35,
-        spacing_m=1.0,
-        reach_along_m=0.5,
-        reach_depth_m=0.2,
-        scatter_m=(0.02, 0.03),
-        fruits_per_tree=(40, 70),
-        height_m=2.3,
-    ),
+    "vtrellis": _V_TRELLIS,
+    "vthin": replace(_V_TRELLIS, scatter_m=(0.02, 0.03), flatness=(1.0, 1.0, 1.0)),
     "wires": RowShape(
         wood="arms",
         wires_m=(0.7, 1.0, 1.3, 1.6),

@@ -21,8 +21,7 @@ const UNSURE: f64 = 2.0;
 
 /// How many times as dense as `density` says strangers are, less what few pairs may show by chance; 1 at the least.
 ///
-/// Of the three axes of the cloud the one counts along which most fruits meet. Crowns give 0.4 to 0.8, walls and roofs 0.6 to 1.1,
-/// wires 1.5 to 3 and the legs of a V 2 to 4.
+/// Of the three axes of the cloud the one counts along which most fruits meet.
 pub(super) fn denser(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64, density: &[f64]) -> f64 {
     let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let scatter = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum::<Matrix3<f64>>();
@@ -71,7 +70,7 @@ fn moved_along(
 mod tests {
     use super::*;
     use crate::cloud::FruitCloud;
-    use crate::statistics::upper_median;
+    use crate::statistics::{gaussian, upper_median};
     use crate::verified::fixture::Dice;
     use crate::verified::landscape::Landscape;
 
@@ -110,7 +109,7 @@ mod tests {
         let variance = (NOISE * landscape.spacing).powi(2);
         let ratio = |p: &Vector3<f64>| {
             let of = |(at, q): (usize, &Vector3<f64>)| {
-                crate::statistics::gaussian((q + landscape.centre - p).norm_squared(), variance) / landscape.density[at]
+                gaussian((q + landscape.centre - p).norm_squared(), variance) / landscape.density[at]
             };
             landscape.points.iter().enumerate().map(of).sum::<f64>()
         };
