@@ -196,3 +196,11 @@ def test_two_million_points_take_the_fast_path(tmp_path: Path) -> None:
     cloud = FruitCloud.read(path)
     assert len(cloud) == n
     np.testing.assert_array_equal(cloud.positions[-1], [1999.25, 999.5, 0.125])
+
+
+def test_a_fruit_whose_squared_distance_is_no_number_is_told_by_its_row(tmp_path: Path) -> None:
+    """And by nothing else: warnings of numpy are errors here."""
+    rows = "".join(f"{0.1 * i},{0.1 * (i % 3)},0\n" for i in range(20))
+    path = write(tmp_path, f"x,y,z\n{rows}1e300,0,0\n")
+    with pytest.warns(PomonaWarning, match="row 20: found a fruit 1e.300 m from the middle of all"):
+        assert len(FruitCloud.read(path)) == 21

@@ -74,7 +74,7 @@ def check_places(path: Path, positions: NDArray[np.float64]) -> None:
     if len(positions) < MIN_FRUITS:
         return
     spacing_m = _spacing_m(positions)
-    reach_m = np.linalg.norm(positions - np.median(positions, axis=0), axis=1)
+    reach_m = np.hypot.reduce(positions - np.median(positions, axis=0), axis=1)  # squares may overflow
     if not MIN_SPACING_M <= spacing_m <= MAX_SPACING_M:
         warnings.warn(
             f"{path}: neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to "
