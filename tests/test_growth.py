@@ -13,11 +13,12 @@ import pytest
 from benchmarks.growth_draw import draw_sizes
 from benchmarks.growth_outside import course_outside
 from benchmarks.growth_scores import scores
+from numpy.typing import NDArray
 
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.growth.blocks import blocks_of
-from pomona.growth.curve_families import FAMILIES
+from pomona.growth.curve_families import FAMILIES, CurveFamily, FamilyName
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.fitting import fit_shape
 from pomona.growth.hierarchy import Hierarchy, Shape
@@ -203,14 +204,30 @@ def test_the_same_map_gives_the_same_growth(row: GrownRow, grown: SeasonGrowth) 
     np.testing.assert_array_equal(again.foretold.summaries["counts"], grown.foretold.summaries["counts"])
 
 
-def test_the_families_are_told_apart_where_sizes_tell() -> None:
-    """Two hundred fruits without noise to speak of, over a season in which growth ends; slower ends are also strays."""
-    times = np.linspace(140.0, 260.0, 9)
+def _exact_sizes(family: CurveFamily, rate_per_day: float, times: NDArray[np.float64]) -> SizeTable:
+    """Two hundred fruits, 74 mm as a median on the last day, without noise to speak of."""
     rng = np.random.default_rng(3)
-    sizes = np.exp(4.3 + 0.06 * rng.normal(size=(200, 1)) + FAMILIES["logistic"].log_size(0.09 * (times - 140.0)))
-    table = SizeTable.of(sizes + rng.normal(0.0, 0.2, sizes.shape), np.zeros(200, np.int64), times)
+    curve = family.log_size(rate_per_day * (times - times[0] + 10.0))
+    sizes = np.exp(4.3 + 0.06 * rng.normal(size=(200, 1)) + curve - curve[-1])
+    return SizeTable.of(sizes + rng.normal(0.0, 0.2, sizes.shape), np.zeros(200, np.int64), times)
+
+
+@pytest.mark.parametrize("truth", FAMILIES)
+def test_the_families_are_told_apart_where_sizes_tell(truth: FamilyName) -> None:
+    """Over a season in which growth ends. By little: any other curve is one that growth has strayed from."""
+    table = _exact_sizes(FAMILIES[truth], FAMILIES[truth].usual_rate_per_day, np.linspace(120.0, 360.0, 9))
     evidence = {name: fit_shape(table, family).log_evidence for name, family in FAMILIES.items()}
-    assert evidence.pop("logistic") > max(evidence.values()) + 10.0
+    assert max(evidence, key=lambda name: evidence[name]) == truth
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+def test_rounding_does_not_end_the_climb(family: CurveFamily) -> None:
+    """Sums in another order round differently; sizes this exact, of a rate that nobody expects, make steep slopes."""
+    table = _exact_sizes(FAMILIES["logistic"], 0.09, np.linspace(140.0, 260.0, 9))
+    turned = SizeTable.of(np.exp(table.logs[::-1]), table.trees, table.times)
+    fits = [fit_shape(each, family) for each in (table, turned)]
+    assert fits[0].log_evidence == pytest.approx(fits[1].log_evidence, abs=0.05)
+    assert fits[0].likeliest.rate_per_day == pytest.approx(fits[1].likeliest.rate_per_day, rel=0.01)
 
 
 def test_a_size_of_another_fruit_is_put_aside(tmp_path: Path, row: GrownRow, grown: SeasonGrowth) -> None:

@@ -35,8 +35,8 @@ _MOST_FRUITS = 300
 _GRADIENT = 0.05
 """At which the climb ends: the draws are weighted, so their middle need not be the mode to the last digit."""
 
-_STEP = 0.05
-"""Of the finite differences, in standard deviations of the prior."""
+_STEP, _FINE_STEP = 0.05, 1e-3
+"""Of the differences that tell the curvature and the slope, in standard deviations of the prior."""
 
 _IMPOSSIBLE = -1e9
 """Logarithm of a likelihood below any that is met."""
@@ -78,6 +78,11 @@ class _Posterior:
     def cost(self, z: Numbers) -> float:
         return -self(z)
 
+    def slope_of_cost(self, z: Numbers) -> Numbers:
+        """By central differences: one-sided ones of 1e-8 drown in rounding, and the climb ends on the way."""
+        steps = _FINE_STEP * np.eye(len(z))
+        return np.array([self.cost(z + step) - self.cost(z - step) for step in steps]) / (2.0 * _FINE_STEP)
+
 
 @dataclass(frozen=True, eq=False)
 class FittedShape:
@@ -111,7 +116,8 @@ class FittedShape:
 def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
     """Fit the shape of one family to a table of at least two visits at different times."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    mode: Numbers = minimize(posterior.cost, np.zeros(len(_SPREADS) + 2), method="BFGS", tol=_GRADIENT).x
+    start = np.zeros(len(_SPREADS) + 2)
+    mode: Numbers = minimize(posterior.cost, start, method="BFGS", jac=posterior.slope_of_cost, tol=_GRADIENT).x
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
     # Where the differences see no bend, the prior's own is there.
     root = np.asarray(axes / np.sqrt(np.maximum(values, 1.0)))
