@@ -67,6 +67,16 @@ def test_a_frame_that_stands_out_of_all_other_poses_is_found(seed: int) -> None:
     assert stages["threshold_nats"] < stages["best_nats"] < 42.0
 
 
+def test_a_frame_is_found_among_a_thousand_trees() -> None:
+    """Shapes that five trees show rarely are common in so large a map, and all that there is to go by."""
+    pair = scene_pair("frame40-trees1000", 10)
+    match = pomona.match(pair.query, pair.map)
+    assert match.status == "Found"
+    assert match.map_from_query is not None
+    error_m = (match.map_from_query - pair.map_from_query) @ [*pair.query.positions.mean(axis=0), 1.0]
+    assert np.linalg.norm(error_m) < 0.05
+
+
 def dozen(seed: int) -> list[FruitCloud]:
     """Two visits to twelve fruits of a flat tree: ten of them each and a false one, 2 cm of noise."""
     random = np.random.default_rng(seed)

@@ -69,6 +69,19 @@ pub(crate) fn maxwell(x: f64) -> f64 {
     erf(x / std::f64::consts::SQRT_2) - (2.0 / std::f64::consts::PI).sqrt() * x * (-0.5 * x * x).exp()
 }
 
+/// Distribution of the length of a normal vector whose variances along its axes are these, to .005 for `(1, 1, 4) / 2`.
+///
+/// Along each way it is Maxwell's; the mean over all ways is that of the 26 of Lebedev's rule of degree 7, of which those
+/// that differ by signs are one here.
+pub(crate) fn length_within(x: f64, variances: &[f64; 3]) -> f64 {
+    let [a, b, c] = *variances;
+    let along = |variance: f64| maxwell(x / variance.sqrt());
+    let (axes, edges) = (2.0 / 21.0, 16.0 / 105.0);
+    axes * (along(a) + along(b) + along(c))
+        + edges * (along(0.5 * (a + b)) + along(0.5 * (a + c)) + along(0.5 * (b + c)))
+        + (1.0 - 3.0 * (axes + edges)) * along((a + b + c) / 3.0)
+}
+
 /// Error function of x >= 0 to 1.5e-7 (Abramowitz and Stegun 7.1.26).
 fn erf(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.327_591_1 * x);
@@ -137,6 +150,23 @@ mod tests {
         assert!(maxwell(0.0).abs() < 1e-6);
         assert!((maxwell(1.538_17) - 0.5).abs() < 1e-4); // its median
         assert!((maxwell(6.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_distribution_of_lengths_of_noise_that_is_long_one_way_is_that_of_its_integral() {
+        // P(|x| < r) = integral of N(z; 0, 2) (1 - exp(z^2 - r^2)) over |z| < r, by Simpson's rule.
+        let exact = |r: f64| {
+            let at =
+                |z: f64| (-0.25 * z * z).exp() / (4.0 * std::f64::consts::PI).sqrt() * (1.0 - (z * z - r * r).exp());
+            let step = r / 200.0;
+            let part = |z: f64| (at(z) + 4.0 * at(z + 0.5 * step) + at(z + step)) * step / 6.0;
+            (-200..200).map(|i| part(f64::from(i) * step)).sum::<f64>()
+        };
+        for r in [0.3, 0.8, 1.2, 1.8, 2.5, 4.0] {
+            let (found, exact) = (length_within(r, &[0.5, 2.0, 0.5]), exact(r));
+            assert!((found - exact).abs() < 0.005, "{r}: {found} for {exact}");
+            assert!((length_within(r, &[1.0; 3]) - maxwell(r)).abs() < 1e-12);
+        }
     }
 
     #[test]

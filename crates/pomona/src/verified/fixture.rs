@@ -23,6 +23,11 @@ impl Dice {
 
 /// Clusters of three, 8 cm apart, in a box of 4 x 2 x 1 m; two visits that see 0.6 of them with `sigma` between them.
 pub(super) fn visits(sigma: f64) -> (FruitCloud, FruitCloud) {
+    visits_of(&Vector3::repeat(sigma))
+}
+
+/// The same with a standard deviation along each axis.
+pub(super) fn visits_of(sigma: &Vector3<f64>) -> (FruitCloud, FruitCloud) {
     let mut dice = Dice(7);
     let (mut query, mut map) = (Vec::new(), Vec::new());
     for _ in 0..200 {
@@ -31,7 +36,7 @@ pub(super) fn visits(sigma: f64) -> (FruitCloud, FruitCloud) {
             let fruit = middle + dice.normal() * 0.08 / 3f64.sqrt();
             for visit in [&mut query, &mut map] {
                 if dice.uniform() < 0.6 {
-                    visit.push(Point3::from(fruit + dice.normal() * sigma / 2f64.sqrt()));
+                    visit.push(Point3::from(fruit + dice.normal().component_mul(sigma) / 2f64.sqrt()));
                 }
             }
         }

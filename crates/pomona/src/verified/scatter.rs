@@ -4,16 +4,16 @@
 //! are counted: the fruit itself, where it was seen again, at the distance that the noise gives; and its companions,
 //! which hang as each visit shows them around its own fruits. The second is known, so the first is what is left:
 //!
-//! `H(d) = u (p f(d; sigma) + b g(d))`, f Maxwell's distribution, g the companions of a fruit, u the fruits that the
-//! other visit could have shown. Nobody has to say who is who. Estimates from pairs do, and take the nearest for the
-//! true one where fruits crowd, so that the noise comes out small.
+//! `H(d) = u (p f(d; sigma) + b g(d))`, f the distribution of the lengths of noise (Maxwell's where it is a sphere), g the
+//! companions of a fruit, u the fruits that the other visit could have shown. Nobody has to say who is who. Estimates from
+//! pairs do, and take the nearest for the true one where fruits crowd, so that the noise comes out small.
 
 use super::chance::{BIN, shell};
 use super::hypothesis::SHARES;
 use super::patches::Patchwork;
 use crate::neighbours::others::SHARE_OF_ROWS;
 use crate::neighbours::tree::single;
-use crate::statistics::maxwell;
+use crate::statistics::length_within;
 use rayon::prelude::*;
 
 /// What is known of the noise beforehand.
@@ -38,6 +38,8 @@ struct Counts {
     due: f64,
     /// How surely the map would show one that it would show, in the mean.
     usual: f64,
+    /// Of the noise along its axes, over their mean.
+    variances: [f64; 3],
 }
 
 /// Up to 1.25 spacings.
@@ -112,12 +114,14 @@ impl Counts {
             let both = 0.5 * (seen + map.companions.between(inner, outer));
             due * both.max(map.floor * shell(inner, outer))
         });
-        Self { bin, across, companions, due, usual: if due > 0.0 { squares / due } else { 1.0 } }
+        let usual = if due > 0.0 { squares / due } else { 1.0 };
+        Self { bin, across, companions, due, usual, variances: laid.direction.variances() }
     }
 
     /// Log-likelihood of the counts under the noise, with the share that suits it; and the density of companions that does.
     fn likelihood(&self, sigma: f64) -> (f64, f64) {
-        let cumulative: [f64; BINS + 1] = std::array::from_fn(|i| maxwell(i as f64 * self.bin / sigma));
+        let cumulative: [f64; BINS + 1] =
+            std::array::from_fn(|i| length_within(i as f64 * self.bin / sigma, &self.variances));
         let bins = || {
             let found = cumulative.windows(2).map(|ends| self.due * (ends[1] - ends[0]));
             self.across.iter().zip(&self.companions).zip(found)
@@ -148,26 +152,43 @@ impl Counts {
 mod tests {
     use super::*;
     use crate::geometry::{Scale, Similarity};
-    use crate::verified::fixture::visits;
+    use crate::verified::direction::Direction;
+    use crate::verified::fixture::visits_of;
     use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::landscape::Landscape;
     use crate::verified::patches::Landing;
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix3, Vector3};
+
+    /// Noise of visits that lie on each other, as it is found where so much was told and it is expected to point somewhere.
+    fn found(noise: [f64; 3], told: KnownNoise, direction: Direction) -> f64 {
+        let (query, map) = visits_of(&Vector3::from(noise));
+        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
+        let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
+        let model = Model { sigma: told.sigma, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
+        let mut laid = Patchwork::new(&query, &map, Similarity::identity(), told.sigma, &model);
+        laid.predictions = query.points.iter().map(place).collect();
+        laid.direction = direction;
+        scatter(&laid, told).sigma
+    }
 
     #[test]
     fn noise_is_told_where_the_nearest_is_often_a_stranger() {
         for sigma in [0.01, 0.02, 0.04] {
-            let (query, map) = visits(sigma);
-            let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-            let place = |p: &Vector3<f64>| Some(Landing { place: p + query.centre - map.centre, variance: 1.0 });
-            let model = Model { sigma, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
-            let mut laid = Patchwork::new(&query, &map, Similarity::identity(), sigma, &model);
-            laid.predictions = query.points.iter().map(place).collect();
             // A guess, and what a caller says and is wrong by a factor of two.
             for (told, width, off) in [(0.02, GUESSED, 0.12), (0.5 * sigma, GIVEN, 0.15), (2.0 * sigma, GIVEN, 0.15)] {
-                let found = scatter(&laid, KnownNoise { sigma: told, width }).sigma;
+                let found = found([sigma; 3], KnownNoise { sigma: told, width }, Direction::default());
                 assert!((found / sigma - 1.0).abs() < off, "{found} for {sigma}, told {told}");
             }
         }
+    }
+
+    #[test]
+    fn noise_that_is_long_one_way_is_told_where_the_way_is_known() {
+        let guess = KnownNoise { sigma: 0.02, width: GUESSED };
+        let [round, long] = [Direction::default(), Direction::long_in_depth(&Matrix3::identity())]
+            .map(|direction| found([0.015, 0.015, 0.03], guess, direction));
+        let mean = (2.0f64 * 0.015 * 0.015 + 0.03 * 0.03).sqrt() / 3f64.sqrt();
+        assert!((long / mean - 1.0).abs() < 0.1, "{long} for {mean}");
+        assert!((long / mean).ln().abs() < (round / mean).ln().abs(), "{long} {round} for {mean}");
     }
 }

@@ -100,7 +100,7 @@ impl Search<'_> {
             Scale::Metric => WITHIN * (length / (long * sigma)).clamp(1.0, widest),
             Scale::Free => WITHIN,
         };
-        let (mut runs, mut hits) = (Vec::new(), Vec::new());
+        let (mut runs, mut hits, common) = (Vec::new(), Vec::new(), common_in(index.quads.len()));
         near_ties(&query.points, seed.0, WITHIN * sigma, &mut |quad, code| {
             effort.codes += 1;
             let (code, radius) = match model.scale {
@@ -111,7 +111,7 @@ impl Search<'_> {
             index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
             effort.candidates += hits.len() as u64;
             // A shape that every cluster shows says nothing about the place.
-            if hits.is_empty() || hits.len() > COMMON {
+            if hits.is_empty() || hits.len() > common {
                 return;
             }
             let Some(proposer) = Proposer::new(query, map, &model, quad) else { return };
@@ -136,8 +136,18 @@ impl Search<'_> {
 /// where the length tells: a long seed has few lookalikes.
 const LONG: (f64, f64) = (24.0, 2.0);
 
-/// Seeds whose code has more neighbours in the map than this are passed over.
-const COMMON: usize = 48;
+/// Neighbours of a code that every cluster shows, in a map of no more seeds than this: some eight trees.
+const COMMON: (f64, f64) = (48.0, 5e4);
+
+/// Seeds whose code has more neighbours than this in a map of so many seeds are passed over.
+///
+/// A map of a thousand trees has as many more lookalikes of every seed. Were those passed over that have 48, hardly any seed
+/// of a frame would be asked there; were as rare ones asked as in a row, they would cost as much more as the map is larger.
+/// The root lies between.
+fn common_in(seeds: usize) -> usize {
+    let (most, usual) = COMMON;
+    (most * (seeds as f64 / usual).max(1.0).sqrt()) as usize
+}
 
 /// One seed of every `stride`-th fruit for each of `turns`.
 pub(crate) fn of_some_fruits(query: &Landscape, stride: u64, turns: std::ops::Range<u64>) -> Vec<Seed> {
