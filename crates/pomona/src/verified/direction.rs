@@ -13,8 +13,7 @@ type Seen = (Matrix3<f64>, f64);
 /// Pairs that a pose takes up: it has six numbers, a pair three.
 const FITTED: f64 = 2.0;
 
-/// Noise in the depth of a row over that along it and up, where visits from opposite sides err in depth: stereo at 2 m does so
-/// twice as far.
+/// Noise in the depth of a row over that along it and up, where it is expected to be long; many pairs show their own.
 const DEPTH: f64 = 2.0;
 
 /// Shape of the noise, as it is expected and as pairs show it.
