@@ -9,6 +9,8 @@
 //!   + sum over both visits ln(1 - p u) + p sum over the query u
 //! ```
 //!
+//! p is a visit's own ([`of_either`]): pairs are as many for both, so of the visit that shows more fruits a smaller share is seen again.
+//!
 //! No fruit is tested on a fit that it took part in. So a wrong pose that bent towards strangers scores less here than
 //! when it grew, below zero where nothing was selected.
 
@@ -32,17 +34,32 @@ pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let mut share = DETECTION;
     let mut evidence = 0.0;
     for _ in 0..TURNS {
+        let [of_query, of_map] = of_either(share, due);
         let edge = |meeting: &Meeting| {
-            let (seen, there) = (share * meeting.support, there[meeting.map as usize]);
-            let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - share * there);
+            let (seen, there) = (of_query * meeting.support, there[meeting.map as usize]);
+            let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - of_map * there);
             meeting.edge(seen * meeting.density / strangers)
         };
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
-        let alone: f64 = here.iter().chain(&there).map(|support| (1.0 - share * support).ln()).sum();
-        evidence = beliefs.log_sum + alone + share * due[0];
-        share = seen_again(beliefs.probabilities.iter().sum(), due).clamp(SHARES.0, SHARES.1);
+        let alone = |share: f64, supports: &[f64]| supports.iter().map(|u| (1.0 - share * u).ln()).sum::<f64>();
+        evidence = beliefs.log_sum + alone(of_query, &here) + alone(of_map, &there) + of_query * due[0];
+        let found: f64 = beliefs.probabilities.iter().sum();
+        share = (found / fewer(due)).clamp(SHARES.0, SHARES.1);
     }
     evidence
+}
+
+/// Shares of the fruits that the query and the map show in an overlap which are pairs, where they show `due` fruits there and the
+/// one that shows fewer has this `share` of its own in common.
+///
+/// Of trees that the two see with probabilities a and b, b of what the query shows is in the map and a of what the map shows in the
+/// query. A frame, or a visit before the harvest, shows far from as many fruits as the other.
+pub(super) fn of_either(share: f64, due: [f64; 2]) -> [f64; 2] {
+    due.map(|own| share * fewer(due) / own.max(1.0))
+}
+
+fn fewer([here, there]: [f64; 2]) -> f64 {
+    here.min(there).max(1.0)
 }
 
 /// The share under which evidence of this slope, which falls, is largest.
@@ -56,16 +73,6 @@ pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The share p under which `found` pairs are likeliest, where the query and the map show so many fruits in the overlap.
-///
-/// With m and n of them and f pairs the evidence is `f ln p + (m + n - 2 f) ln(1 - p) + p m` and a constant: its largest value
-/// is where `m p^2 + (n - f) p = f`. Visits that show as many give p = f / n; a frame that ends amid a crown gives less than
-/// the share of its own fruits that are found.
-fn seen_again(found: f64, [here, there]: [f64; 2]) -> f64 {
-    let (here, missed) = (here.max(1.0), (there - found).max(0.0));
-    ((missed * missed + 4.0 * here * found).sqrt() - missed) / (2.0 * here)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,13 +83,17 @@ mod tests {
     use nalgebra::Vector3;
 
     #[test]
-    fn the_share_seen_again_makes_the_evidence_largest() {
-        let [found, here, there] = [19.0, 23.0, 76.0];
-        let evidence = |p: f64| found * p.ln() + (here + there - 2.0 * found) * (1.0 - p).ln() + p * here;
-        let share = seen_again(found, [here, there]);
-        assert!([-0.01, 0.01].iter().all(|step| evidence(share + step) < evidence(share)));
-        assert!((seen_again(60.0, [100.0, 100.0]) - 0.6).abs() < 1e-12);
-        assert!(seen_again(0.0, [0.0, 5.0]).abs() < 1e-12);
+    fn the_shares_that_the_pairs_show_make_the_evidence_largest() {
+        for due @ [here, there] in [[23.0, 76.0], [76.0, 23.0], [40.0, 40.0]] {
+            let found = 19.0;
+            let evidence = |share: f64| {
+                let [p, q] = of_either(share, due);
+                found * p.ln() + (here - found) * (1.0 - p).ln() + (there - found) * (1.0 - q).ln() + p * here
+            };
+            let share = found / fewer(due);
+            assert_eq!(of_either(share, due), [found / here, found / there]);
+            assert!([-0.01, 0.01].iter().all(|step| evidence(share + step) < evidence(share)));
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
 use super::claims::Claims;
+use super::evidence::of_either;
 use super::footing::Footing;
 use super::landscape::Landscape;
 use super::sight::Sight;
@@ -119,7 +120,11 @@ pub(super) fn refined(
 struct Refiner<'a> {
     query: &'a Landscape,
     map: &'a Landscape,
+    /// What is assumed of the clouds, and of the region that is looked at.
+    clouds: Model,
     model: Model,
+    /// Share of the region's fruits of the map that are seen again; that of the query's is the model's.
+    of_map: f64,
     /// Fruits of the query around the place: rows and points.
     rows: Vec<u32>,
     region: Vec<Vector3<f64>>,
@@ -144,7 +149,9 @@ impl<'a> Refiner<'a> {
         Self {
             query,
             map,
+            clouds: *model,
             model: *model,
+            of_map: model.detection,
             rows: Vec::new(),
             region: Vec::new(),
             sight: None,
@@ -159,6 +166,7 @@ impl<'a> Refiner<'a> {
         self.rows = query.within(place, reach);
         self.region = self.rows.iter().map(|&row| query.points[row as usize]).collect();
         self.sight = self.model.sight(query, self.map, start);
+        self.compare(start, place, reach);
         let model = self.model;
         let (mut pose, mut sigma) = (*start, model.sigma);
         let mut footing = Footing::of_seed(place, reach);
@@ -222,22 +230,40 @@ impl<'a> Refiner<'a> {
         self.sight.as_ref().map_or(1.0, |sight| sight.shares[0][self.rows[at] as usize])
     }
 
+    /// Shares that are seen again of what either visit shows of the region: of the one that shows more, less.
+    fn compare(&mut self, pose: &Similarity, place: &Vector3<f64>, reach: f64) {
+        let mut there = 0.0;
+        self.each_looked_at(pose, place, reach, |_, seen| there += seen);
+        [self.model.detection, self.of_map] = of_either(self.clouds.detection, [self.shown(pose), there]);
+    }
+
     /// The other half of the evidence: fruits of the map that the query should have seen, and how many pairs were due.
     ///
-    /// With two visits that see a fruit with probability p each, the likelihood ratio of "same trees" to "unrelated" is
-    /// the product of N(d) p / density over the pairs, of (1 - p) over the fruits of either visit that lack a partner, and
-    /// exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
+    /// With visits that see again the share p of the query's fruits and q of the map's, the likelihood ratio of "same trees" to
+    /// "unrelated" is the product of N(d) p / density over the pairs, of 1 - p and 1 - q over the fruits of either that lack a
+    /// partner, and exp(p n) for the n fruits of the query inside the overlap: the pairs that unrelated trees would have shown double.
     fn other_side(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64) -> f64 {
-        let seen = |(at, p): (usize, &Vector3<f64>)| self.share(at) * self.map.support.at(&pose.image(p));
-        let due = self.region.iter().enumerate().map(seen).sum::<f64>() * self.model.detection;
+        let back = Model { detection: self.of_map, ..self.model };
         let mut missing = Evidence::default();
-        self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
+        self.each_looked_at(pose, place, reach, |row, seen| {
             if self.claims.owner(row).is_none() {
-                let share = self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row as usize]);
-                let seen = share * self.query.support.at(&pose.preimage(&self.map.points[row as usize]));
-                missing.multiply(self.model.missed(seen));
+                missing.multiply(back.missed(seen));
             }
         });
-        due + missing.log_odds()
+        self.model.detection * self.shown(pose) + missing.log_odds()
+    }
+
+    /// Fruits of the region that the map can have seen.
+    fn shown(&self, pose: &Similarity) -> f64 {
+        let seen = |(at, p): (usize, &Vector3<f64>)| self.share(at) * self.map.support.at(&pose.image(p));
+        self.region.iter().enumerate().map(seen).sum()
+    }
+
+    /// Calls `visit` with the fruits of the map in the region, and how surely the query would have shown each.
+    fn each_looked_at(&self, pose: &Similarity, place: &Vector3<f64>, reach: f64, mut visit: impl FnMut(u32, f64)) {
+        self.map.tree.within(&single(&pose.image(place)), (reach * pose.scale) as f32, |row, _| {
+            let share = self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row as usize]);
+            visit(row, share * self.query.support.at(&pose.preimage(&self.map.points[row as usize])));
+        });
     }
 }

@@ -1,6 +1,6 @@
 //! What a growth explains, and how much evidence it has.
 
-use super::evidence::likeliest_share;
+use super::evidence::{likeliest_share, of_either};
 use super::growth::Growth;
 use super::patches::Landing;
 use crate::geometry::Similarity;
@@ -39,22 +39,33 @@ impl Growth<'_> {
     /// fruits seen again that suits it best.
     fn log_odds(&self) -> f64 {
         let (map, partners) = (self.patches.map, &self.partners);
+        let shown: Vec<f64> = self
+            .patches
+            .predictions
+            .iter()
+            .enumerate()
+            .map(|(row, at)| at.map_or(0.0, |at| self.patches.shown(row, &at.place)))
+            .collect();
+        let looked_at: Vec<f64> = (0..map.len()).map(|row| self.patches.looked_at(row)).collect();
+        let [of_query, of_map] = of_either(1.0, [&shown, &looked_at].map(|all| all.iter().sum()));
         // A fruit of the query that meets its partner has 1 + p x, x by how much that is likelier than a stranger; one that is alone
         // 1 - p u, u how surely it would be seen: -u is its x.
-        let (mut terms, mut due) = (Vec::new(), 0.0);
+        let mut terms = Vec::new();
         for (row, (at, partner)) in self.patches.predictions.iter().zip(partners).enumerate() {
             let Some(at) = at else { continue };
-            let support = self.patches.shown(row, &at.place);
-            due += support;
-            terms.push(partner.map_or(-support, |partner| {
-                let d2 = (map.points[partner as usize] - at.place).norm_squared();
-                self.patches.share_seen(row) * (gaussian(d2, at.variance) / map.density[partner as usize] - 1.0)
-            }));
+            terms.push(
+                of_query
+                    * partner.map_or(-shown[row], |partner| {
+                        let d2 = (map.points[partner as usize] - at.place).norm_squared();
+                        self.patches.share_seen(row) * (gaussian(d2, at.variance) / map.density[partner as usize] - 1.0)
+                    }),
+            );
         }
         let mut found = vec![false; map.len()];
         partners.iter().flatten().for_each(|&partner| found[partner as usize] = true);
-        let missed = (0..map.len()).filter(|&row| !found[row]).map(|row| self.patches.looked_at(row));
-        terms.extend(missed.filter(|support| *support > 0.0).map(|support| -support));
+        let missed = looked_at.iter().zip(found).filter(|(support, found)| !found && **support > 0.0);
+        terms.extend(missed.map(|(support, _)| -of_map * support));
+        let due = of_query * shown.iter().sum::<f64>();
         // The evidence is concave in the share.
         let slope = |share: f64| due + terms.iter().map(|x| x / (1.0 + share * x)).sum::<f64>();
         let share = likeliest_share(slope);
