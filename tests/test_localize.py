@@ -277,11 +277,11 @@ def test_a_gap_with_the_motion_unknown_is_noticed():
 
 
 def test_frames_with_few_fruits_are_joined(row, fresh):
-    """Nine fruits are hardly a place; those of several frames are one."""
+    """Seven fruits are hardly a place; those of several frames are one."""
     before, alone, joined = None, [], []
     for number, x_m in enumerate(np.arange(3.0, 4.6, 0.2)):
         true = pose_at(x_m)
-        seen = seen_from(row, true, 300 + number, most=9)
+        seen = seen_from(row, true, 300 + number, most=7)
         moved = None if before is None else np.linalg.solve(before, true)
         alone.append(bool(fresh.locate(seen)))
         found = fresh.update(seen, moved)

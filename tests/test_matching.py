@@ -54,7 +54,7 @@ def test_an_answer_has_pairs() -> None:
     assert dict(match.stages)["verified"] == 1.0, "no longer what it tests"
 
 
-@pytest.mark.parametrize("seed", [9, 11])
+@pytest.mark.parametrize("seed", [11, 50])
 def test_a_frame_that_stands_out_of_all_other_poses_is_found(seed: int) -> None:
     pair = scene_pair("frame25", seed)
     match = pomona.match(pair.query, pair.map)
