@@ -1,9 +1,9 @@
 //! Poses with the evidence around them, refined from what seeds propose.
 
 use super::claims::Claims;
-use super::evidence::of_either;
 use super::footing::Footing;
 use super::landscape::Landscape;
+use super::shares::of_either;
 use super::sight::Sight;
 use super::vertical::Vertical;
 use crate::geometry::{Scale, Similarity};

@@ -49,6 +49,7 @@ mod scatter;
 mod search;
 mod seeds;
 mod settlement;
+mod shares;
 mod sight;
 mod size;
 mod soft;

@@ -1,8 +1,8 @@
 //! What a growth explains, and how much evidence it has.
 
-use super::evidence::{likeliest_share, of_either};
 use super::growth::Growth;
 use super::patches::Landing;
+use super::shares::{likeliest_share, of_either};
 use crate::geometry::Similarity;
 use crate::statistics::gaussian;
 use nalgebra::Vector3;
