@@ -267,3 +267,26 @@ impl<'a> Refiner<'a> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::fixture::visits;
+
+    #[test]
+    fn a_visit_that_shows_a_third_says_as_much_as_the_query_and_as_the_map() {
+        let (mut few, all) = visits(0.02);
+        few.positions = few.positions.into_iter().step_by(3).collect();
+        let [few, all] = [few, all].map(|cloud| Landscape::new(&cloud));
+        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
+        let said = |query: &Landscape, map: &Landscape| {
+            let pose = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
+            // The same metre and a half of the orchard.
+            let start = (pose, all.centre - query.centre);
+            refined([query, map], &model, 1.5, &[start]).first().expect("pairs fix the true pose").log_odds
+        };
+        let [there, back] = [said(&few, &all), said(&all, &few)];
+        // Each takes the density of strangers from its own map. With one share for both visits they say 39 and 231 nats.
+        assert!(there > 100.0 && (there / back).ln().abs() < 0.25, "{there} {back}");
+    }
+}
