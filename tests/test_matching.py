@@ -219,15 +219,28 @@ def test_frames_get_their_own_transforms() -> None:
     ("arguments", "message"),
     [
         ({"per_frame": True}, "the query does not know which frame saw which fruit"),
-        ({"noise_m": -1.0}, "noise_m"),
+        ({"noise_m": -1.0}, "^noise_m: found -1"),
         ({"config": {"paper": {"inlier_mm": 80}}}, "inlier_mm"),
         ({"config": {"constellation": {"k": 8}}}, "constellation.k: found 8, expected 4 to 7"),
-        ({"scale": "feet"}, "feet"),
+        ({"scale": "feet"}, "^scale: found 'feet', expected 'metric' or 'free'"),
+        ({"up": [[0, 0, 0], [0, 0, 1]]}, "^up: expected a finite vector"),
     ],
 )
 def test_wrong_settings_are_named(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(pomona.PomonaError, match=message):
         pomona.match(row(), row(), method="paper", **arguments)
+
+
+def test_fruits_that_cannot_be_in_metres_are_told_of() -> None:
+    millimetres = 1000 * row()
+    with pytest.warns(pomona.PomonaWarning, match=r"^positions: neighbouring fruits are .* m apart .* scale='free'"):
+        pomona.match(millimetres, row())
+    assert pomona.match(millimetres, row(), scale="free")  # a warning would fail here
+
+
+def test_no_cloud_is_named_as_none() -> None:
+    with pytest.raises(pomona.PomonaError, match=r"^cloud: found None, expected fruits"):
+        pomona.match(None, row())  # type: ignore[arg-type]
 
 
 def test_more_fruits_than_the_paper_can_hold_are_refused() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -142,6 +142,10 @@ class Index:
         threads: int | None = None,
         compact: bool = False,
     ) -> None:
+        for name, found, known in (("method", method, Method), ("scale", scale, Scale)):
+            if found not in get_args(known):
+                expected = " or ".join(repr(one) for one in get_args(known))
+                raise PomonaError(f"{name}: found {found!r}, expected {expected}")
         if compact and (method, scale) != ("verified", "metric"):
             raise PomonaError(f"compact: found an index by {method}, {scale}; expected one by verified, metric")
         self._unit: Unit = "free" if scale == "free" else "m"
@@ -157,7 +161,7 @@ class Index:
                     core_arrays(self._map), method=method, scale=scale, config=overrides, threads=threads
                 )
         except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"map: {error}") from None
+            raise _named("map", error) from None
 
     @classmethod
     def open(
@@ -257,8 +261,17 @@ class Index:
         try:
             found = question(self._core, core_arrays(cloud))
         except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"query: {error}") from None
+            raise _named("query", error) from None
         return _told(found, len(cloud), len(self._map), start)
+
+
+OF_NO_CLOUD = ("configuration", "noise_m", "per_frame", "setting", "up")
+"""What the core's errors begin with where they are not about the fruits."""
+
+
+def _named(cloud: str, error: Exception) -> PomonaError:
+    told = str(error)
+    return PomonaError(told if told.startswith(OF_NO_CLOUD) else f"{cloud}: {told}")
 
 
 def _told(found: _core.Match, n_query: int, n_map: int, start: float) -> Match:
@@ -348,7 +361,7 @@ class ReadyCloud:
         try:
             self._core = _core.ReadyCloud(core_arrays(self.cloud), threads=capped_threads(threads))
         except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"cloud: {error}") from None
+            raise _named("cloud", error) from None
 
     def __len__(self) -> int:
         return len(self.cloud)
@@ -400,7 +413,7 @@ def match_expected(
             threads=capped_threads(threads),
         )
     except (ValueError, TypeError, OverflowError) as error:
-        raise PomonaError(f"match: {error}") from None
+        raise _named("match", error) from None
     return _told(found, len(asked), len(known), start)
 
 

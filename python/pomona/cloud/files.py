@@ -69,7 +69,12 @@ def write_cloud(path: Path, cloud: FruitCloud) -> None:
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv or .ply")
 
 
-def check_places(path: Path, positions: NDArray[np.float64]) -> None:
+def check_places(
+    name: str | Path,
+    positions: NDArray[np.float64],
+    *,
+    remedy: str = "say so: --unit mm, or FruitCloud.read(path, unit='mm')",
+) -> None:
     """Warn when places, (N, 3) metres, cannot be those of fruits: by their neighbours, or one far from all others."""
     if len(positions) < MIN_FRUITS:
         return
@@ -77,14 +82,14 @@ def check_places(path: Path, positions: NDArray[np.float64]) -> None:
     reach_m = np.hypot.reduce(positions - np.median(positions, axis=0), axis=1)  # squares may overflow
     if not MIN_SPACING_M <= spacing_m <= MAX_SPACING_M:
         warnings.warn(
-            f"{path}: neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to "
-            f"{MAX_SPACING_M:g} m; if the file is not in metres say so: --unit mm, or FruitCloud.read(path, unit='mm')",
+            f"{name}: neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to "
+            f"{MAX_SPACING_M:g} m; if it is not in metres {remedy}",
             PomonaWarning,
             stacklevel=4,
         )
     elif reach_m.max() > FARTHEST_FRUIT_M:
         warnings.warn(
-            f"{path}: row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at "
+            f"{name}: row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at "
             f"most {FARTHEST_FRUIT_M:g} m",
             PomonaWarning,
             stacklevel=4,

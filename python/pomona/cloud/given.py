@@ -8,10 +8,16 @@ from typing import Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from pomona.cloud.files import check_places
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.cloud.units import Unit
+from pomona.errors import PomonaError
 
 __all__ = ["Cloud", "as_cloud"]
+
+
+METRES_EXPECTED = "multiply them, or give scale='free' where their unit is unknown"
+"""What to do with an array that is not in metres."""
 
 
 class WithCloud(Protocol):
@@ -34,12 +40,12 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
     cloud : FruitCloud, Survey, Session, OrchardMap, array_like, str or Path
         The fruits.
     unit : {"m", "cm", "mm", "free"}
-        Of the coordinates, where it is a file; arrays are taken as they are.
+        Of the coordinates, where it is a file; arrays are taken as they are, and warned of where they cannot be metres.
 
     Raises
     ------
     PomonaError
-        The file or the array is wrong.
+        The file or the array is wrong, or there is none.
     """
     if isinstance(cloud, FruitCloud):
         return cloud
@@ -48,4 +54,9 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
     held = getattr(cloud, "cloud", None)
     if isinstance(held, FruitCloud):
         return held
-    return FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there
+    if cloud is None:
+        raise PomonaError("cloud: found None, expected fruits, (N, 3) metres, or the name of a file with them")
+    fruits = FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there
+    if unit != "free":
+        check_places("positions", fruits.positions, remedy=METRES_EXPECTED)
+    return fruits
