@@ -134,6 +134,82 @@ def test_the_graph_gives_what_the_network_gives(tmp_path):
 
 
 @needs_torch
+def test_a_finished_network_is_normalised_again_and_tells_the_same(tmp_path):
+    import torch
+
+    from pomona.detect.shipped import EXACT, model_named
+    from pomona.detect.training.fruit_network import folded, unfolded
+    from pomona.detect.training.graph import network_in
+
+    torch.manual_seed(0)
+    network = network_in(model_named(EXACT)).eval()
+    again = unfolded(network, torch.rand(3, 3, 64, 64))
+    learning = again.train()(torch.rand(3, 3, 64, 64))
+    assert torch.isfinite(learning).all()
+    picture = torch.rand(1, 3, 64, 96)
+    normalised = unfolded(network, torch.rand(3, 3, 64, 64)).eval()
+    with torch.no_grad():
+        expected = network(picture)
+        for each in (normalised, folded(normalised)):
+            assert (each(picture) - expected).abs().max() < 1e-3
+    assert not any(module._forward_hooks for module in network.modules())
+
+
+@needs_torch
+def test_training_goes_on_from_what_ships_before_its_scores_were_scaled(own, tmp_path):
+    import torch
+    from training.begun import as_in_training
+
+    from pomona.detect.shipped import EXACT, model_named
+    from pomona.detect.training.cache import cached
+    from pomona.detect.training.fine_tuning import labelled_pictures
+    from pomona.detect.training.graph import network_in
+
+    samples = cached(labelled_pictures([own], tmp_path / "boxes.csv"), tmp_path / "cache")
+    begun = as_in_training(model_named(EXACT), samples).eval()
+    picture = torch.rand(1, 3, 64, 96)
+    with torch.no_grad():
+        expected, found = network_in(model_named(EXACT))(picture)[0], begun(picture)[0]
+    assert (found[1:] - expected[1:]).abs().max() < 1e-3
+    scaled = (found[0] - found[0].mean()) / found[0].std()
+    assert (scaled - (expected[0] - expected[0].mean()) / expected[0].std()).abs().max() < 1e-3
+    assert found[0].std() < expected[0].std()  # calibrated scores are surer than those in training
+
+
+@needs_torch
+def test_eight_bits_are_read_as_the_numbers_they_stand_for(tmp_path):
+    import torch
+
+    from pomona.detect.training.eight_bits import write_eight_bits
+    from pomona.detect.training.fruit_network import FruitNetwork
+    from pomona.detect.training.graph import network_in, write_network
+
+    torch.manual_seed(0)
+    network = FruitNetwork(normalised=False, wider=2)
+    write_network(tmp_path / "exact.onnx", network, 0.3, {})
+    write_eight_bits(tmp_path / "bits.onnx", tmp_path / "exact.onnx", [torch.rand(1, 3, 64, 64).numpy()])
+    again = network_in(tmp_path / "bits.onnx")
+    assert again.wider == 2
+    for name, weights in network.state_dict().items():
+        error = (again.state_dict()[name] - weights).abs().max()
+        assert error <= weights.abs().max() / 126, name  # half a step of seven bits and a sign
+
+
+@needs_torch
+def test_halves_only_where_the_processor_calculates_with_them(monkeypatch):
+    import torch
+
+    from pomona.detect.training import loop
+
+    for able in (False, True):
+        monkeypatch.setattr(torch.cpu, "_is_avx512_bf16_supported", lambda able=able: able)
+        assert loop._halved(loop.Plan()) is able
+        assert loop._halved(loop.Plan(device="cuda"))
+    monkeypatch.delattr(torch.cpu, "_is_avx512_bf16_supported")
+    assert not loop._halved(loop.Plan())
+
+
+@needs_torch
 def test_a_fine_tuned_model_is_found_by_detect(pomona, own, tmp_path):
     output = tmp_path / "my.onnx"
     code, out, _ = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", output, "--batches", 2)

@@ -50,10 +50,12 @@ def _shadowed(crop: NDArray[np.uint8], draw: np.random.Generator) -> NDArray[Any
     """Darken one half-plane with a soft edge."""
     height, width = crop.shape[:2]
     angle = draw.uniform(0, 2 * np.pi)
-    across = np.cos(angle) * np.arange(width)[None] + np.sin(angle) * np.arange(height)[:, None]
-    lit = 1 / (1 + np.exp(-(across - draw.choice(across.ravel())) / draw.uniform(2, 30)))
-    light = np.asarray(1 - draw.uniform(0.3, 0.7) * lit, np.float32)
-    return (crop * light[..., None]).astype(np.uint8)
+    along_x, along_y = (np.arange(side, dtype=np.float32) for side in (width, height))
+    across = np.float32(np.cos(angle)) * along_x + np.float32(np.sin(angle)) * along_y[:, None]
+    edge, soft = across.flat[draw.integers(across.size)], np.float32(draw.uniform(2, 30))
+    lit = (1 + np.tanh((across - edge) / (2 * soft))) / 2  # the logistic curve, that cannot overflow
+    light = 1 - np.float32(draw.uniform(0.3, 0.7)) * lit
+    return cv2.multiply(crop, cv2.merge([light] * 3), dtype=cv2.CV_8U)
 
 
 def _blurred(crop: NDArray[np.uint8], draw: np.random.Generator) -> NDArray[Any]:

@@ -6,7 +6,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-__all__ = ["SIZE_PX", "WIDTHS", "FruitNetwork", "folded"]
+__all__ = ["SIZE_PX", "WIDTHS", "FruitNetwork", "folded", "unfolded"]
 
 SIZE_PX = 16.0
 """Half of the side of a usual fruit: what a distance to an edge of its box is told against."""
@@ -92,3 +92,34 @@ def folded(network: FruitNetwork) -> FruitNetwork:
             weights[f"{convolution}.bias"] = module.bias - module.running_mean * gain
     plain.load_state_dict({name: weights[name] for name in plain.state_dict()})
     return plain
+
+
+@torch.no_grad()
+def unfolded(network: FruitNetwork, pictures: torch.Tensor) -> FruitNetwork:
+    """Give a copy with a normalisation after each convolution again, that on these pictures changes nothing.
+
+    The inverse of `folded`, so that a finished network can go on learning as it did: the statistics are those of the
+    pictures (N, 3, H, W), and gain and shift undo them.
+    """
+    made = FruitNetwork(normalised=True, wider=network.wider)
+    weights = made.state_dict() | network.state_dict()
+
+    def fold_out(name: str, told: torch.Tensor) -> None:
+        mean, variance = told.mean((0, 2, 3)), told.var((0, 2, 3))
+        normalisation = f"{name.removesuffix('.0')}.1"
+        bias = weights.pop(f"{name}.bias")
+        weights[f"{normalisation}.running_mean"], weights[f"{normalisation}.running_var"] = mean - bias, variance
+        weights[f"{normalisation}.weight"] = torch.sqrt(variance + nn.BatchNorm2d(1).eps)
+        weights[f"{normalisation}.bias"] = mean
+
+    convolutions = {name: module for name, module in network.named_modules() if isinstance(module, nn.Conv2d)}
+    hooks = [
+        module.register_forward_hook(lambda _module, _given, told, name=name: fold_out(name, told))
+        for name, module in convolutions.items()
+        if f"{name}.bias" not in made.state_dict()
+    ]
+    network(pictures)
+    for hook in hooks:
+        hook.remove()
+    made.load_state_dict(weights)
+    return made

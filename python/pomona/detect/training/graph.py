@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from pomona.atomic import whole_file
 from pomona.detect.onnx.claims import OWN_KEY
 from pomona.detect.onnx.families import FRUITS
-from pomona.detect.training.fruit_network import FruitNetwork
+from pomona.detect.training.fruit_network import WIDTHS, FruitNetwork
 from pomona.errors import PomonaError
 from pomona.likes import MODEL_MARK
 
@@ -27,6 +28,9 @@ LAST = "map"
 
 HALF = ".half"
 """Ends the names of numbers that are kept in 16 bits."""
+
+QUANTIZED = "_quantized"
+"""Ends the names that ONNX Runtime gives to numbers in 8 bits, or 32 for biases; `_scale` those of what they are in."""
 
 
 def write_network(
@@ -67,7 +71,9 @@ def write_network(
 
 
 def network_in(path: Path) -> FruitNetwork:
-    """Read the network out of a file that `write_network` wrote.
+    """Read the network out of a file that `write_network` wrote, or `write_eight_bits` out of that.
+
+    Eight bits are read as the numbers that they stand for; a teacher is as wide as its file says.
 
     Raises
     ------
@@ -75,17 +81,30 @@ def network_in(path: Path) -> FruitNetwork:
         It holds another one.
     """
     try:
-        initializers = onnx.load(path).graph.initializer
+        graph = onnx.load(path).graph
     except Exception as error:  # protobuf's errors have no base of their own
         raise PomonaError(f"{path}: not an ONNX model ({' '.join(str(error).split())[:100]})") from None
-    arrays = {each.name.removesuffix(HALF): np.array(numpy_helper.to_array(each)) for each in initializers}
-    found = {name: torch.from_numpy(array) for name, array in arrays.items()}
-    network = FruitNetwork(normalised=False)
+    found = {name: torch.from_numpy(array) for name, array in _numbers_in(graph)}
+    stem = found.get("stem.0.0.weight")
+    network = FruitNetwork(normalised=False, wider=1 if stem is None else max(len(stem) // WIDTHS[0], 1))
     wanted = network.state_dict()
     if any(name not in found or found[name].shape != weights.shape for name, weights in wanted.items()):
         raise PomonaError(f"{path}: found another network, expected the shipped one or one that was trained from it")
     network.load_state_dict({name: found[name] for name in wanted})
     return network
+
+
+def _numbers_in(graph: onnx.GraphProto) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    """Give names and numbers, those in eight bits times their scales, one for each channel that is made."""
+    arrays = {each.name: np.array(numpy_helper.to_array(each)) for each in graph.initializer}
+    for name, array in arrays.items():
+        if name.endswith(QUANTIZED):
+            named = name.removesuffix(QUANTIZED)
+            scales = arrays.get(f"{named}{QUANTIZED}_scale", arrays.get(f"{named}_scale"))
+            scales = np.ones(1) if scales is None else scales
+            yield named, (array * scales.reshape(-1, *[1] * (array.ndim - 1))).astype(np.float32)
+        else:
+            yield name.removesuffix(HALF), array
 
 
 class _Graph:

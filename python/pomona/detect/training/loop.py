@@ -57,7 +57,7 @@ class Plan:
         Share of the batches, the last ones, in which it falls to nothing.
     seed : int
     half_precision : bool
-        bfloat16 where it helps: on processors that calculate with it.
+        bfloat16 where it helps: on graphics cards and processors that calculate with it. Others take ten times as long.
     device : str
         As PyTorch names it: cpu, cuda.
     teacher : int
@@ -100,6 +100,7 @@ def train(
     begin: FruitNetwork | None,
     progress: Progress,
     *,
+    teacher: FruitNetwork | None = None,
     workers: int = 0,
 ) -> FruitNetwork:
     """Train a network, going on from a checkpoint that is there.
@@ -114,6 +115,8 @@ def train(
     begin : FruitNetwork or None
         What to begin with, None for numbers drawn by the seed.
     progress : callable
+    teacher : FruitNetwork or None
+        What a teacher begins with; None for one that the plan asks for, if it does.
     workers : int
         Processes that draw crops meanwhile; 0 for none besides this one.
 
@@ -124,7 +127,9 @@ def train(
     """
     torch.manual_seed(plan.seed)
     learner = Learner.begun(FruitNetwork() if begin is None else begin, plan.device)
-    state = _State(learner, Learner.begun(FruitNetwork(wider=plan.teacher), plan.device) if plan.teacher else None)
+    if teacher is None and plan.teacher:
+        teacher = FruitNetwork(wider=plan.teacher)
+    state = _State(learner, None if teacher is None else Learner.begun(teacher, plan.device))
     if checkpoint.is_file():
         _restore(state, checkpoint)
     for pictures, wanted in _batches(sources, plan, state.done, workers):
@@ -137,7 +142,7 @@ def train(
 
 def _step(state: _State, pictures: torch.Tensor, wanted: dict[str, torch.Tensor], plan: Plan) -> None:
     rate, told = plan.rate_at(state.done), None
-    with torch.autocast(pictures.device.type, torch.bfloat16, enabled=plan.half_precision):
+    with torch.autocast(pictures.device.type, torch.bfloat16, enabled=_halved(plan)):
         maps = state.learner.network(pictures).float()
         if state.teacher is not None:
             taught = state.teacher.network(pictures).float()
@@ -150,6 +155,11 @@ def _step(state: _State, pictures: torch.Tensor, wanted: dict[str, torch.Tensor]
     state.done += 1
     late = loss.item()
     state.loss = late if np.isnan(state.loss) else 0.98 * state.loss + 0.02 * late
+
+
+def _halved(plan: Plan) -> bool:
+    told = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # torch has no public name for it
+    return plan.half_precision and (plan.device != "cpu" or (told is not None and told()))
 
 
 _Batch = tuple[torch.Tensor, dict[str, torch.Tensor]]
