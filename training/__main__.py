@@ -30,6 +30,7 @@ def main() -> None:
     parser.add_argument("--device", default=Plan.device, help="cpu or cuda")
     parser.add_argument("--batch", type=int, default=Plan.batch, help="crops in one")
     parser.add_argument("--rate", type=float, default=Plan.rate)
+    parser.add_argument("--falling", type=float, default=Plan.falling, help="share of the batches in which it falls")
     parser.add_argument("--seed", type=int, default=Plan.seed)
     parser.add_argument("--go-on", action="store_true", help="begin with the shipped network and its teacher")
     parser.add_argument("--teacher", type=int, default=Plan.teacher, help="times the channels of one to learn from")
@@ -50,6 +51,7 @@ def main() -> None:
         batches=given.batches,
         batch=given.batch,
         rate=given.rate,
+        falling=given.falling,
         seed=given.seed,
         device=given.device,
         teacher=given.teacher,

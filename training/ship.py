@@ -35,6 +35,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder with orchard_photos/")
     parser.add_argument("run", type=Path, help="folder of the run")
+    parser.add_argument("--recipe", default="", help="what the run was begun with and asked for; kept in the models")
     given = parser.parse_args()
     validation = [
         labelled
@@ -42,20 +43,23 @@ def main() -> None:
         for labelled in photographs(given.data / "orchard_photos", kind, VALIDATION_ROWS)
     ]
     network, teacher, batches = means_of(given.run / "checkpoint.pt")
-    _write(network, batches, validation, model_named(SHIPPED), model_named(EXACT))
+    run = {"data": DATA, "batches": batches, "recipe": given.recipe}
+    _write(network, run, validation, model_named(SHIPPED), model_named(EXACT))
     if teacher is not None:
         WIDE.parent.mkdir(exist_ok=True)
-        _write(teacher, batches, validation, WIDE)
+        _write(teacher, run, validation, WIDE)
 
 
 def _write(
-    network: FruitNetwork, batches: int, validation: list[Labelled], eight_bits: Path, halved: Path | None = None
+    network: FruitNetwork,
+    run: dict[str, object],
+    validation: list[Labelled],
+    eight_bits: Path,
+    halved: Path | None = None,
 ) -> None:
     network, min_score, scaled = finished(folded(network), validation)
-    about = {
-        "data": DATA,
+    about = run | {
         "rows_held_out": {"test": TEST_ROWS, "validation": VALIDATION_ROWS},
-        "batches": batches,
         "calibration": {"slope": scaled.slope, "offset": scaled.offset},
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -64,7 +68,7 @@ def _write(
         write_eight_bits(eight_bits, exact, _prepared(validation))
     if halved is not None:
         write_network(halved, network, min_score, about, halved=True)
-    print(f"{eight_bits.name}: {batches} batches, {scaled}, least score {min_score:.3f}")
+    print(f"{eight_bits.name}: {run['batches']} batches, {scaled}, least score {min_score:.3f}")
 
 
 def _prepared(pictures: list[Labelled]) -> Iterator[NDArray[np.float32]]:
