@@ -308,7 +308,6 @@ def test_strangers_are_no_match(localizer):
     assert len(found.pairs) == 0
 
 
-@pytest.mark.filterwarnings("ignore:positions. neighbouring fruits:pomona.PomonaWarning")
 @pytest.mark.parametrize("smaller", [30, 1000])
 def test_fruits_that_all_hang_within_the_noise_give_no_pose(row, smaller):
     localizer = Localizer(row.on_map / smaller)

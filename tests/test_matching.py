@@ -231,11 +231,13 @@ def test_wrong_settings_are_named(arguments: dict[str, object], message: str) ->
         pomona.match(row(), row(), method="paper", **arguments)
 
 
-def test_fruits_that_cannot_be_in_metres_are_told_of() -> None:
-    millimetres = 1000 * row()
-    with pytest.warns(pomona.PomonaWarning, match=r"^positions: neighbouring fruits are .* m apart .* scale='free'"):
-        pomona.match(millimetres, row())
-    assert pomona.match(millimetres, row(), scale="free")  # a warning would fail here
+@pytest.mark.parametrize("which", ["query", "map"])
+def test_arrays_that_cannot_be_in_metres_are_told_of_where_nothing_is_found(which: str) -> None:
+    clouds = {"query": row(), "map": row()} | {which: 1000 * row()}
+    with pytest.warns(pomona.PomonaWarning, match=rf"^{which}: neighbouring fruits are .* m apart .* scale='free'"):
+        assert not pomona.match(**clouds)
+    assert pomona.match(**clouds, scale="free")  # a warning would fail here
+    assert not pomona.match(**{name: FruitCloud(positions=cloud) for name, cloud in clouds.items()})
 
 
 def test_no_cloud_is_named_as_none() -> None:

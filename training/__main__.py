@@ -11,7 +11,7 @@ import torch
 
 from pomona.detect.shipped import EXACT, model_named
 from pomona.detect.training.cache import cached
-from pomona.detect.training.loop import Plan, Source, train
+from pomona.detect.training.loop import Plan, Source, first_pictures, train
 from training import WIDE
 from training.begun import as_in_training
 from training.sources import TEST_ROWS, VALIDATION_ROWS, photographs, rendered
@@ -58,8 +58,8 @@ def main() -> None:
     )
     begin, teacher = None, None
     if given.go_on:
-        everything = [sample for source in sources for sample in source.samples]
-        begin, teacher = (as_in_training(model, everything) for model in (model_named(EXACT), WIDE))
+        pictures = first_pictures(sources, Plan(seed=given.seed))
+        begin, teacher = (as_in_training(model, pictures) for model in (model_named(EXACT), WIDE))
     checkpoint = given.output / "checkpoint.pt"
     train(sources, plan, checkpoint, begin, tell, teacher=teacher, workers=given.workers)
 

@@ -18,6 +18,7 @@ from pomona.amounts import amount
 from pomona.atomic import whole_file
 from pomona.cards import as_card
 from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
+from pomona.cloud.given import doubt_metres, is_array
 from pomona.core_settings import core_settings
 from pomona.errors import PomonaError
 from pomona.kept_index import out_of_index
@@ -149,7 +150,7 @@ class Index:
         if compact and (method, scale) != ("verified", "metric"):
             raise PomonaError(f"compact: found an index by {method}, {scale}; expected one by verified, metric")
         self._unit: Unit = "free" if scale == "free" else "m"
-        self._map = as_cloud(map, self._unit)
+        self._map, self._of_array = as_cloud(map, self._unit), is_array(map)
         self._kind = f"{method}, {scale}"
         threads = capped_threads(threads)
         overrides = core_settings(config)
@@ -192,7 +193,7 @@ class Index:
         cloud, settings, most = as_cloud(map, "m"), core_settings(config), capped_threads(threads)
         arrays = core_arrays(cloud)
         index = cls.__new__(cls)
-        index._unit, index._kind, index._map = "m", "verified, metric", cloud
+        index._unit, index._kind, index._map, index._of_array = "m", "verified, metric", cloud, is_array(map)
         index._core = out_of_index(
             Path(path),
             lambda path: _core.MapIndex.opened(path, arrays, config=settings, threads=most),
@@ -262,6 +263,10 @@ class Index:
             found = question(self._core, core_arrays(cloud))
         except (ValueError, TypeError, OverflowError) as error:
             raise _named("query", error) from None
+        if found.status == Verdict.NO_MATCH and self._unit != "free":
+            for name, asked, of_array in (("query", cloud, is_array(query)), ("map", self._map, self._of_array)):
+                if of_array:  # looked at only now, for it takes longer than many a search
+                    doubt_metres(name, asked)
         return _told(found, len(cloud), len(self._map), start)
 
 
@@ -332,7 +337,8 @@ def match(
     Raises
     ------
     PomonaError
-        An array or a setting is wrong. That there is no match is no error: see `Match.status`.
+        An array or a setting is wrong. That there is no match is no error: see `Match.status`. Where nothing is found
+        and an array cannot be in metres, a `PomonaWarning` says so.
     """
     start = time.perf_counter()
     index = Index(map, scale=scale, method=method, config=config, threads=threads)

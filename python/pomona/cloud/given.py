@@ -13,11 +13,7 @@ from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.cloud.units import Unit
 from pomona.errors import PomonaError
 
-__all__ = ["Cloud", "as_cloud"]
-
-
-METRES_EXPECTED = "multiply them, or give scale='free' where their unit is unknown"
-"""What to do with an array that is not in metres."""
+__all__ = ["Cloud", "as_cloud", "doubt_metres", "is_array"]
 
 
 class WithCloud(Protocol):
@@ -40,7 +36,7 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
     cloud : FruitCloud, Survey, Session, OrchardMap, array_like, str or Path
         The fruits.
     unit : {"m", "cm", "mm", "free"}
-        Of the coordinates, where it is a file; arrays are taken as they are, and warned of where they cannot be metres.
+        Of the coordinates, where it is a file; arrays are taken as they are.
 
     Raises
     ------
@@ -56,7 +52,15 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
         return held
     if cloud is None:
         raise PomonaError("cloud: found None, expected fruits, (N, 3) metres, or the name of a file with them")
-    fruits = FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there
-    if unit != "free":
-        check_places("positions", fruits.positions, remedy=METRES_EXPECTED)
-    return fruits
+    return FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there
+
+
+def is_array(cloud: Cloud) -> bool:
+    """Whether `as_cloud` takes a cloud as positions that nobody has looked at: files are, when they are read."""
+    held = getattr(cloud, "cloud", cloud)
+    return not isinstance(held, FruitCloud | str | PathLike)
+
+
+def doubt_metres(name: str, cloud: FruitCloud) -> None:
+    """Warn where the places of a cloud cannot be metres."""
+    check_places(name, cloud.positions, remedy="multiply it, or give scale='free' where its unit is unknown")

@@ -29,6 +29,12 @@ LAST = "map"
 HALF = ".half"
 """Ends the names of numbers that are kept in 16 bits."""
 
+STEM = "stem.0.0.weight"
+"""The first convolution, whose channels tell how wide a network is."""
+
+WIDEST = 4
+"""Times the channels of the network that ships, of a teacher that is read."""
+
 QUANTIZED = "_quantized"
 """Ends the names that ONNX Runtime gives to numbers in 8 bits, or 32 for biases; `_scale` those of what they are in."""
 
@@ -73,7 +79,7 @@ def write_network(
 def network_in(path: Path) -> FruitNetwork:
     """Read the network out of a file that `write_network` wrote, or `write_eight_bits` out of that.
 
-    Eight bits are read as the numbers that they stand for; a teacher is as wide as its file says.
+    Eight bits are read as the numbers that they stand for; a teacher may be up to `WIDEST` times as wide.
 
     Raises
     ------
@@ -81,12 +87,13 @@ def network_in(path: Path) -> FruitNetwork:
         It holds another one.
     """
     try:
-        graph = onnx.load(path).graph
-    except Exception as error:  # protobuf's errors have no base of their own
+        found = {name: torch.from_numpy(array) for name, array in _numbers_in(onnx.load(path).graph)}
+    except Exception as error:  # protobuf's errors have no base of their own, and a stranger's numbers any shape
         raise PomonaError(f"{path}: not an ONNX model ({' '.join(str(error).split())[:100]})") from None
-    found = {name: torch.from_numpy(array) for name, array in _numbers_in(graph)}
-    stem = found.get("stem.0.0.weight")
-    network = FruitNetwork(normalised=False, wider=1 if stem is None else max(len(stem) // WIDTHS[0], 1))
+    # Only these widths are made: a network as wide as a stranger's file says might fill the memory.
+    stems = {tuple(found[STEM].shape)} if STEM in found else set()
+    wide = next((wider for wider in range(2, WIDEST + 1) if (wider * WIDTHS[0], 3, 3, 3) in stems), 1)
+    network = FruitNetwork(normalised=False, wider=wide)
     wanted = network.state_dict()
     if any(name not in found or found[name].shape != weights.shape for name, weights in wanted.items()):
         raise PomonaError(f"{path}: found another network, expected the shipped one or one that was trained from it")

@@ -20,7 +20,7 @@ from pomona.detect.training.loss import loss_of, unlike_teacher
 from pomona.detect.training.shown_crops import drawn_crop
 from pomona.detect.training.targets import Targets, targets_of
 
-__all__ = ["Plan", "Source", "means_of", "train"]
+__all__ = ["Plan", "Source", "first_pictures", "means_of", "train"]
 
 SAVED_EVERY = 200
 """Batches between two checkpoints: that is what an interruption costs at most."""
@@ -179,6 +179,12 @@ def _batches(sources: Sequence[Source], plan: Plan, first: int, workers: int) ->
     for pictures, wanted in drawn:
         moved = {name: target.to(plan.device, non_blocking=True) for name, target in wanted.items()}
         yield pictures.to(plan.device, non_blocking=True).permute(0, 3, 1, 2).float() / 255, moved
+
+
+def first_pictures(sources: Sequence[Source], plan: Plan) -> torch.Tensor:
+    """Give the pictures of the first batch of a plan, (N, 3, S, S), RGB from 0 to 1."""
+    pictures, _ = next(_batches(sources, plan, 0, workers=0))
+    return pictures
 
 
 def _alone(_worker: int) -> None:
