@@ -14,7 +14,7 @@ import json
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -48,52 +48,42 @@ RUNS = 20
 """Looks of which the fastest counts, in CPU time."""
 
 
-@dataclass(frozen=True)
-class Shown:
-    """How much larger the detector is shown the pictures, and in which folder people are shown what it found."""
-
-    enlarged: float
-    folder: Path | None
-
-    def within(self, name: str) -> Shown:
-        """Give the same for one set."""
-        return replace(self, folder=self.folder and self.folder / name)
-
-
 def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks detector", description=__doc__)
     parser.add_argument("--model", help="a file, or the name of a shipped one; else the shipped one and the wide one")
-    parser.add_argument(
-        "--enlarged", type=float, default=1.0, help="how much larger the detector is shown the pictures"
-    )
-    parser.add_argument("--draw", type=Path, help="folder for pictures with boxes")
+    parser.add_argument("--draw", type=Path, help="folder for pictures with boxes, a folder for each way to look")
     options = parser.parse_args(arguments)
     data = shared_data()
     if data is None:
         print("detector: no data at POMONA_DATA or ../shared/data: skipped")
         return
-    shown = Shown(options.enlarged, options.draw)
-    tables = [_table(model, data, shown) for model in ([options.model] if options.model else (SHIPPED, str(WIDE)))]
+    models = [options.model] if options.model else [SHIPPED, str(WIDE)]
+    tables = [_table(model, augment, data, options.draw) for model in models for augment in (False, True)]
     text = "\n".join([*tables, _times()])
     print(text)
-    if not options.model and options.enlarged == 1:
+    if not options.model:
         write_text("detector.md", text)
 
 
-def _table(model: str, data: Path, shown: Shown) -> str:
-    detector = OnnxDetector.open(model_named(model), min_score=LOW_SCORE, threads=1)
+def _table(model: str, augment: bool, data: Path, drawn: Path | None) -> str:
+    detector = OnnxDetector.open(model_named(model), min_score=LOW_SCORE, threads=1, augment=augment)
     threshold = detector.signature.min_score or LOW_SCORE
-    rows = [_row(name, pictures, complete, detector, threshold, shown) for name, pictures, complete in _sets(data)]
-    told = f"{detector.path.name}, boxes from a score of {threshold:.3f} on where no other is said.\n"
-    return f"{told}\n{markdown(HEADER, rows)}"
+    title = _title(model, augment)
+    folder = drawn and drawn / title.replace(", ", "_")
+    rows = [_row(name, pictures, complete, detector, threshold, folder) for name, pictures, complete in _sets(data)]
+    return f"{title}, boxes from a score of {threshold:.3f} on where no other is said.\n\n{markdown(HEADER, rows)}"
+
+
+def _title(model: str, augment: bool) -> str:
+    return f"{model_named(model).name}, {'two looks' if augment else 'one look'}"
 
 
 def _times() -> str:
     picture = cv2.resize(read_picture(PHOTOGRAPH), (640, 360), interpolation=cv2.INTER_AREA)
-    models = (SHIPPED, EXACT, str(WIDE))
+    ways = ((SHIPPED, False), (EXACT, False), (SHIPPED, True), (str(WIDE), False), (str(WIDE), True))
     return markdown(
         ("model", "ms at 640x360, one thread"),
-        [(model_named(name).name, f"{_time_ms(name, picture):.1f}") for name in models],
+        [(_title(*way), f"{_time_ms(*way, picture):.1f}") for way in ways],
     )
 
 
@@ -104,9 +94,9 @@ HEADER = (
 
 
 def _row(
-    name: str, pictures: list[Labelled], complete: bool, detector: OnnxDetector, threshold: float, shown: Shown
+    name: str, pictures: list[Labelled], complete: bool, detector: OnnxDetector, threshold: float, drawn: Path | None
 ) -> tuple[str, ...]:
-    looks = list(_found(pictures, detector, threshold, shown.within(name.replace(" ", "_"))))
+    looks = list(_found(pictures, detector, threshold, drawn and drawn / name.replace(" ", "_")))
     found, strict = judged(looks), judged(replace(look, smallest_px=0.0) for look in looks)
     precision, recall = found.above(threshold)
     head = (name, str(len(pictures)), str(found.n_fruits))
@@ -120,17 +110,17 @@ def _ratio(found: Judged, threshold: float) -> float:
     return float((found.scores >= threshold).sum() / found.n_fruits)
 
 
-def _found(pictures: Iterable[Labelled], detector: OnnxDetector, threshold: float, shown: Shown) -> Iterator[Found]:
+def _found(
+    pictures: Iterable[Labelled], detector: OnnxDetector, threshold: float, drawn: Path | None
+) -> Iterator[Found]:
     for each in pictures:
         picture = read_picture(each.picture)
-        size_px = [round(shown.enlarged * side) for side in picture.shape[1::-1]]
-        detections = detector.detect(cv2.resize(picture, size_px, interpolation=cv2.INTER_LINEAR))
-        detections = type(detections)(detections.boxes_px / shown.enlarged, detections.scores)
-        if shown.folder is not None:
-            shown.folder.mkdir(parents=True, exist_ok=True)
+        detections = detector.detect(picture)
+        if drawn is not None:
+            drawn.mkdir(parents=True, exist_ok=True)
             counted = detections.scores >= threshold
             kept = type(detections)(detections.boxes_px[counted], detections.scores[counted])
-            draw_boxes(shown.folder / drawn_name(each.picture.name), picture, kept)
+            draw_boxes(drawn / drawn_name(each.picture.name), picture, kept)
         yield Found(detections, each.boxes_px, each.ignored_px, each.smallest_px)
 
 
@@ -204,8 +194,8 @@ def _rendered(recording: Path) -> Iterator[Labelled]:
         yield _labelled(picture, wanted, others)
 
 
-def _time_ms(name: str, picture: NDArray[np.uint8]) -> float:
-    detector = OnnxDetector.open(model_named(name), threads=1)
+def _time_ms(name: str, augment: bool, picture: NDArray[np.uint8]) -> float:
+    detector = OnnxDetector.open(model_named(name), threads=1, augment=augment)
     times_s = []
     for _ in range(RUNS):
         begun_s = time.process_time()

@@ -16,6 +16,7 @@ import typer.main
 
 from pomona.cli import app, main
 from pomona.cloud import FruitCloud, Views
+from pomona.mirrored import mirror_image
 from pomona.orchard import write_session
 from pomona.synth.clouds import scene_pair
 
@@ -400,6 +401,47 @@ def test_config_comes_from_what_is_open_already(name: str) -> None:
     done = run("config", "--config", name, stdin="[match]\nnoise = 0.03\n")
     assert done.returncode == 2
     assert done.stderr.startswith(f"pomona: {name}: unknown setting match.noise, expected one of ")
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("method", ["verified", "paper"])
+def test_left_handed_axes_are_told(run_here: Run, visits: Path, tmp_path: Path, axis: int, method: str) -> None:
+    cloud = FruitCloud.read(visits / "query.csv")
+    flipped = replace(cloud, positions=cloud.positions * np.where(np.arange(3) == axis, -1.0, 1.0))
+    flipped.write(tmp_path / "flipped.csv")
+    done = run_here("match", tmp_path / "flipped.csv", visits / "map.csv", "--method", method)
+    told = re.search(
+        r"pomona: the mirror image of QUERY fits MAP, with (\d+) pairs: the axes .* left-handed", done.stderr
+    )
+    assert told, done.stderr
+    assert int(told[1]) > 0.4 * len(cloud)
+
+
+def test_a_row_that_is_not_there_is_no_mirror_image_either(run_here: Run, tmp_path: Path) -> None:
+    pair = scene_pair("noov", seed=7)
+    pair.query.write(tmp_path / "query.csv")
+    pair.map.write(tmp_path / "map.csv")
+    done = run_here("match", tmp_path / "query.csv", tmp_path / "map.csv")
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_a_mirror_image_stands_upright_as_its_cloud_does() -> None:
+    up = np.array([0.3, -0.5, 0.8])
+    cloud = scene_pair("base", seed=7).query
+    cloud = replace(cloud, covariances=np.tile(np.diag([1e-4, 4e-4, 9e-4]), (len(cloud), 1, 1)))
+    image = mirror_image(cloud, up)
+    np.testing.assert_allclose(image.positions @ up, cloud.positions @ up, atol=1e-12)
+    np.testing.assert_allclose(mirror_image(image, up).positions, cloud.positions, atol=1e-12)
+    apart, apart_then = (each.positions[1:] - each.positions[:-1] for each in (cloud, image))
+    np.testing.assert_allclose(np.linalg.norm(apart_then, axis=1), np.linalg.norm(apart, axis=1))
+    assert np.linalg.det(apart[:3]) == pytest.approx(-np.linalg.det(apart_then[:3]))
+    for row in (0, 5):
+        offset, offset_then = (each.positions[row] - each.positions[row + 1] for each in (cloud, image))
+        weighed, weighed_then = (
+            offset_of @ np.linalg.solve(each.covariances[row], offset_of)
+            for each, offset_of in ((cloud, offset), (image, offset_then))
+        )
+        assert weighed == pytest.approx(weighed_then)
 
 
 def test_no_match_under_a_vertical_that_is_not_theirs_says_so(run_here: Run, visits: Path) -> None:

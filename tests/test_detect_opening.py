@@ -57,6 +57,7 @@ def test_a_model_with_settings(row):
         "classes": [0],
         "class_agnostic": True,
         "tiles": "auto",
+        "augment": False,
     }
     assert detector.path == model
 
@@ -67,6 +68,11 @@ def test_what_does_not_go_together_is_told(row):
         open_detector(row / "detections.csv", row / "apples.onnx", recording)
     with pytest.raises(PomonaError, match="min_score: found without a model, expected --model FILE"):
         open_detector(None, None, recording, min_score=0.5)
+    with pytest.raises(PomonaError, match="augment: found without a model, expected --model FILE"):
+        open_detector(None, None, recording, augment=True)
+    model = onnx_maker.yolov8(row / "apples.onnx", 320, 256)
+    with pytest.raises(PomonaError, match=r"apples.onnx: augment: found an input of 320x256, expected one of any size"):
+        open_detector(None, model, recording, augment=True)
     (row / "detections.csv").unlink()
     (row / "left" / "0000.png").unlink()
     (row / "left").rmdir()

@@ -8,9 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+import onnx_maker
 from pomona.detect import Detections
 from pomona.detect.accuracy import Found, judged
 from pomona.detect.onnx import OnnxDetector
@@ -27,7 +29,7 @@ def boxes_in(path):
     with path.open(encoding="utf-8", newline="") as file:
         for line in csv.DictReader(file):
             boxes[line["image"]].append([float(value) for value in list(line.values())[1:]])
-    return {name: np.array(rows).reshape(len(rows), -1) for name, rows in boxes.items()}
+    return {name: np.array(rows).reshape(len(rows), len(rows[0]) if rows else 5) for name, rows in boxes.items()}
 
 
 def accuracy(path, names):
@@ -65,6 +67,36 @@ def test_a_least_score_leaves_the_better_boxes(pomona, tmp_path):
     assert 0 < len(few) < len(many)
     assert set(few) < set(many)
     assert all(float(line.split(",")[-1]) >= 0.8 for line in few)
+
+
+def test_pictures_are_looked_at_twice_unless_told_otherwise(pomona, tmp_path):
+    picture = read_picture(PICTURES / NAMES[0])
+    for augment, arguments in ((True, ()), (True, ("--augment",)), (False, ("--no-augment",))):
+        assert pomona("detect", PICTURES / NAMES[0], "-o", tmp_path / "boxes.csv", *arguments)[0] == 0
+        detector = OnnxDetector.open(model_named(SHIPPED), augment=augment)
+        assert detector.configuration["augment"] == augment
+        assert ("looks twice" in detector.description) == augment
+        found = detector.detect(picture)
+        told = boxes_in(tmp_path / "boxes.csv")[NAMES[0]]
+        np.testing.assert_allclose(told, np.column_stack([found.boxes_px, found.scores]), atol=0.006)
+    # A network of one size sees no more of an enlarged picture.
+    model = onnx_maker.yolov8(tmp_path / "apples.onnx", 320, 256)
+    assert pomona("detect", PICTURES / NAMES[0], "-o", tmp_path / "boxes.csv", "--model", model)[0] == 0
+    code, out, told = pomona("detect", PICTURES / NAMES[0], "-o", tmp_path / "b.csv", "--model", model, "--augment")
+    assert (code, out) == (2, "")
+    assert told == (
+        f"pomona: {model}: augment: found an input of 320x256, expected one of any size: none is enlarged\n"
+    )
+    assert not (tmp_path / "b.csv").exists()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (31, 700), (2000, 3000)])
+def test_two_looks_at_pictures_of_any_size(shape):
+    # A photograph, as large as asked: tiny, thin, and so large that it is shrunk and its second look not.
+    picture = cv2.resize(read_picture(PICTURES / NAMES[0]), shape[::-1], interpolation=cv2.INTER_AREA)
+    found = OnnxDetector.open(model_named(SHIPPED), augment=True).detect(picture)
+    assert (found.boxes_px[:, 2:] <= shape[::-1]).all()
+    assert len(found) > 0 or shape != (2000, 3000)
 
 
 def test_a_name_that_is_not_utf_8_is_one_line(pomona, tmp_path):

@@ -26,6 +26,11 @@ def detect(
     ),
     min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least score; else what the model asks for."),
     tiles: str = typer.Option("auto", metavar="auto|off|NxM", help="Tiles of a large picture."),
+    augment: bool | None = typer.Option(
+        None,
+        "--augment/--no-augment",
+        help="Look at each picture twice, once enlarged; else where the network takes pictures of any size.",
+    ),
     plot: Annotated[Path | None, Writes(DRAWN_BOXES)] = typer.Option(
         None, metavar="DIR", help="Draw the boxes into pictures here."
     ),
@@ -44,7 +49,7 @@ def detect(
     named = pictures_in(pictures)
     outputs = [output, *([plot] if plot else [])]
     refuse_inputs(outputs, [*named.values(), model_named(model)])
-    detector = OnnxDetector.open(model_named(model), min_score=min_score, tiles=tiles)
+    detector = OnnxDetector.open(model_named(model), min_score=min_score, tiles=tiles, augment=augment)
     with counting("detecting", len(named)) as progress:
         found = detect_in(named, detector, plot, progress)
     with whole_file(output) as partial:

@@ -29,6 +29,7 @@ from pomona.likes import PAIRS, PICTURE
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
+    from pomona.settings import Settings
 
 
 def match(
@@ -81,8 +82,20 @@ def match(
     _print(answer, in_query, in_map, json=json, explain=explain)
     if answer.status == "NoMatch" and settings.call["up"] is not None:
         tell("pomona: only poses that stand upright by --up were taken; given once, it holds for both clouds")
+    _doubt_hands(in_query, in_map, answer, settings)
     if answer.status != "Found":
         raise typer.Exit(1)
+
+
+def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> None:
+    from pomona.cli.progress import working
+    from pomona.mirrored import pairs_of_mirror_image
+
+    with working("looking at the mirror image of QUERY"):
+        pairs = pairs_of_mirror_image(query, map, answer, settings)
+    if pairs:
+        left_handed = "the axes of one of them are left-handed, and the sign of one axis has to be changed"
+        tell(f"pomona: the mirror image of QUERY fits MAP, with {amount(pairs, 'pair')}: {left_handed}")
 
 
 def _draw(

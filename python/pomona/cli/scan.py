@@ -45,6 +45,11 @@ def scan(
     min_score: float | None = typer.Option(None, min=0.0, max=1.0, help="Least confidence of the model's boxes."),
     classes: str | None = typer.Option(None, metavar="NAME,...", help="Classes of the model that are fruits."),
     tiles: str | None = typer.Option(None, metavar="auto|off|NxM", help="Tiles of a large picture for the model."),
+    augment: bool = typer.Option(
+        False,
+        "--augment",
+        help="Let the model look twice, once at the picture enlarged: fewer false fruits, more time.",
+    ),
     calibration: Path | None = typer.Option(
         None, metavar="FILE", help="Calibration, where it does not lie beside the pictures."
     ),
@@ -123,6 +128,7 @@ def scan(
         min_score=min_score,
         classes=_classes(classes),
         tiles=tiles,
+        augment=augment or None,
     )
     opened = ready.recording
     with (

@@ -46,6 +46,7 @@ class ModelSettings(TypedDict, total=False):
     tiles: str | None
     size_px: tuple[int, int] | None
     threads: int | None
+    augment: bool | None
 
 
 def open_detections(path: str | Path, calibration: Calibration, numbers: Sequence[int]) -> FileDetector | MaskDetector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pomona.detect.detections import Detections
 from pomona.detect.onnx.candidates import Selection, suppress
 from pomona.detect.onnx.families import FAMILIES
+from pomona.detect.onnx.looks import ENLARGED, LARGEST_PX, LEAST, agreed
 from pomona.detect.onnx.mask_boxes import tightened
 from pomona.detect.onnx.network import Network
 from pomona.detect.onnx.preparation import prepare
@@ -44,6 +45,7 @@ class OnnxDetector:
     iou: float
     class_agnostic: bool
     tiling: Tiling
+    augment: bool = False
 
     @classmethod
     def open(
@@ -58,6 +60,7 @@ class OnnxDetector:
         tiles: str = "auto",
         size_px: tuple[int, int] | None = None,
         threads: int | None = None,
+        augment: bool | None = False,
     ) -> OnnxDetector:
         """Open a model and tell what it is.
 
@@ -82,6 +85,9 @@ class OnnxDetector:
             Width and height of the input, where the network takes any; else those that the file says, else 640x640.
         threads : int, optional
             For ONNX Runtime; one a core where it is None.
+        augment : bool or None
+            Whether each picture is looked at twice, the second time enlarged by 1.5, in three times the time: test-time
+            augmentation (`looks`). None is yes where the network takes pictures of any size.
 
         Raises
         ------
@@ -96,7 +102,11 @@ class OnnxDetector:
         signature = identify(network, family, size_px)
         asked = MIN_SCORE if signature.min_score is None else signature.min_score
         selection = signature.selection(str(path), asked if min_score is None else min_score, classes)
-        return cls(network, signature, selection, iou, class_agnostic, tiling)
+        if augment and signature.multiple_px is None:
+            found = "x".join(map(str, signature.size_px))
+            raise PomonaError(f"{path}: augment: found an input of {found}, expected one of any size: none is enlarged")
+        twice = signature.multiple_px is not None if augment is None else augment
+        return cls(network, signature, selection, iou, class_agnostic, tiling, twice)
 
     @property
     def path(self) -> Path:
@@ -121,6 +131,7 @@ class OnnxDetector:
             "classes": None if classes is None else classes.tolist(),
             "class_agnostic": self.class_agnostic,
             "tiles": "auto" if self.tiling is None else "x".join(map(str, self.tiling)),
+            "augment": self.augment,
         }
 
     @property
@@ -129,7 +140,8 @@ class OnnxDetector:
         signature = self.signature
         size = "x".join(map(str, signature.size_px)) + (" at most" if signature.multiple_px else "")
         title = f"{signature.family} ({FAMILIES[signature.family].title}) {signature.grounds}"
-        return f"{self.path}: {title}; input {size} {signature.preparation}; {self._classes()}"
+        looks = f"; looks twice, once enlarged by {ENLARGED:g}" if self.augment else ""
+        return f"{self.path}: {title}; input {size} {signature.preparation}; {self._classes()}{looks}"
 
     def _classes(self) -> str:
         names, wanted = self.signature.names or {}, self.selection.classes
@@ -182,16 +194,32 @@ class OnnxDetector:
     def _in_tile(self, picture: NDArray[np.uint8], tile: Tile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Boxes and scores of one tile, in the pixels of the picture."""
         part = picture[tile.ymin : tile.ymax, tile.xmin : tile.xmax]
-        size_px = self.signature.input_px((part.shape[1], part.shape[0]))
-        given, placement = prepare(part, size_px, self.signature.preparation)
+        boxes_px, scores = self._two_looks(part) if self.augment else self._look(part, self.selection)
+        return boxes_px + np.tile((tile.xmin, tile.ymin), 2), scores
+
+    def _two_looks(self, picture: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        asked = self.selection
+        least = replace(asked, min_score=LEAST)
+        first, second = (self._look(picture, least, enlarged) for enlarged in (1.0, ENLARGED))
+        largest_px = LARGEST_PX / self.signature.ratio((picture.shape[1], picture.shape[0]))
+        with np.errstate(all="ignore"):
+            boxes_px, scores = agreed(first, second, self.iou, largest_px)
+            enough = scores >= asked.min_score
+        return boxes_px[enough], scores[enough]
+
+    def _look(
+        self, picture: NDArray[np.uint8], selection: Selection, enlarged: float = 1.0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Boxes and scores that the network tells of a picture that it sees enlarged."""
+        size_px = self.signature.input_px((picture.shape[1], picture.shape[0]), enlarged)
+        given, placement = prepare(picture, size_px, self.signature.preparation, enlarged)
         outputs = self.network.run(given)
         # A network may give NaN and infinity; boxes of such numbers are left out at the end.
         with np.errstate(all="ignore"):
-            candidates = self.signature.decoder(outputs, self.selection)
+            candidates = self.signature.decoder(outputs, selection)
             if FAMILIES[self.signature.family].overlapping:
                 candidates = suppress(candidates, self.iou, across_classes=self.class_agnostic)
-            boxes_px = placement.to_picture(tightened(candidates, size_px)) + np.tile((tile.xmin, tile.ymin), 2)
-        return boxes_px, candidates.scores
+            return placement.to_picture(tightened(candidates, size_px)), candidates.scores
 
     def _margin_px(self, tile: Tile) -> float:
         width, height = self.signature.input_px((tile.xmax - tile.xmin, tile.ymax - tile.ymin))

@@ -26,7 +26,7 @@ class Preparation:
     ----------
     fit : str
         `letterbox`: shape kept, centred between grey bars; `corner`: shape kept, in the top left corner; `inside`: the
-        same, and never enlarged; `stretch`.
+        same, and enlarged only where that is asked for; `stretch`.
     channels : str
         Their order.
     resize : str
@@ -65,7 +65,7 @@ class InputPlacement:
 
 
 def prepare(
-    picture: NDArray[np.uint8], size_px: tuple[int, int], preparation: Preparation
+    picture: NDArray[np.uint8], size_px: tuple[int, int], preparation: Preparation, enlarged: float = 1.0
 ) -> tuple[NDArray[np.float32], InputPlacement]:
     """Prepare a picture.
 
@@ -77,6 +77,8 @@ def prepare(
         Width and height of the network's input.
     preparation : Preparation
         What the network expects.
+    enlarged : float
+        How much larger than it is the picture may become where it lies `inside`.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def prepare(
         The input, and where the picture lies in it.
     """
     old_px = (picture.shape[1], picture.shape[0])
-    new_px, corner_px = _fit(old_px, size_px, preparation.fit)
+    new_px, corner_px = _fit(old_px, size_px, preparation.fit, enlarged)
     resized = _resized(picture, new_px, preparation.resize)
     given = np.full((3, size_px[1], size_px[0]), PADDING, np.float32)
     inside = np.s_[corner_px[1] : corner_px[1] + new_px[1], corner_px[0] : corner_px[0] + new_px[0]]
@@ -96,13 +98,15 @@ def prepare(
     return given, InputPlacement((new_px[0] / old_px[0], new_px[1] / old_px[1]), corner_px)
 
 
-def _fit(old_px: tuple[int, int], size_px: tuple[int, int], fit: str) -> tuple[tuple[int, int], tuple[int, int]]:
+def _fit(
+    old_px: tuple[int, int], size_px: tuple[int, int], fit: str, enlarged: float
+) -> tuple[tuple[int, int], tuple[int, int]]:
     """Size of the picture in the input, and its corner there; rounded as each family's own code rounds."""
     if fit == "stretch":
         return size_px, (0, 0)
     ratio = min(size_px[0] / old_px[0], size_px[1] / old_px[1])
     if fit in ("corner", "inside"):
-        ratio = ratio if fit == "corner" else min(ratio, 1.0)
+        ratio = ratio if fit == "corner" else min(ratio, enlarged)
         return (max(int(old_px[0] * ratio), 1), max(int(old_px[1] * ratio), 1)), (0, 0)
     new_px = max(round(old_px[0] * ratio), 1), max(round(old_px[1] * ratio), 1)
     # An odd rest puts the smaller half left and above.

@@ -73,15 +73,19 @@ class Signature:
     multiple_px: int | None = None
     min_score: float | None = None
 
-    def input_px(self, picture_px: tuple[int, int]) -> tuple[int, int]:
-        """Width and height of the input for a picture of such a size."""
+    def input_px(self, picture_px: tuple[int, int], enlarged: float = 1.0) -> tuple[int, int]:
+        """Width and height of the input for a picture of such a size, `enlarged` where any size goes."""
         if self.multiple_px is None:
             return self.size_px
-        ratio = min(1.0, self.size_px[0] / picture_px[0], self.size_px[1] / picture_px[1])
+        ratio = enlarged * self.ratio(picture_px)
         width, height = (
             self.multiple_px * math.ceil(max(int(side * ratio), 1) / self.multiple_px) for side in picture_px
         )
         return width, height
+
+    def ratio(self, picture_px: tuple[int, int]) -> float:
+        """By how much a picture is shrunk so that it fits, where any size goes; 1 where it does as it is."""
+        return min(1.0, self.size_px[0] / picture_px[0], self.size_px[1] / picture_px[1])
 
     def selection(self, where: str, min_score: float, classes: tuple[str | int, ...] | None) -> Selection:
         """Turn names or numbers of classes into a selection.
