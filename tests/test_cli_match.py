@@ -425,21 +425,45 @@ def test_a_row_that_is_not_there_is_no_mirror_image_either(run_here: Run, tmp_pa
     assert (done.returncode, done.stderr) == (1, "")
 
 
-def test_a_mirror_image_stands_upright_as_its_cloud_does() -> None:
-    up = np.array([0.3, -0.5, 0.8])
+@pytest.mark.parametrize("vertical", [False, True])
+def test_left_handed_axes_are_told_under_a_vertical(run_here: Run, tmp_path: Path, vertical: bool) -> None:
+    pair = scene_pair("part1o45up", seed=7)
+    assert pair.up is not None
+    across = np.cross(pair.up, [0.6, 0.0, 0.8])
+    mirror_image(pair.query, pair.up if vertical else across).write(tmp_path / "query.csv")
+    pair.map.write(tmp_path / "map.csv")
+    up = ",".join(map(str, pair.up))
+    done = run_here("match", tmp_path / "query.csv", tmp_path / "map.csv", f"--up={up}")
+    assert done.returncode == 1
+    assert "pomona: the mirror image of QUERY fits MAP, with " in done.stderr
+
+
+def test_a_dozen_fruits_that_lie_somewhat_like_their_mirror_image(run_here: Run, tmp_path: Path) -> None:
+    draw = np.random.default_rng(3)
+    told = 0
+    for _ in range(6):
+        places = draw.uniform(-0.4, 0.4, (10, 3))
+        for name, sign in (("map", 1.0), ("query", -1.0)):
+            FruitCloud(places * (1, 1, sign) + draw.normal(0, 0.02, (10, 3))).write(tmp_path / f"{name}.csv")
+        told += "mirror image" in run_here("match", tmp_path / "query.csv", tmp_path / "map.csv").stderr
+    assert told >= 5
+
+
+def test_a_mirror_image_keeps_distances_and_covariances_and_turns_the_hand() -> None:
+    normal = np.array([0.3, -0.5, 0.8])
     cloud = scene_pair("base", seed=7).query
     cloud = replace(cloud, covariances=np.tile(np.diag([1e-4, 4e-4, 9e-4]), (len(cloud), 1, 1)))
-    image = mirror_image(cloud, up)
-    np.testing.assert_allclose(image.positions @ up, cloud.positions @ up, atol=1e-12)
-    np.testing.assert_allclose(mirror_image(image, up).positions, cloud.positions, atol=1e-12)
+    image = mirror_image(cloud, normal)
+    np.testing.assert_allclose(mirror_image(image, normal).positions, cloud.positions, atol=1e-12)
+    moved = image.positions - cloud.positions
+    np.testing.assert_allclose(np.cross(moved, normal), 0, atol=1e-12)
     apart, apart_then = (each.positions[1:] - each.positions[:-1] for each in (cloud, image))
     np.testing.assert_allclose(np.linalg.norm(apart_then, axis=1), np.linalg.norm(apart, axis=1))
     assert np.linalg.det(apart[:3]) == pytest.approx(-np.linalg.det(apart_then[:3]))
     for row in (0, 5):
-        offset, offset_then = (each.positions[row] - each.positions[row + 1] for each in (cloud, image))
         weighed, weighed_then = (
-            offset_of @ np.linalg.solve(each.covariances[row], offset_of)
-            for each, offset_of in ((cloud, offset), (image, offset_then))
+            offset @ np.linalg.solve(each.covariances[row], offset)
+            for each, offset in ((cloud, apart[row]), (image, apart_then[row]))
         )
         assert weighed == pytest.approx(weighed_then)
 

@@ -85,7 +85,8 @@ def test_pictures_are_looked_at_twice_unless_told_otherwise(pomona, tmp_path):
     code, out, told = pomona("detect", PICTURES / NAMES[0], "-o", tmp_path / "b.csv", "--model", model, "--augment")
     assert (code, out) == (2, "")
     assert told == (
-        f"pomona: {model}: augment: found an input of 320x256, expected one of any size: none is enlarged\n"
+        f"pomona: {model}: augment: found yolov8 with an input of 320x256, "
+        "expected a network that sees pictures in their own size\n"
     )
     assert not (tmp_path / "b.csv").exists()
 

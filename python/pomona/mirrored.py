@@ -13,13 +13,21 @@ from pomona.settings import Settings
 
 __all__ = ["mirror_image", "pairs_of_mirror_image"]
 
-FEW = 0.2
-"""Of a mirror image up to this share of the fruits is found, by the halves of crowns that are like their own image;
-more is not looked into."""
+WHOLE = 0.5
+"""An answer that finds so much of the smaller cloud is not doubted."""
+
+FEW = 30
+"""Fruits of a small cloud, whose mirror image is looked at in any case: a dozen can lie somewhat like their image."""
+
+LEAST_PAIRS = 8
+"""Fewer are found by chance: with two images the question is asked twice."""
+
+BETTER = 1.3
+"""Evidence of the image over that of the answer from which on it is told; of what is flat both have the same."""
 
 
 def pairs_of_mirror_image(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> int:
-    """Count the pairs of the mirror image of a query of which little or nothing was found; 0 where it fits no better.
+    """Count the pairs of a query's mirror image, where that fits better than the query; 0 where it does not.
 
     Parameters
     ----------
@@ -29,20 +37,27 @@ def pairs_of_mirror_image(query: FruitCloud, map: FruitCloud, answer: Match, set
     settings : Settings
         That they were matched with.
     """
-    found = len(answer.pairs) if answer.status == "Found" else 0
-    if answer.status == "TooFew" or found > FEW * min(len(query), len(map)):
+    found, smaller = answer.status == "Found", min(len(query), len(map))
+    if answer.status == "TooFew" or (found and len(answer.pairs) > WHOLE * smaller and smaller > FEW):
         return 0
+    # With a vertical it matters which axis was turned about: the image stands as its cloud, or on its head.
     ups = settings.call["up"]
-    mirrored = settings.match(mirror_image(query, np.array(ups[0] if ups else (0.0, 0.0, 1.0))), map)
-    better = mirrored.status == "Found" and len(mirrored.pairs) > 2 * found
-    return len(mirrored.pairs) if better else 0
+    up = np.array(ups[0] if ups else (0.0, 0.0, 1.0), float)
+    normals = [np.cross(up, np.eye(3)[np.abs(up).argmin()]), *([up] if ups else [])]
+    images = [settings.match(mirror_image(query, normal), map) for normal in normals]
+    least = BETTER * answer.log_odds if found else 0.0
+    better = [
+        len(image.pairs)
+        for image in images
+        if image.status == "Found" and len(image.pairs) >= LEAST_PAIRS and image.log_odds > least
+    ]
+    return max(better, default=0)
 
 
-def mirror_image(cloud: FruitCloud, up: NDArray[np.float64]) -> FruitCloud:
-    """Reflect a cloud at a plane through its middle that the direction `up` (3,) lies in."""
-    across = np.cross(up, np.eye(3)[np.abs(up).argmin()])
-    across /= np.linalg.norm(across)
-    reflection = np.eye(3) - 2 * np.outer(across, across)
+def mirror_image(cloud: FruitCloud, normal: NDArray[np.float64]) -> FruitCloud:
+    """Reflect a cloud at the plane through its middle with this normal (3,)."""
+    normal = normal / np.linalg.norm(normal)
+    reflection = np.eye(3) - 2 * np.outer(normal, normal)
     middle = cloud.positions.mean(axis=0)
     positions = middle + (cloud.positions - middle) @ reflection
     covariances = None if cloud.covariances is None else reflection @ cloud.covariances @ reflection

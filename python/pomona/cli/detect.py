@@ -29,7 +29,7 @@ def detect(
     augment: bool | None = typer.Option(
         None,
         "--augment/--no-augment",
-        help="Look at each picture twice, once enlarged; else where the network takes pictures of any size.",
+        help="Look at each picture twice, once enlarged; else where the network sees them in their own size.",
     ),
     plot: Annotated[Path | None, Writes(DRAWN_BOXES)] = typer.Option(
         None, metavar="DIR", help="Draw the boxes into pictures here."

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.detect.detections import Detections
 
-__all__ = ["Found", "Judged", "judged", "overlaps"]
+__all__ = ["Found", "Judged", "judged", "overlaps", "shared_areas"]
 
 SAME_IOU = 0.5
 """Overlap from which on a box is that of a fruit: the 50 of AP50."""
@@ -117,20 +117,26 @@ def _hits(found: Found) -> NDArray[np.bool_]:
 
 def overlaps(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -> NDArray[np.float64]:
     """Intersection over union of each of (N, 4) boxes with each of (M, 4), (N, M)."""
-    shared = _shared(one_px, other_px)
+    shared = shared_areas(one_px, other_px)
     union = _areas(one_px)[:, None] + _areas(other_px)[None] - shared
     return np.asarray(shared / np.maximum(union, 1e-9))
 
 
 def _share_in(boxes_px: NDArray[np.floating], regions_px: NDArray[np.floating]) -> NDArray[np.float64]:
     """Share of each box that lies in the region that holds most of it."""
-    return np.asarray((_shared(boxes_px, regions_px) / _areas(boxes_px)[:, None]).max(axis=1, initial=0.0))
+    return np.asarray((shared_areas(boxes_px, regions_px) / _areas(boxes_px)[:, None]).max(axis=1, initial=0.0))
 
 
-def _shared(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -> NDArray[np.float64]:
-    low = np.maximum(one_px[:, None, :2], other_px[None, :, :2])
-    high = np.minimum(one_px[:, None, 2:], other_px[None, :, 2:])
-    return np.asarray(np.maximum(high - low, 0).prod(axis=2), np.float64)
+def shared_areas(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Area that each of (N, 4) boxes shares with each of (M, 4), (N, M)."""
+    width, height = (
+        np.maximum(
+            np.minimum(one_px[:, None, end], other_px[:, end]) - np.maximum(one_px[:, None, start], other_px[:, start]),
+            0,
+        )
+        for start, end in ((0, 2), (1, 3))
+    )
+    return np.asarray(width * height, np.float64)
 
 
 def _areas(boxes_px: NDArray[np.floating]) -> NDArray[np.float64]:

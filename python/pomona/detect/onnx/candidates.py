@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.detect.accuracy import shared_areas
+
 __all__ = ["Candidates", "Selection", "from_centres", "select", "suppress"]
+
+
+PAIRS_AT_ONCE = 1 << 20
+"""Pairs of boxes that are compared at once: 8 MB for each number of them."""
 
 
 @dataclass(frozen=True)
@@ -84,15 +90,21 @@ def suppress(candidates: Candidates, iou: float, *, across_classes: bool) -> Can
     """
     order = np.argsort(-candidates.scores, kind="stable")
     boxes_px, classes = candidates.boxes_px[order], candidates.classes[order]
-    areas = np.prod(np.maximum(boxes_px[:, 2:] - boxes_px[:, :2], 0), axis=1)
     alive = np.ones(len(order), bool)
-    for row in range(len(order)):
-        if not alive[row]:
-            continue
-        rest = row + 1 + np.flatnonzero(alive[row + 1 :])
-        low = np.maximum(boxes_px[rest, :2], boxes_px[row, :2])
-        high = np.minimum(boxes_px[rest, 2:], boxes_px[row, 2:])
-        shared = np.prod(np.maximum(high - low, 0), axis=1)
-        same = shared > iou * (areas[rest] + areas[row] - shared)
-        alive[rest[same & (across_classes | (classes[rest] == classes[row]))]] = False
+    step = max(1, PAIRS_AT_ONCE // max(len(order), 1))
+    for first in range(0, len(order), step):
+        rows = first + np.flatnonzero(alive[first : first + step])
+        same = _same(boxes_px[rows], boxes_px[first:], iou)
+        if not across_classes:
+            same &= classes[rows, None] == classes[None, first:]
+        for row, repeated in zip(rows, same, strict=True):
+            if alive[row]:
+                alive[row + 1 :] &= ~repeated[row + 1 - first :]
     return candidates.rows(order[alive])
+
+
+def _same(one_px: NDArray[np.float64], other_px: NDArray[np.float64], iou: float) -> NDArray[np.bool_]:
+    """Whether each of (N, 4) boxes overlaps each of (M, 4) by more than `iou`, (N, M)."""
+    shared = shared_areas(one_px, other_px)
+    one, other = (np.prod(np.maximum(px[:, 2:] - px[:, :2], 0), axis=1) for px in (one_px, other_px))
+    return np.asarray(shared > iou * (one[:, None] + other - shared))

@@ -87,7 +87,7 @@ class OnnxDetector:
             For ONNX Runtime; one a core where it is None.
         augment : bool or None
             Whether each picture is looked at twice, the second time enlarged by 1.5, in three times the time: test-time
-            augmentation (`looks`). None is yes where the network takes pictures of any size.
+            augmentation (`looks`). None is yes where the network sees pictures in their own size.
 
         Raises
         ------
@@ -103,8 +103,10 @@ class OnnxDetector:
         asked = MIN_SCORE if signature.min_score is None else signature.min_score
         selection = signature.selection(str(path), asked if min_score is None else min_score, classes)
         if augment and signature.multiple_px is None:
-            found = "x".join(map(str, signature.size_px))
-            raise PomonaError(f"{path}: augment: found an input of {found}, expected one of any size: none is enlarged")
+            found = f"{signature.family} with an input of {'x'.join(map(str, signature.size_px))}"
+            raise PomonaError(
+                f"{path}: augment: found {found}, expected a network that sees pictures in their own size"
+            )
         twice = signature.multiple_px is not None if augment is None else augment
         return cls(network, signature, selection, iou, class_agnostic, tiling, twice)
 
@@ -203,9 +205,7 @@ class OnnxDetector:
         first, second = (self._look(picture, least, enlarged) for enlarged in (1.0, ENLARGED))
         largest_px = LARGEST_PX / self.signature.ratio((picture.shape[1], picture.shape[0]))
         with np.errstate(all="ignore"):
-            boxes_px, scores = agreed(first, second, self.iou, largest_px)
-            enough = scores >= asked.min_score
-        return boxes_px[enough], scores[enough]
+            return agreed(first, second, self.iou, largest_px, asked.min_score)
 
     def _look(
         self, picture: NDArray[np.uint8], selection: Selection, enlarged: float = 1.0

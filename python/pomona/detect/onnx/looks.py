@@ -30,7 +30,7 @@ Boxes = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Corners (N, 4), and scores (N,)."""
 
 
-def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float) -> Boxes:
+def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float, min_score: float) -> Boxes:
     """Make one list of the boxes of two looks.
 
     Each box of the first, best first, goes with the free box of the second that it overlaps most, where that is `iou`
@@ -40,7 +40,7 @@ def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float) -> Boxes:
     Returns
     -------
     (M, 4) float64, (M,) float64
-        Boxes and scores, best first; no two overlap by more than `iou`.
+        Boxes and scores of at least `min_score`, best first; no two overlap by more than `iou`.
     """
     (first_px, first_scores), (second_px, second_scores) = first, _up_to(second, largest_px)
     large = _areas(first_px) > largest_px**2
@@ -55,7 +55,8 @@ def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float) -> Boxes:
     here, there = np.hsplit(said[:n][paired] ** 2, 2)
     boxes_px[:n][paired] = (here * first_px[paired] + there * second_px[partners[paired]]) / (here + there)
     scores = 1 / (1 + np.exp(-_log_odds(said).mean(axis=1)))
-    numbers = np.zeros(len(scores), np.int64)
+    enough = scores >= min_score
+    boxes_px, scores, numbers = boxes_px[enough], scores[enough], np.zeros(np.count_nonzero(enough), np.int64)
     kept = suppress(Candidates(boxes_px, scores, numbers, numbers), iou, across_classes=True)
     return kept.boxes_px, kept.scores
 
