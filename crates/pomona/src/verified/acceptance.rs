@@ -62,7 +62,7 @@ impl VerifiedConfig {
 /// Were the log-odds of a wrong pose those of a fixed pose, `P(any of N > t) <= N exp(-t)`. Refinement fits six or
 /// seven numbers to each and so stretches the tail: over unrelated clouds the largest log-odds follow
 /// `P(max > t) = exp(-(t - offset - per_pose ln N) / stretch)`. `python -m benchmarks chance` fits the three; it gives
-/// 14.7, 0.86 and 2.2 for crowns, more for a dozen fruits and less for rows. The cells without overlap and the
+/// 16.0, 0.56 and 1.8 for crowns: as much for a dozen fruits and less for rows. The cells without overlap and the
 /// unrelated clouds of the benchmarks `cells` and `season` hold them to account.
 ///
 /// Where only a `share` of all turns is admitted, the probability is that share of it.

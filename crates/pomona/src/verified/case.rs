@@ -155,6 +155,14 @@ impl<'a> Search<'a> {
         Some(Self { model: Model { vertical, ..self.model }, ..*self })
     }
 
+    /// The same search for another query.
+    pub(super) fn for_query<'b>(&self, query: &'b Landscape) -> Search<'b>
+    where
+        'a: 'b,
+    {
+        Search { query, ..*self }
+    }
+
     /// Evidence that a grown pose must exceed, nats.
     pub(super) fn threshold(&self, share: f64) -> f64 {
         self.reached(self.config.false_alarm_rate, share)

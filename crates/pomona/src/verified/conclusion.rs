@@ -11,7 +11,7 @@ impl Search<'_> {
     /// The answer to what was found.
     pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
         let mut stages = self.stages(&findings);
-        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best)) {
+        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best, &findings.log)) {
             stages.push(("mirrored", 1.0));
             findings.accepted.clear();
         }

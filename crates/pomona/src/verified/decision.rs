@@ -43,7 +43,7 @@ const REACHED_LAID: f64 = 17.0;
 /// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
 const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 
-/// A pose with this many times the evidence needed is no local optimum and has no rival.
+/// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
 pub(super) const SURE: f64 = 6.0;
 
 /// Finds the query in the map.
@@ -120,7 +120,7 @@ impl<'a> Search<'a> {
     }
 
     /// Grows the best of what seeds propose; returns the candidates that were not refined.
-    fn try_seeds(&self, seeds: &[Seed], keep: usize, findings: &mut Findings<'a>) -> Vec<Contender> {
+    pub(super) fn try_seeds(&self, seeds: &[Seed], keep: usize, findings: &mut Findings<'a>) -> Vec<Contender> {
         let (hypotheses, rest) = self.ask(seeds, keep, &mut findings.log);
         self.grow_distinct(&hypotheses, findings);
         rest

@@ -1,16 +1,20 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
-use super::case::{Finding, Findings, Search};
+use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
+use super::decision::SURE;
 use super::growth::grow;
 use super::hypothesis::{GATE, Hypothesis, Model, refined};
+use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::patches::Landing;
+use super::proposal::Effort;
 use super::search::REACH;
+use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::moments::Moments;
 use crate::neighbours::tree::single;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -23,9 +27,6 @@ const BENT: f64 = 0.05;
 
 /// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
 const MIRRORED: f64 = 1.3;
-
-/// A pose that explains this share of the query is no accident of a flat crown.
-const WHOLE: f64 = 0.7;
 
 /// Turn about each axis that a polish tries either way, radians: 7 degrees.
 const POLISH_TURN_RAD: f64 = 0.13;
@@ -82,16 +83,35 @@ impl<'a> Search<'a> {
         spread[1] > (GATE * noise).powi(2)
     }
 
-    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does.
+    /// Whether the mirror image of the query is found with more evidence than the query.
     ///
-    /// Where a crown is flat, a mirrored row matches by a half-turn; the rest of the row tells.
-    pub(super) fn fits_better_mirrored(&self, finding: &Finding) -> bool {
-        let explained = finding.overlap.predictions.iter().flatten().count();
-        explained as f64 <= WHOLE * self.query.len() as f64 && self.mirror_explains_more(finding)
+    /// Where a crown is flat, or half of one is like the other, a mirrored row matches in part; all of it matches as what it is. It
+    /// is looked for as the query was, with the first seeds. What is sure is not doubted.
+    pub(super) fn fits_better_mirrored(&self, finding: &Finding, log: &Log) -> bool {
+        let Overlap { log_odds, .. } = finding.overlap;
+        if log_odds >= SURE * log.threshold {
+            return false;
+        }
+        let query = self.mirrored_query();
+        let search = self.for_query(&query);
+        let mut findings = Findings::none(Effort::default(), log.threshold);
+        if let Some((seeds, keep)) = search.rounds().next() {
+            search.try_seeds(&seeds, keep, &mut findings);
+        }
+        findings.accepted.iter().any(|image| image.overlap.log_odds > MIRRORED * log_odds)
     }
 
-    /// The same of a pose that lays all of the query on few of its fruits, as rows laid along rows do: those next to the middle of
-    /// a mirrored row lie on themselves.
+    /// Reflected at a plane that a known vertical lies in.
+    fn mirrored_query(&self) -> Landscape {
+        let up = self.model.vertical.map_or(Vector3::z(), |vertical| vertical.of_query());
+        let across = up.cross(&Vector3::ith(up.iamin(), 1.0)).normalize();
+        let image = |p: &Vector3<f64>| Point3::from(p - across * (2.0 * across.dot(p)));
+        let positions = self.query.points.iter().map(image).collect();
+        Landscape::with_spacing(&FruitCloud::from_positions(positions), Some(self.query.spacing))
+    }
+
+    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does: a row laid along a row is
+    /// mirrored there, for those next to the middle of a mirrored row lie on themselves.
     pub(super) fn mirror_explains_more(&self, finding: &Finding) -> bool {
         let moments = self.overlap_moments(finding);
         let eigen = moments.spread().symmetric_eigen();

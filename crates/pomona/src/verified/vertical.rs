@@ -19,6 +19,11 @@ impl Vertical {
         Self { query: query.normalize(), map: map.normalize() }
     }
 
+    /// Up in the query.
+    pub(super) fn of_query(&self) -> Vector3<f64> {
+        self.query
+    }
+
     /// The same where the query is upside down.
     pub(crate) fn inverted(&self) -> Self {
         Self { query: -self.query, map: self.map }

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from pomona.detect.detections import Detections
 from pomona.detect.onnx.candidates import Selection, suppress
 from pomona.detect.onnx.families import FAMILIES
-from pomona.detect.onnx.looks import ENLARGED, LARGEST_PX, LEAST, agreed
 from pomona.detect.onnx.mask_boxes import tightened
 from pomona.detect.onnx.network import Network
 from pomona.detect.onnx.preparation import prepare
 from pomona.detect.onnx.signature import Signature, identify
 from pomona.detect.onnx.tiles import Tile, Tiling, lay_tiles, merge_tiles, read_tiling
+from pomona.detect.onnx.two_looks import ENLARGED, LARGEST_PX, LEAST, agreed
 from pomona.errors import PomonaError
 from pomona.recording import Frame
 
@@ -87,7 +87,7 @@ class OnnxDetector:
             For ONNX Runtime; one a core where it is None.
         augment : bool or None
             Whether each picture is looked at twice, the second time enlarged by 1.5, in three times the time: test-time
-            augmentation (`looks`). None is yes where the network sees pictures in their own size.
+            augmentation (`two_looks`). None is yes where the network sees pictures in their own size.
 
         Raises
         ------

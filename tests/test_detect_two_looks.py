@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pomona.detect.onnx.looks import LEAST, agreed
+from pomona.detect.onnx.two_looks import LEAST, agreed
 
 NOTHING = np.zeros((0, 4)), np.zeros(0)
 FAR_PX = 1000.0
