@@ -160,6 +160,14 @@ def spurs(seed: int) -> NDArray[np.float64]:
     return np.vstack([taken + random.normal(0.0, 0.03, taken.shape), elsewhere])
 
 
+def test_a_mirrored_row_of_which_a_part_fits_is_not_found() -> None:
+    pair = scene_pair("mirror", 82)
+    match = pomona.match(pair.query, pair.map)
+    assert match.status == "NoMatch"
+    # A half of a crown lies on another with 42 nats: the mirror image has more.
+    assert dict(match.stages)["mirrored"] == 1.0
+
+
 @pytest.mark.parametrize("seed", [5, 12, 14])
 def test_a_planting_that_meets_itself_everywhere_is_not_found(seed: int) -> None:
     """Two rows without a common fruit: each step from spur to spur is as good as the next."""

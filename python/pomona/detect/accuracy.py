@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.detect.detections import Detections
 
-__all__ = ["Found", "Judged", "judged", "overlaps", "shared_areas"]
+__all__ = ["Found", "Judged", "areas", "judged", "overlaps", "shared_areas"]
 
 SAME_IOU = 0.5
 """Overlap from which on a box is that of a fruit: the 50 of AP50."""
@@ -101,7 +101,7 @@ def judged(pictures: Iterable[Found]) -> Judged:
 
 def _is_open(found: Found) -> NDArray[np.bool_]:
     boxes_px = found.detections.boxes_px
-    return (_share_in(boxes_px, found.ignored_px) >= SAME_IOU) | (_areas(boxes_px) < found.smallest_px**2)
+    return (_share_in(boxes_px, found.ignored_px) >= SAME_IOU) | (areas(boxes_px) < found.smallest_px**2)
 
 
 def _hits(found: Found) -> NDArray[np.bool_]:
@@ -118,13 +118,13 @@ def _hits(found: Found) -> NDArray[np.bool_]:
 def overlaps(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -> NDArray[np.float64]:
     """Intersection over union of each of (N, 4) boxes with each of (M, 4), (N, M)."""
     shared = shared_areas(one_px, other_px)
-    union = _areas(one_px)[:, None] + _areas(other_px)[None] - shared
+    union = areas(one_px)[:, None] + areas(other_px)[None] - shared
     return np.asarray(shared / np.maximum(union, 1e-9))
 
 
 def _share_in(boxes_px: NDArray[np.floating], regions_px: NDArray[np.floating]) -> NDArray[np.float64]:
     """Share of each box that lies in the region that holds most of it."""
-    return np.asarray((shared_areas(boxes_px, regions_px) / _areas(boxes_px)[:, None]).max(axis=1, initial=0.0))
+    return np.asarray((shared_areas(boxes_px, regions_px) / areas(boxes_px)[:, None]).max(axis=1, initial=0.0))
 
 
 def shared_areas(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -139,5 +139,6 @@ def shared_areas(one_px: NDArray[np.floating], other_px: NDArray[np.floating]) -
     return np.asarray(width * height, np.float64)
 
 
-def _areas(boxes_px: NDArray[np.floating]) -> NDArray[np.float64]:
+def areas(boxes_px: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Area of each of (N, 4) boxes, (N,)."""
     return np.asarray((boxes_px[:, 2:] - boxes_px[:, :2]).prod(axis=1), np.float64)

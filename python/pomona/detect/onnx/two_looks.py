@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.detect.accuracy import overlaps
+from pomona.detect.accuracy import areas, overlaps
 from pomona.detect.onnx.candidates import Candidates, suppress
 
-__all__ = ["ENLARGED", "LEAST", "agreed"]
+__all__ = ["ENLARGED", "LARGEST_PX", "LEAST", "agreed"]
 
 ENLARGED = 1.5
 """How much larger the second look sees the picture. On validation pictures 1.25 is better for fruits of 40 px and worse
@@ -43,7 +43,7 @@ def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float, min_score
         Boxes and scores of at least `min_score`, best first; no two overlap by more than `iou`.
     """
     (first_px, first_scores), (second_px, second_scores) = first, _up_to(second, largest_px)
-    large = _areas(first_px) > largest_px**2
+    large = areas(first_px) > largest_px**2
     partners = _partners(np.where(large[:, None], 0, overlaps(first_px, second_px)), first_scores, iou)
     paired, n = partners >= 0, len(first_px)
     alone = np.setdiff1d(np.arange(len(second_px)), partners)
@@ -63,12 +63,8 @@ def agreed(first: Boxes, second: Boxes, iou: float, largest_px: float, min_score
 
 def _up_to(boxes: Boxes, largest_px: float) -> Boxes:
     boxes_px, scores = boxes
-    small = _areas(boxes_px) <= largest_px**2
+    small = areas(boxes_px) <= largest_px**2
     return boxes_px[small], scores[small]
-
-
-def _areas(boxes_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.prod(boxes_px[:, 2:] - boxes_px[:, :2], axis=1))
 
 
 def _partners(like: NDArray[np.float64], scores: NDArray[np.float64], iou: float) -> NDArray[np.intp]:
