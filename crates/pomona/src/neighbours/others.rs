@@ -42,4 +42,4 @@ pub(crate) fn each_row<T: Send>(count: usize, of: impl Fn(usize) -> T + Sync + S
 }
 
 /// Rows at the least that are worth a thread of their own.
-pub(crate) const SHARE_OF_ROWS: usize = 256;
+pub(crate) const SHARE_OF_ROWS: usize = 64;

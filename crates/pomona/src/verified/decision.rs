@@ -185,25 +185,16 @@ impl<'a> Search<'a> {
 
     /// Grows the best hypotheses that no accepted finding explains yet, and adds them to these.
     pub(super) fn grow_distinct(&self, hypotheses: &[Hypothesis], findings: &mut Findings<'a>) {
-        let mut grown = 0;
-        let mut left = hypotheses.iter();
-        while grown < GROWN {
-            // What one of them explains of the next is thrown away: the others do not depend on how many grow at once.
-            let at_once = rayon::current_num_threads().min(GROWN - grown);
-            let worth = |seed: &&Hypothesis| self.is_worth_growing(seed, findings);
-            let some: Vec<&Hypothesis> = left.by_ref().filter(worth).take(at_once).collect();
-            if some.is_empty() {
+        let before = findings.accepted.len();
+        for seed in hypotheses {
+            if findings.accepted.len() == before + GROWN {
                 break;
             }
-            let grow = |seed: &&Hypothesis| Finding::new(grow(self.query, self.map, seed, &self.model), **seed);
-            for finding in some.par_iter().map(grow).collect::<Vec<_>>() {
-                if self.is_worth_growing(&finding.seed, findings) {
-                    grown += 1;
-                    findings.accepted.push(finding);
-                }
+            if self.is_worth_growing(seed, findings) {
+                findings.accepted.push(Finding::new(grow(self.query, self.map, seed, &self.model), *seed));
             }
         }
-        findings.log.grown += grown;
+        findings.log.grown += findings.accepted.len() - before;
     }
 
     /// Whether no finding explains a hypothesis, and it is strong enough to be a rival.

@@ -26,7 +26,7 @@ pub(super) const NEXT: f64 = 0.3;
 pub(super) const ALL: f64 = 0.0;
 
 /// Cells at the least that are worth a thread of their own.
-const SHARE_OF_CELLS: usize = 32;
+const SHARE_OF_CELLS: usize = 8;
 
 /// A fruit of the query where the grown pose puts it.
 #[derive(Debug, Clone, Copy)]

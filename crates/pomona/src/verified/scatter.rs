@@ -65,16 +65,17 @@ pub(super) struct Scatter {
 pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> Scatter {
     let counts = Counts::new(laid);
     // Each an eighth of an octave above the last: from half a bin to half of all, 5 mm to 16 cm in an orchard.
-    let tried: Vec<(f64, f64, f64)> = (0..8 * BINS as i32)
+    let sigmas: Vec<f64> = (0..8 * BINS as i32)
         .map(|step| 0.5 * counts.bin * 2f64.powf(f64::from(step) / 8.0))
         .take_while(|&sigma| sigma < 0.5 * counts.bin * BINS as f64)
-        .map(|sigma| {
-            let off = (sigma / expected.sigma).ln() / expected.width;
-            // Cauchy's prior lets go of a noise that the counts contradict; a normal one would not.
-            let (likelihood, density) = counts.likelihood(sigma);
-            (likelihood - (off * off).ln_1p(), sigma, density)
-        })
         .collect();
+    let weigh = |&sigma: &f64| {
+        let off = (sigma / expected.sigma).ln() / expected.width;
+        // Cauchy's prior lets go of a noise that the counts contradict; a normal one would not.
+        let (likelihood, density) = counts.likelihood(sigma);
+        (likelihood - (off * off).ln_1p(), sigma, density)
+    };
+    let tried: Vec<(f64, f64, f64)> = sigmas.par_iter().with_min_len(sigmas.len().div_ceil(8)).map(weigh).collect();
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, tried| best.max(tried.0));
     let [mut total, mut logarithm, mut dense] = [0.0; 3];
     for (likelihood, sigma, density) in tried {

@@ -141,7 +141,7 @@ pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
         seeds.select_nth_unstable_by(count, |a, b| b.1[0].total_cmp(&a.1[0]).then(a.0.cmp(&b.0)));
         seeds.truncate(count);
     }
-    seeds.sort_unstable_by_key(|seed| (shuffled(u64::from(seed.0[0])), seed.0));
+    seeds.par_sort_unstable_by_key(|seed| (shuffled(u64::from(seed.0[0])), seed.0));
     seeds
 }
 
