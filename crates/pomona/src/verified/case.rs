@@ -149,6 +149,12 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The same search for poses that are upside down, where the vertical is known.
+    pub(super) fn upside_down(&self) -> Option<Self> {
+        let vertical = Some(self.model.vertical?.inverted());
+        Some(Self { model: Model { vertical, ..self.model }, ..*self })
+    }
+
     /// The same search for another query.
     pub(super) fn for_query<'b>(&self, query: &'b Landscape) -> Search<'b>
     where
@@ -167,6 +173,11 @@ impl<'a> Search<'a> {
     pub(super) fn reached(&self, rate: f64, share: f64) -> f64 {
         let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         reached(rate, offered, self.model.vertical.map_or(1.0, |_| share))
+    }
+
+    /// Evidence that a grown pose must exceed in a map as small as the query, nats: no answer is given for less.
+    pub(super) fn least(&self) -> f64 {
+        reached(self.config.false_alarm_rate, poses(self.query.len(), self.query.len(), self.model.scale), 1.0)
     }
 
     /// Whether a finding has enough evidence: as it grew or once it is settled, every fruit predicted without its own partner,

@@ -1,6 +1,6 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::{KEPT, VerifiedConfig};
+use super::acceptance::{KEPT, VerifiedConfig, outlying};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
@@ -34,6 +34,10 @@ const GROWN: usize = 6;
 
 /// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
 const LEAST_LAID: f64 = 10.0;
+
+/// Evidence, in nats, that chance is taken to reach wherever rows are laid along rows, however few other poses a search shows:
+/// the best wrong ones of crowns and hedges have 17 in the median, more than those of seeds.
+const REACHED_LAID: f64 = 17.0;
 
 /// A row laid along a row of which less than this share is found, of what the map can show of it, is a stranger: half of what is
 /// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
@@ -96,8 +100,23 @@ impl<'a> Search<'a> {
         if findings.accepted.is_empty() {
             self.lay_along(&mut findings);
         }
+        if findings.accepted.is_empty() {
+            findings.others.extend(self.upside_down_poses());
+            self.accept_outlier(&mut findings, f64::NEG_INFINITY);
+        }
         best_first(&mut findings.accepted);
         findings
+    }
+
+    /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.
+    fn upside_down_poses(&self) -> Vec<Finding<'a>> {
+        let Some(inverted) = self.upside_down() else { return Vec::new() };
+        let mut findings = Findings::none(Effort::default(), 0.0);
+        for (seeds, keep) in inverted.rounds() {
+            inverted.try_seeds(&seeds, keep, &mut findings);
+        }
+        findings.accepted.retain(|finding| inverted.is_pose(finding));
+        findings.accepted
     }
 
     /// Grows the best of what seeds propose; returns the candidates that were not refined.
@@ -116,11 +135,18 @@ impl<'a> Search<'a> {
             self.grow_distinct(some, &mut findings);
         }
         self.sift(&mut findings);
-        if !findings.accepted.is_empty() {
+        if findings.accepted.is_empty() {
+            self.accept_outlier(&mut findings, self.least());
+        } else {
             self.doubt(&mut findings, &[]);
         }
         best_first(&mut findings.accepted);
         findings
+    }
+
+    /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
+    fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
+        accepted.extend(self.single_out(others, least, KEPT.settled, log));
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
@@ -196,8 +222,13 @@ impl<'a> Search<'a> {
         let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
         log.grown += laid.len();
         laid.retain(|finding| self.is_pose(finding));
-        let answer = self.single_out(&mut laid, log);
-        let Some(answer) = answer.filter(|answer| !self.mirror_explains_more(answer)) else { return };
+        let least = outlying(self.config.false_alarm_rate, REACHED_LAID);
+        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
+        let Some(answer) =
+            answer.filter(|answer| answer.overlap.log_odds > least && !self.mirror_explains_more(answer))
+        else {
+            return;
+        };
         let answer = self.laid_again(&answer, &few);
         // Rows that lie on each other all along and show few of the fruits that they then should have in common are strangers.
         if answer.share_of_row() > LEAST_AGAIN {

@@ -7,11 +7,11 @@
 //!    (`hypothesis`). A fruit that several claim is the strongest claim's (`claims`).
 //! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
-//!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`).
+//!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
+//!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives, for the noise or for want of fruits in common, the offsets of all fruits of two rows are
 //!    counted under the turns that their axes leave (`offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
-//!    (`soft`), and each counts as far as the other visit can have seen it (`sight`). One that stands out of all others of the
-//!    search is the answer (`outlier`).
+//!    (`soft`), and each counts as far as the other visit can have seen it (`sight`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`) and which way it points from the pairs
 //!    (`direction`), one-to-one pairs with probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
 //!

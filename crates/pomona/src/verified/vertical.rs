@@ -24,6 +24,11 @@ impl Vertical {
         self.query
     }
 
+    /// The same where the query is upside down.
+    pub(crate) fn inverted(&self) -> Self {
+        Self { query: -self.query, map: self.map }
+    }
+
     /// Share of all turns that keep the vertical: the cap of directions within the lean, over the sphere.
     pub(crate) fn share_of_turns() -> f64 {
         cap(gate(0.0))
