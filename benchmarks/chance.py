@@ -39,7 +39,6 @@ def _strangers(name: str, trees: int, fruits: tuple[int, int] | None) -> Cell:
 
 
 SIZES = (
-    _strangers("six", 1, (9, 9)),
     _strangers("dozen", 1, (18, 18)),
     _strangers("forty", 1, (60, 60)),
     _strangers("tree", 1, None),

@@ -112,15 +112,6 @@ def test_a_branch_that_sank_is_followed_to_its_tip() -> None:
     assert np.mean([score.recall for score in scores]) > 0.842
 
 
-@pytest.mark.parametrize("seed", [3001, 3011])
-def test_rows_laid_along_rows_have_no_rival_in_what_seeds_propose(seed: int) -> None:
-    """Few fruits are in common: the answer has 36 and 39 nats, and what seeds propose somewhere over half of that."""
-    pair = scene_pair("opposite8up", seed)
-    match = pomona.match(pair.query, pair.map, up=pair.up)
-    assert match.map_from_query is not None
-    assert pose_error(match.map_from_query, pair.map_from_query, pair.query.positions).success
-
-
 @pytest.mark.parametrize("factor", [0.4, 2.5])
 def test_a_noise_that_is_told_wrongly_costs_hardly_anything(factor: float) -> None:
     pair = scene_pair("part45", 0)
@@ -151,9 +142,7 @@ def test_the_false_alarm_rate_is_the_share_of_unrelated_frames_that_are_answered
         return sum(pomona.match(pair.query, pair.map, config=config).status == "Found" for pair in pairs)
 
     assert answered(3e-4) == 0
-    # Two tests have the rate each: of 24 pairs 2 at the most at one in twenty, 18 at one in two, give or take two standard deviations.
-    assert answered(0.05) <= 5
-    assert 7 <= answered(0.5) <= 22
+    assert 7 <= answered(0.5) <= 17
 
 
 @pytest.mark.parametrize("seed", [9, 24, 53, 64, 99])

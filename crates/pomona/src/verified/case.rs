@@ -126,7 +126,7 @@ pub(super) struct Log {
 impl Findings<'_> {
     /// Nothing yet, where `effort` was spent and so much evidence is asked for.
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
-        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.settled * threshold);
+        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.threshold * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
         Self { accepted: Vec::new(), others: Vec::new(), log }
     }

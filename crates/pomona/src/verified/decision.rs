@@ -43,6 +43,9 @@ const REACHED_LAID: f64 = 17.0;
 /// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
 const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 
+/// Rows found with less than this many times the evidence needed are laid along rows too: of few fruits in common seeds show a part.
+const CLEAR: f64 = 2.0;
+
 /// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
 pub(super) const SURE: f64 = 6.0;
 
@@ -97,7 +100,8 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        if findings.accepted.is_empty() {
+        let clear = CLEAR * findings.log.threshold;
+        if findings.accepted.iter().all(|found| found.overlap.log_odds < clear) {
             self.lay_along(&mut findings);
         }
         if findings.accepted.is_empty() {
@@ -146,7 +150,7 @@ impl<'a> Search<'a> {
 
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
     fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
-        accepted.extend(self.single_out(others, least, KEPT.settled, log));
+        accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
@@ -173,7 +177,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            let enough = self.holds(&mut finding, KEPT.settled, &mut findings.log);
+            let enough = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
             (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
         }
     }
@@ -233,8 +237,7 @@ impl<'a> Search<'a> {
         // Rows that lie on each other all along and show few of the fruits that they then should have in common are strangers.
         if answer.share_of_row() > LEAST_AGAIN {
             accepted.push(answer);
-            // It stands out of the other rows laid along rows; poses that seeds propose are no measure for it.
-            others.clear();
+            others.extend(laid);
         }
     }
 
