@@ -100,6 +100,13 @@ def test_opposite_sides_with_one_fruit_in_seven_in_common_are_found(seed: int) -
     assert pose_error(match.map_from_query, pair.map_from_query, pair.query.positions).success
 
 
+def test_what_seeds_find_in_part_is_found_in_full_from_the_other_side_too() -> None:
+    """What seeds found ended with the trees that they began with, 16 of 47 fruits."""
+    pair = scene_pair("opposite15fine", 3)
+    match = pomona.match(pair.query, pair.map)
+    assert score_pairs(match.pairs.tolist(), pair.query.ids or (), pair.map.ids or ()).recall > 0.9
+
+
 def test_a_branch_that_sank_is_followed_to_its_tip() -> None:
     """20 cm at the tips: the means of neighbours, which hang nearer the stem, fall short there."""
     pairs = [scene_pair("sag20", seed) for seed in range(3)]
