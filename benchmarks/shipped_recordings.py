@@ -17,9 +17,12 @@ from pathlib import Path
 import av
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from pomona.recording.poses import read_tum, write_tum
 from pomona.render.filming import Filming, film
 from pomona.synth.living import RowDesign
+from pomona.trajectory import Trajectory
 
 SEED = 20
 PAIRS = 48
@@ -34,7 +37,7 @@ VISITS = (
 )
 """Three dates: the light, the direction, the height and where the camera looks differ."""
 
-TABLES = ("calibration.json", "fruits.csv", "boxes.csv", "poses_tum.txt")
+TABLES = ("calibration.json", "fruits.csv", "boxes.csv")
 
 MOST_BYTES = 15_000_000
 """Of all three together, since they lie in the repository."""
@@ -61,6 +64,8 @@ def pack(recording: Path, packed: Path) -> None:
     packed.mkdir(parents=True)
     for name in TABLES:
         shutil.copyfile(recording / name, packed / name)
+    _, session_from_camera = read_tum(recording / "poses_tum.txt")
+    write_tum(packed / "poses_tum.txt", in_the_video(session_from_camera))
     with av.open(str(packed / "row.mp4"), "w") as container:
         container.metadata["creation_time"] = f"{packed.name}T10:00:00Z"
         stream = container.add_stream("libx264", rate=Fraction(RATE_HZ), options=ENCODING)
@@ -70,6 +75,12 @@ def pack(recording: Path, packed: Path) -> None:
             both = np.hstack([cv2.imread(str(recording / eye / left.name)) for eye in ("left", "right")])
             container.mux(stream.encode(av.VideoFrame.from_ndarray(both, format="bgr24")))
         container.mux(stream.encode())
+
+
+def in_the_video(session_from_camera: NDArray[np.float64]) -> Trajectory:
+    """Give poses, (N, 4, 4), the times that the frames have in the video: the drive was as long as its path."""
+    frames = np.arange(len(session_from_camera))
+    return Trajectory(frames, frames / RATE_HZ, session_from_camera)
 
 
 def _progress(visit: Filming):
