@@ -31,9 +31,18 @@ def test_a_list_of_points_is_a_cloud() -> None:
             {"covariances": [np.eye(3), [[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]]]},
             "covariances: row 1 is not symmetric positive semi-definite",
         ),
+        ({"ids": ("a", "")}, "ids: row 1 is empty, expected a name for every fruit or no ids"),
+        ({"ids": ("a", "\ud800")}, r"ids: row 1 is '\ud800', expected characters of Unicode"),
+        ({"ids": 5}, "ids: found 5, expected 2 values, one a fruit"),
         ({"n_views": [1]}, "n_views: found shape (1), expected (2)"),
+        ({"n_views": [1, 2**60]}, f"n_views: row 1 is {2**60}, expected a number of frames"),
+        ({"views": [1, 2]}, "views: found [1, 2], expected pomona.Views"),
         ({"views": Views(np.array([0]), np.array([2]))}, "views.fruits: a sighting names a row outside 0..1"),
         ({"extras": {"note": ("a",)}}, "note: found 1 values, expected 2, one a fruit"),
+        ({"extras": {"note": ("\udcff", "a")}}, r"note: row 0 is '\udcff', expected characters of Unicode"),
+        ({"extras": {"\ud800": "ab"}}, r"extras: found the name '\ud800', expected characters of Unicode"),
+        ({"extras": {5: "ab"}}, "extras: found the name 5, expected text"),
+        ({"extras": ["note"]}, "extras: found ['note'], expected a mapping of names to columns"),
     ],
 )
 def test_refuses_in_one_line(wrong: dict[str, object], line: str) -> None:
@@ -74,6 +83,25 @@ def test_select_takes_a_mask_and_nothing(full_cloud: FruitCloud) -> None:
 def test_select_refuses_a_row_twice(full_cloud: FruitCloud) -> None:
     with pytest.raises(PomonaError, match="a row is named twice"):
         full_cloud.select([1, 1])
+
+
+@pytest.mark.parametrize("rows", [[6], "a", None, 2, [0.5], [[0, 1]], [[0], [1, 2]], [True, False]])
+def test_select_refuses_what_are_no_rows(full_cloud: FruitCloud, rows: object) -> None:
+    with pytest.raises(PomonaError, match=r"^select: found .*, expected numbers of 6 rows, or a mask of them$"):
+        full_cloud.select(rows)  # type: ignore[arg-type]
+
+
+def test_halves_of_one_character_in_two_texts_are_no_character() -> None:
+    with pytest.raises(PomonaError, match="ids: row 0 is"):
+        FruitCloud(np.zeros((2, 3)), ids=("\ud83c", "\udf4e"))
+    assert FruitCloud(np.zeros((1, 3)), ids=("\U0001f34e",)).ids == ("\U0001f34e",)
+
+
+@pytest.mark.parametrize("name", [None, 5, ["fruits.csv"]])
+def test_what_names_no_file_is_our_error(full_cloud: FruitCloud, name: object) -> None:
+    for use in (FruitCloud.read, full_cloud.write):
+        with pytest.raises(PomonaError, match=r"^path: found .*, expected the name of a file$"):
+            use(name)  # type: ignore[operator]
 
 
 @given(scale=st.floats(0.1, 10.0), angle_rad=st.floats(-3.1, 3.1))

@@ -42,6 +42,33 @@ def test_everything_but_the_sightings_reads_back_the_same(tmp_path: Path, full_c
     assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
 
 
+TEXT = st.text(st.characters(exclude_categories=("Cs",)) | st.sampled_from('\r\n", \t\0'), max_size=4)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(ids=st.lists(TEXT.filter(bool), unique=True, min_size=1, max_size=4), note=TEXT, unknown=st.booleans())
+def test_any_text_reads_back_the_same(tmp_path: Path, ids: list[str], note: str, unknown: bool) -> None:
+    """By both readers: of numbers that are all known, and with a blank among them."""
+    n, path = len(ids), tmp_path / "fruits.csv"
+    cloud = FruitCloud(
+        np.eye(n, 3),
+        ids=tuple(ids),
+        diameters_m=np.full(n, np.nan if unknown else 0.07),
+        extras={"note": (note,) * n, 'a\r"b': (note,) * n},
+    )
+    cloud.write(path)
+    back = FruitCloud.read(path)
+    assert (back.ids, back.extras) == (cloud.ids, cloud.extras)
+
+
+def test_a_carriage_return_in_a_cell_begins_no_row(tmp_path: Path) -> None:
+    path = write(tmp_path, 'id,x,y,z\r\n"a\rb",1,2,3\r\n"c\r\nd",1,2,4\r\n')
+    cloud = FruitCloud.read(path)
+    assert cloud.ids == ("a\rb", "c\r\nd")
+    cloud.write(path)
+    assert path.read_bytes() == b'id,x,y,z\n"a\rb",1.0,2.0,3.0\n"c\r\nd",1.0,2.0,4.0\n'
+
+
 def test_columns_come_in_any_order_and_others_are_kept(tmp_path: Path) -> None:
     text = '\ufeffnote, z,y,x,id\r\n"red, ""small""",3,2,1,7\r\n\r\n,6,5,4,8\r\n'
     cloud = FruitCloud.read(write(tmp_path, text))
@@ -89,6 +116,16 @@ def test_a_blank_diameter_is_unknown(tmp_path: Path) -> None:
             "x,y,z,diameter_m\n1,2,3,-1\n",
             "line 2 (row 0), column diameter_m: found '-1', expected a positive number or nothing",
         ),
+        (
+            "cxx,x,y,z,cyy,czz,cxy,cxz,cyz\n1,1,2,3,1,1,0,0,0\n\n1,1,2,3,1,1,2,0,0\n",
+            "line 4 (row 1), columns cxx,cyy,czz,cxy,cxz,cyz: found a matrix that is not positive semi-definite, "
+            "expected a covariance",
+        ),
+        (
+            "diameter_m,x,y,z,cxx,cyy,czz,cxy,cxz,cyz\n,1,2,3,-1,1,1,0,0,0\n",
+            "line 2 (row 0), columns cxx,cyy,czz,cxy,cxz,cyz: found a matrix that is not positive semi-definite, "
+            "expected a covariance",
+        ),
         ("x,y,z,n_views\n1,2,3,1.5\n", "line 2 (row 0), column n_views: found '1.5', expected a whole number"),
     ],
 )
@@ -117,9 +154,12 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> 
     cloud = FruitCloud(np.zeros((1, 3)), extras={"x": ("1",)})
     with pytest.raises(PomonaError, match="extras: found the name 'x'"):
         cloud.write(path)
-    lost = FruitCloud(np.zeros((1, 3)), extras={"note": ("\ud800",)})  # half a character, which UTF-8 cannot hold
-    with pytest.raises(UnicodeEncodeError):
-        lost.write(path)
+    twice = FruitCloud(np.zeros((1, 3)), extras={"note ": ("1",), "note": ("1",)})  # readers strip the names
+    with pytest.raises(PomonaError, match=f"^{path}: column 'note' is there twice, expected each name once"):
+        twice.write(path)
+    many = FruitCloud(np.zeros((1, 3)), extras={f"note {number}": ("1",) for number in range(1000)})
+    with pytest.raises(PomonaError, match="found 1003 columns, expected at most 1000"):
+        many.write(path)
     assert path.read_text() == "x,y,z\n1,2,3\n"
     assert list(tmp_path.iterdir()) == [path]
 

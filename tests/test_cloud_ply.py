@@ -103,6 +103,14 @@ def test_no_vertices_is_a_cloud_without_fruits(tmp_path: Path) -> None:
         (ascii_ply(1, "1 nan 3\n"), "row 0, property y: found nan, expected a finite number"),
         (ascii_ply(1, "1 2 3\n", "comment text id 0 a\n"), "line 7: found 'a', expected a quoted text"),
         (
+            ascii_ply(1, "1 2 3\n", 'comment text id 0 "\\ud800"\n'),
+            r"line 7: found '\ud800', expected characters of Unicode",
+        ),
+        (
+            ascii_ply(1, "1 2 3\n", 'comment text id 0 ""\n'),
+            "ids: row 0 is empty, expected a name for every fruit or no ids",
+        ),
+        (
             ascii_ply(2, "1 2 3\n4 5 6\n", 'comment text id 0 "a"\n'),
             "comments name id of 1 fruits, expected 2, one a fruit",
         ),
@@ -125,6 +133,43 @@ def test_a_binary_file_cut_short_is_named(tmp_path: Path, full_cloud: FruitCloud
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(PomonaError, match="the file ends after 5 vertices, expected 6"):
         FruitCloud.read(path)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    ids=st.lists(
+        st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=4) | st.sampled_from(["-0", "0", "00"]),
+        unique=True,
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_any_id_reads_back_the_same(tmp_path: Path, ids: list[str]) -> None:
+    FruitCloud(np.eye(len(ids), 3), ids=tuple(ids)).write(tmp_path / "a.ply")
+    assert FruitCloud.read(tmp_path / "a.ply").ids == tuple(ids)
+
+
+def test_counts_beyond_32_bits_are_not_cut(tmp_path: Path) -> None:
+    for counts in ([1, 2**31], [-(2**31), 2**53], [0, 2**31 - 1]):
+        FruitCloud(np.eye(2, 3), n_views=np.array(counts)).write(tmp_path / "a.ply")
+        back = FruitCloud.read(tmp_path / "a.ply").n_views
+        assert back is not None
+        assert back.tolist() == counts
+
+
+def test_no_text_is_longer_than_a_line_of_the_header(tmp_path: Path) -> None:
+    """Neither written nor read: the rest of such a line would be taken for the next one."""
+    path = tmp_path / "a.ply"
+    with pytest.raises(PomonaError, match="column note, row 0: found a text of 65536 characters, expected less"):
+        FruitCloud(np.eye(1, 3), extras={"note": ("a" * 65_536,)}).write(path)
+    assert not path.exists()
+    long = f"comment {'a' * 65_528}element face 1\n"
+    write(tmp_path, ascii_ply(1, "1 2 3\n", long))
+    with pytest.raises(PomonaError, match="line 7: found a line of more than 65536 bytes, expected a PLY header"):
+        FruitCloud.read(tmp_path / "fruits.ply")
+    text = "a" * 65_000
+    FruitCloud(np.eye(1, 3), extras={"note": (text,)}).write(path)
+    assert FruitCloud.read(path).extras == {"note": (text,)}
 
 
 def test_a_column_that_ply_cannot_name_is_refused(tmp_path: Path) -> None:

@@ -122,6 +122,43 @@ def test_boxes_are_drawn_and_json_counts_them(pomona, tmp_path):
         assert 0 < changed.mean() < 0.5
 
 
+def test_a_drawn_picture_gives_its_place_to_the_next_and_a_photograph_of_its_name_does_not(pomona, tmp_path):
+    drawn = tmp_path / "drawn"
+    command = ("detect", PICTURES / NAMES[0], "-o", tmp_path / "b.csv", "--plot", drawn)
+    assert pomona(*command)[0] == 0
+    first = (drawn / f"{NAMES[0]}.boxes.png").read_bytes()
+    assert pomona(*command)[0] == 0
+    assert (drawn / f"{NAMES[0]}.boxes.png").read_bytes() == first
+    photograph = cv2.imencode(".png", read_picture(PICTURES / NAMES[1]))[1].tobytes()
+    (drawn / f"{NAMES[0]}.boxes.png").write_bytes(photograph)
+    code, _, told = pomona(*command)
+    assert code == 2
+    assert told == (
+        f"pomona: {drawn}: is there already and is not a folder of drawn boxes: take another name, or --force to "
+        "replace it\n"
+    )
+    assert (drawn / f"{NAMES[0]}.boxes.png").read_bytes() == photograph
+    assert pomona(*command, "--force")[0] == 0
+
+
+def test_a_picture_that_cannot_be_read_is_skipped_and_told(pomona, tmp_path):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    shutil.copy(PICTURES / NAMES[0], folder / "b.jpg")
+    whole = (PICTURES / NAMES[1]).read_bytes()
+    (folder / "a.jpg").write_bytes(whole[: len(whole) // 2])
+    (folder / "c.png").write_bytes(b"no picture")
+    code, out, told = pomona("detect", folder, "-o", tmp_path / "b.csv")
+    assert code == 0
+    assert [line.split(": ")[1] for line in out.splitlines()][1:] == ["skipped", "skipped"]
+    assert told == f"pomona: warning: skipped 2 of 3 pictures, first {folder}/a.jpg: the JPEG is cut off\n"
+    with (tmp_path / "b.csv").open(encoding="utf-8", newline="") as file:
+        assert {line["image"] for line in csv.DictReader(file)} == {"b.jpg"}
+    code, out, _ = pomona("detect", folder, "-o", tmp_path / "b.csv", "--json")
+    assert code == 0
+    assert json.loads(out)["skipped"].keys() == {"a.jpg", "c.png"}
+
+
 def test_the_table_goes_through_a_pipe(tmp_path):
     command = [sys.executable, "-m", "pomona", "detect", str(PICTURES), "-o", "-"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

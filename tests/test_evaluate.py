@@ -4,6 +4,7 @@ import io
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.evaluate import PairScore, score_pairs, score_placed_pairs
-from pomona.pairs import read_pairs
+from pomona.pairs import read_pairs, write_pairs
 from pomona.scanning import scan as pomona_scan
 from recording_maker import make_recording
 
@@ -72,6 +73,15 @@ def test_reads_pairs_by_id_from_csv_and_from_json(tmp_path: Path, clouds: tuple[
     as_csv.write_text("probability,map,query\n0.9,a,a\n0.8,only-map,b\n")
     as_json.write_text(json.dumps({"matches": [{"query": "a", "map": "a"}, {"query": "b", "map": "only-map"}]}))
     assert read_pairs(as_csv, *clouds) == read_pairs(as_json, *clouds) == [(0, 2), (1, 1)]
+
+
+def test_pairs_of_any_names_read_back_the_same(tmp_path: Path) -> None:
+    names = ("a\rb", "a\nb", 'a",\r\n"b', " ", "林檎")
+    cloud = FruitCloud(np.arange(15.0).reshape(5, 3), ids=names)
+    pairs = [(row, 4 - row) for row in range(5)]
+    match = SimpleNamespace(pairs=np.array(pairs), probabilities=np.full(5, 0.5), distances_m=np.zeros(5))
+    write_pairs(tmp_path / "pairs.csv", match, cloud, cloud)  # type: ignore[arg-type]
+    assert read_pairs(tmp_path / "pairs.csv", cloud, cloud) == pairs
 
 
 def test_reads_rows_where_there_are_no_ids(tmp_path: Path) -> None:

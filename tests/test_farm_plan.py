@@ -173,6 +173,16 @@ def test_a_first_plan_is_written_for_what_is_there_and_is_a_plan(tmp_path):
     first = json.loads(dry.stdout)[0]
     assert first["step"] == "map a"
     assert first["commands"][0][:4] == ["map", "add", "results/maps/a.gpkg", "rec/a/2024-08-09.csv"]
+    # It was to be looked at and changed.
+    plan = (tmp_path / "farm.toml").read_text().replace("skip = []", 'skip = ["a/2024-08-09"]')
+    (tmp_path / "farm.toml").write_text(plan)
+    again = subprocess.run([*command, "init", "rec"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (again.returncode, again.stdout) == (2, "")
+    assert again.stderr == (
+        "pomona: farm.toml: is there already and is not a first plan, which takes a name of its own: "
+        "take another name, or --force to replace it\n"
+    )
+    assert (tmp_path / "farm.toml").read_text() == plan
     (tmp_path / "notes.toml").write_text("mine = 1\n")
     refused = subprocess.run(
         [*command, "init", "rec", "-o", "notes.toml"], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -276,6 +276,35 @@ def test_the_verb_tells_rows_and_trees(orchard: Path) -> None:
     assert (row["number"], row["kind"], len(row["trees"])) == (1, "trees", 8)
 
 
+def test_given_trees_stay_until_they_are_forgotten(orchard: Path, tmp_path: Path) -> None:
+    (found,) = find_trees(orchard)
+    connection = geopackage.connect(orchard)
+    place = connection.execute("SELECT geom FROM trees WHERE number = 1").fetchone()
+    connection.close()
+    (first,) = geopackage.points_of(place)
+    (tmp_path / "trees.csv").write_text("name,x,y,z\nmine,{},{},{}\n".format(*first))
+
+    def told(*arguments: str | Path) -> tuple[list[str], str]:
+        done = subprocess.run([POMONA, "map", "trees", orchard, *arguments], capture_output=True, text=True, check=True)
+        return done.stdout.splitlines(), done.stderr
+
+    lines, warned = told("--trees", tmp_path / "trees.csv")
+    assert "1 tree, given" in lines[0]
+    # Fruits that hang nearer to no tree than the spacing allows are counted too.
+    assert sum(int(line.split(": ")[1].split()[0]) for line in lines[1:]) == found.n_fruits
+    assert warned == ""
+    again, warned = told("--segments", "1", "--spacing", "1.2")
+    assert again == lines
+    assert warned == (
+        "pomona: warning: --spacing and --segments: no effect in row 1, whose trees were given or drawn; "
+        "--forget looks for trees where some were given\n"
+    )
+    anew, warned = told("--forget")
+    assert warned == ""
+    assert "8 trees, found" in anew[0]
+    assert problems(orchard) == []
+
+
 def test_gdal_draws_trees_and_rows(orchard: Path) -> None:
     find_trees(orchard)
     assert pyogrio.read_info(orchard, layer="trees")["features"] == 8

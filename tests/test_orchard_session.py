@@ -1,5 +1,6 @@
 """Session files: read back the same, opened by GDAL, and what is refused."""
 
+import datetime
 import sqlite3
 import struct
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 from pyogrio.raw import read as read_layer
 
 from pomona import FruitCloud, PomonaError, geopackage
+from pomona.fruit_crop import FruitCrop
 from pomona.orchard import load_session, problems, read_session, write_session
 from pomona.trajectory import Trajectory
 
@@ -81,9 +83,9 @@ def test_bare_positions_and_no_fruits_are_sessions_too(tmp_path: Path) -> None:
 
 def test_the_same_session_is_the_same_file(session_file: Path, tmp_path: Path) -> None:
     session = read_session(session_file)
-    for name in ("a", "b"):
+    for name in ("a.gpkg", "b.gpkg"):
         write_session(tmp_path / name, session.cloud, name=session.name, date=session.date, recording="same")
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    assert (tmp_path / "a.gpkg").read_bytes() == (tmp_path / "b.gpkg").read_bytes()
 
 
 def test_the_content_hash_tells_clouds_apart(session_file: Path) -> None:
@@ -247,12 +249,29 @@ def test_a_geometry_of_another_kind_is_refused(session_file: Path) -> None:
             {"configuration": {"radius": float("nan")}},
             "session: configuration is not JSON: Out of range float values are not JSON compliant",
         ),
+        ({"name": None}, "session: name: found NoneType, expected str"),
+        ({"name": "\ud800"}, r"session: found '\ud800', expected characters of Unicode"),
+        ({"recording": Path("row.bag")}, "session: recording: found PosixPath, expected str"),
+        ({"date": 5}, "session: found the date 5, expected ISO 8601"),
+        (
+            {"date": datetime.datetime(2024, 8, 9, tzinfo=datetime.UTC)},
+            "session: found the date '2024-08-09T00:00:00+00:00' with a time zone",
+        ),
+        ({"cloud": np.zeros((1, 3))}, "session: cloud: found ndarray, expected FruitCloud"),
+        ({"trajectory": np.eye(4)}, "session: trajectory: found ndarray, expected Trajectory"),
+        ({"configuration": [1]}, "session: configuration: found list, expected a mapping"),
+        ({"input_hashes": "a"}, "session: input_hashes: found str, expected a mapping"),
+        ({"crops": [b""]}, "session: crops: found list, expected a mapping"),
+        ({"crops": {0: b""}}, "session: crops: found bytes, expected FruitCrop"),
+        ({"crops": {-1: FruitCrop(0, b"")}}, "session: crops: found row -1, expected one of 1 fruits"),
+        ({"path": None}, "path: found None, expected the name of a file"),
+        ({"path": "f.csv"}, "f.csv: found suffix '.csv', expected .gpkg"),
     ],
 )
 def test_a_wrong_session_is_not_written(tmp_path: Path, wrong: dict[str, object], line: str) -> None:
-    about = {"name": "a", "date": "2024-08-09", "recording": "r", **wrong}
+    about = {"path": tmp_path / "a.gpkg", "cloud": FruitCloud(np.zeros((1, 3))), "name": "a", "date": "2024-08-09"}
     with pytest.raises(PomonaError) as caught:
-        write_session(tmp_path / "a.gpkg", FruitCloud(np.zeros((1, 3))), **about)  # type: ignore[arg-type]
+        write_session(**{**about, "recording": "r", **wrong})  # type: ignore[arg-type]
     assert str(caught.value).startswith(line)
     assert not list(tmp_path.iterdir())
 
@@ -270,3 +289,53 @@ def test_a_bare_cloud_is_a_session_with_a_date(tmp_path: Path, full_cloud: Fruit
 def test_a_date_can_be_corrected(session_file: Path) -> None:
     assert load_session(session_file).date == "2024-08-09T14:30:00"
     assert load_session(session_file, date="2024-08-10").date == "2024-08-10"
+
+
+@pytest.mark.parametrize("day", [datetime.date(2024, 8, 9), datetime.datetime(2024, 8, 9, 14, 30)])
+def test_a_date_is_one_of_python_too(tmp_path: Path, full_cloud: FruitCloud, day: datetime.date) -> None:
+    write_session(tmp_path / "a.gpkg", full_cloud, name="a", date=day, recording="r")
+    assert read_session(tmp_path / "a.gpkg").date == day.isoformat()
+    full_cloud.write(tmp_path / "a.csv")
+    assert load_session(tmp_path / "a.csv", date=day).date == day.isoformat()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ({"date": 5}, "session: found the date 5, expected ISO 8601"),
+        ({"date": np.datetime64("2024-08-09")}, "session: found the date np.datetime64"),
+        ({"unit": ""}, "unit: found '', expected one of m, cm, mm, free"),
+        ({"unit": 5}, "unit: found 5, expected one of m, cm, mm, free"),
+        ({"path": None}, "path: found None, expected the name of a file"),
+    ],
+)
+def test_a_session_is_not_loaded_by_a_wrong_argument(
+    tmp_path: Path, full_cloud: FruitCloud, wrong: dict[str, object], line: str
+) -> None:
+    full_cloud.write(tmp_path / "a.csv")
+    with pytest.raises(PomonaError) as caught:
+        load_session(**{"path": tmp_path / "a.csv", "date": "2024-08-09", **wrong})  # type: ignore[arg-type]
+    assert str(caught.value).startswith(line)
+
+
+def test_only_a_session_gives_its_place_to_another(tmp_path: Path, session_file: Path, full_cloud: FruitCloud) -> None:
+    notes, about = tmp_path / "notes.gpkg", {"name": "a", "date": "2024-08-09", "recording": "r"}
+    notes.write_text("mine")
+    with pytest.raises(PomonaError, match="is there already and is not a session: take another name, or force=True"):
+        write_session(notes, full_cloud, **about)
+    assert notes.read_text() == "mine"
+    with pytest.raises(PomonaError, match=r"the folder .* is not there"):
+        write_session(tmp_path / "missing" / "a.gpkg", full_cloud, **about)
+    write_session(str(session_file), full_cloud, **about)
+    assert read_session(session_file).name == "a"
+    write_session(notes, full_cloud, **about, force=True)
+    assert read_session(notes).name == "a"
+
+
+def test_an_empty_name_of_an_earlier_version_is_no_name(session_file: Path, full_cloud: FruitCloud) -> None:
+    connection = geopackage.connect(session_file)
+    connection.execute("UPDATE observations SET label = '' WHERE id = 2")
+    connection.close()
+    cloud = FruitCloud.read(session_file)
+    assert cloud.ids is None
+    np.testing.assert_array_equal(cloud.positions, full_cloud.positions)

@@ -12,6 +12,7 @@ import pytest
 import typer.main
 
 from pomona.cli import app
+from pomona.likes import database_of
 
 Pomona = Callable[..., tuple[int, str, str]]
 
@@ -138,10 +139,29 @@ def test_its_like_is_replaced(pomona: Pomona, here: Path, command: str) -> None:
 
 
 def test_force_replaces_what_is_not_alike(pomona: Pomona, here: Path) -> None:
-    (here / "notes.txt").write_text("mine")
-    assert pomona("match", "query.csv", "map.csv", "-o", "notes.txt", "--force")[0] == 0
-    assert (here / "notes.txt").read_text().startswith("query,map,")
+    for name in ("notes.csv", "notes.gpkg"):
+        (here / name).write_text("mine")
+    assert pomona("match", "query.csv", "map.csv", "-o", "notes.csv", "--force")[0] == 0
+    assert (here / "notes.csv").read_text().startswith("query,map,")
+    assert pomona("scan", "R", "-o", "notes.gpkg", "--force")[0] == 0
+    assert database_of(here / "notes.gpkg") == "session"
     assert pomona("export", "map.csv", "--to", "csv", "-o", "session.gpkg", "--force")[0] == 0
+
+
+@pytest.mark.parametrize("force", ["", " --force"])
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("match query.csv map.csv -o pairs.txt", "pairs.txt: found suffix '.txt', expected .csv"),
+        ("match query.csv map.csv -o pairs", "pairs: found suffix '', expected .csv"),
+        ("localize map.csv R -o poses.csv", "poses.csv: found suffix '.csv', expected .tum, .txt, .kitti"),
+        ("localize map.csv R -o poses", "poses: found suffix '', expected .tum, .txt, .kitti"),
+    ],
+)
+def test_a_name_that_says_something_else_is_refused(
+    pomona: Pomona, here: Path, command: str, told: str, force: str
+) -> None:
+    refused(pomona, here, command + force, told)
 
 
 def test_an_empty_file_holds_nothing_that_could_be_lost(pomona: Pomona, here: Path) -> None:

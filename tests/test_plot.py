@@ -179,6 +179,21 @@ def test_few_fruits_are_a_picture_too(n: int, tmp_path: Path) -> None:
     assert (tmp_path / "few.png").stat().st_size > 0
 
 
+def test_only_the_clouds_that_were_matched_are_drawn() -> None:
+    query, map, match = moved_row()
+    for view in ("row", "lines"):
+        with pytest.raises(PomonaError, match=r"^query: found 1 fruit, expected the 50 that were matched$"):
+            draw_match(query.select([0]), map, match, view=view)
+        with pytest.raises(PomonaError, match=r"^map: found 59 fruits, expected the 60 that were matched$"):
+            draw_match(query, map.select(range(59)), match, view=view)
+
+
+@pytest.mark.parametrize("up", ["a", 5, [0, 1], [0, 0, 0], [np.nan, 0, 1], np.eye(3)])
+def test_a_vertical_that_is_no_direction_is_refused(up: object) -> None:
+    with pytest.raises(PomonaError, match=r"^up_in_map: "):
+        draw_match(*moved_row(), up_in_map=up)
+
+
 def test_an_unknown_view_is_refused() -> None:
     with pytest.raises(PomonaError, match="view: found 'maze', expected one of row, lines"):
         draw_match(*moved_row(), view="maze")
@@ -187,7 +202,7 @@ def test_an_unknown_view_is_refused() -> None:
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])
 def test_writes_what_the_name_says(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"match{suffix}"
-    save_picture(Figure(), path)
+    save_picture(Figure(), str(path))
     starts = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     assert path.read_bytes().startswith(starts[suffix.lower()])
 
@@ -195,4 +210,6 @@ def test_writes_what_the_name_says(tmp_path: Path, suffix: str) -> None:
 def test_refuses_a_name_that_is_no_picture(tmp_path: Path) -> None:
     with pytest.raises(PomonaError, match=r"match\.txt: found \.txt, expected a picture named \.png"):
         save_picture(Figure(), tmp_path / "match.txt")
+    with pytest.raises(PomonaError, match="path: found None, expected the name of a file"):
+        save_picture(Figure(), None)
     assert list(tmp_path.iterdir()) == []

@@ -62,7 +62,7 @@ def test_an_expected_pose_saves_the_search_and_changes_nothing_of_what_is_found(
         np.testing.assert_allclose(found.probabilities, searched.probabilities, atol=1e-9)
     aside = searched.map_from_query + np.pad([[2.0], [2.0], [0.0]], ((0, 1), (3, 0)))
     assert not match_expected(query, map, aside)
-    with pytest.raises(PomonaError, match=r"map_from_query: found an array of shape \(3, 3\), expected \(4, 4\)"):
+    with pytest.raises(PomonaError, match=r"map_from_query: found shape \(3, 3\), expected \(4, 4\)"):
         match_expected(query, map, np.eye(3))
 
 
@@ -127,6 +127,37 @@ def test_whatever_holds_a_cloud_is_matched(visits: tuple[Path, Path], tmp_path: 
     assert pomona.match(visits[0], session).pairs.tolist() == found.pairs.tolist()
     with pytest.raises(PomonaError, match=r"a bare cloud has no date, .*--date YYYY-MM-DD, in Python date="):
         pomona.load_session(visits[1])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ({"noise_m": "a"}, "noise_m: found 'a', expected metres per axis, or None"),
+        ({"noise_m": True}, "noise_m: found True, expected metres per axis, or None"),
+        ({"noise_m": [0.1]}, r"noise_m: found \[0.1\], expected metres per axis, or None"),
+        ({"per_frame": 1}, "per_frame: found 1, expected True or False"),
+        ({"up": "a"}, "up: expected one direction"),
+        ({"query": None}, "query: found None, expected fruits"),
+        ({"map": None}, "map: found None, expected fruits"),
+    ],
+)
+def test_an_argument_that_is_wrong_is_called_by_its_name(wrong: dict[str, Any], line: str) -> None:
+    with pytest.raises(PomonaError, match=f"^{line}"):
+        pomona.match(**{"query": np.eye(3), "map": np.eye(3), **wrong})
+
+
+@pytest.mark.parametrize("pose", ["a", None, [[1], [2, 3]], np.eye(3), np.full((4, 4), np.nan), np.zeros((4, 4))])
+def test_a_pose_that_is_none_is_called_by_its_name(pose: Any) -> None:
+    for asked in (Index(np.eye(3)).pairs_under, lambda query, pose: match_expected(query, np.eye(3), pose)):
+        with pytest.raises(PomonaError, match=r"^map_from_query: "):
+            asked(np.eye(3), pose)
+    with pytest.raises(PomonaError, match=r"^noise_m: found 'a'"):
+        Index(np.eye(3)).pairs_under(np.eye(3), np.eye(4), noise_m="a")  # type: ignore[arg-type]
+
+
+def test_an_index_has_the_name_of_a_file() -> None:
+    with pytest.raises(PomonaError, match="path: found None, expected the name of a file"):
+        Index.open(None, np.eye(3))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("config", ["pomona.toml", 5, {"verified": {"rate": object()}}])

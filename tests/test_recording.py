@@ -95,6 +95,27 @@ def test_a_calibration_reads_back(tmp_path):
     assert Calibration.read(tmp_path / "calibration.json") == calibration
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"width": 0}, "width: found 0, expected a whole number of pixels"),
+        ({"height": 480.5}, "height: found 480.5, expected a whole number of pixels"),
+        ({"fx": -1.0}, "fx: found -1.0, expected pixels above 0"),
+        ({"fy": float("nan")}, "fy: found nan, expected pixels above 0"),
+        ({"cx": float("inf")}, "cx: found inf, expected pixels"),
+        ({"cy": "240"}, "cy: found '240', expected pixels"),
+        ({"baseline_m": -0.1}, "baseline_m: found -0.1, expected metres above 0, or None"),
+        ({"depth_unit_m": 0}, "depth_unit_m: found 0, expected metres above 0"),
+    ],
+)
+def test_a_calibration_of_no_camera_is_refused(changes, told):
+    right = {"width": 640, "height": 480, "fx": np.float32(500.0), "fy": 501, "cx": 319.0, "cy": 241.0}
+    assert Calibration(**right).size_px == (640, 480)
+    with pytest.raises(PomonaError) as refusal:
+        Calibration(**{**right, **changes})
+    assert str(refusal.value) == told
+
+
 @pytest.mark.parametrize("field", ["width", "height", "fx", "fy", "cx", "cy"])
 def test_a_missing_field_is_named(folder, field):
     with_fields(folder, **{field: ...})

@@ -67,7 +67,8 @@ def test_a_device_is_written_into(here: Path) -> None:
 
 
 def test_a_full_standard_output_is_told(here: Path) -> None:
-    for command in ("match query.csv map.csv --json", "export map.csv --to csv -o -", "match query.csv map.csv"):
+    results = ("match query.csv map.csv --json", "export map.csv --to csv -o -", "match query.csv map.csv")
+    for command in (*results, "--help", "match --help", "map", "--version"):
         done = run(here, f"pomona {command} > /dev/full")
         assert done.returncode == 2
         assert "cannot be written: No space left on device" in done.stderr

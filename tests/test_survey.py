@@ -14,6 +14,7 @@ import pytest
 from benchmarks.lifting import rigid_residuals, rows_named
 from benchmarks.recordings import detector, rendered_truth, true_boxes
 
+from pomona.amounts import amount
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.orchard import load_session
@@ -131,6 +132,7 @@ def test_ctrl_c_writes_a_valid_session_and_says_so(pomona, row, tmp_path, interr
     assert len(session.cloud) == 3
     # Frames are looked at ahead, so the signal may come while the first is still followed.
     assert 1 <= len(session.trajectory) <= 2
+    assert printed.splitlines()[0].endswith(f"in {amount(len(session.trajectory), 'frame')}")
     assert signal.getsignal(signal.SIGINT) is before
 
 

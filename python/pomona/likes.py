@@ -13,6 +13,7 @@ from typing import Literal
 __all__ = [
     "BOXES",
     "BOXES_DRAWN",
+    "BOXES_DRAWN_MARK",
     "BY_DATE",
     "CALIPER_PAIRS",
     "DEMO",
@@ -61,7 +62,10 @@ VIDEO_MARK = "boxes drawn by pomona"
 """Comment in the videos of `--preview`, by which they are told from recordings."""
 
 BOXES_DRAWN = ".boxes.png"
-"""How the names of pictures end in which boxes were drawn, by which they are told from photographs."""
+"""How the names of pictures end in which boxes were drawn."""
+
+BOXES_DRAWN_MARK = b"Software\0boxes drawn by pomona"
+"""Text in these pictures, by which they are told from others of such a name."""
 
 POSES_MARK = "# time tx ty tz qx qy qz qw: map_from_camera"
 """First line of the poses that are found in a map, by which they are told from those of a recording."""
@@ -266,7 +270,7 @@ def _is_index(path: Path) -> bool:
 
 
 def _has_drawn_boxes(folder: Path) -> bool:
-    return all(path.name.endswith(BOXES_DRAWN) for path in folder.iterdir())
+    return all(path.name.endswith(BOXES_DRAWN) and BOXES_DRAWN_MARK in _head(path) for path in folder.iterdir())
 
 
 def _has_note(folder: Path) -> bool:
@@ -367,7 +371,7 @@ REPORT = Like("a report of a season", _is_report)
 INDEX = Like("the index of a map", _is_index)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
 BY_DATE = Like("a folder of observations by date", _has_dates, is_folder=True)
-FARM_PLAN = Like("a plan of a farm", lambda path: b"[recordings]" in _head(path))
+FARM_PLAN = Like("a first plan, which takes a name of its own", lambda _: False)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
     "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),

@@ -21,8 +21,10 @@ from pomona.cloud import Cloud, FruitCloud, Unit, as_cloud
 from pomona.cloud.given import doubt_metres, is_array
 from pomona.core_settings import core_settings
 from pomona.errors import PomonaError
+from pomona.file_names import given_path
 from pomona.kept_index import out_of_index
 from pomona.likes import INDEX
+from pomona.match_arguments import given_flag, given_noise, given_pose
 from pomona.outputs import Output, require_outputs
 from pomona.threads import capped_threads
 
@@ -150,7 +152,7 @@ class Index:
         if compact and (method, scale) != ("verified", "metric"):
             raise PomonaError(f"compact: found an index by {method}, {scale}; expected one by verified, metric")
         self._unit: Unit = "free" if scale == "free" else "m"
-        self._map, self._of_array = as_cloud(map, self._unit), is_array(map)
+        self._map, self._of_array = as_cloud(map, self._unit, name="map"), is_array(map)
         self._kind = f"{method}, {scale}"
         threads = capped_threads(threads)
         overrides = core_settings(config)
@@ -190,12 +192,12 @@ class Index:
         PomonaError
             The file is missing or is no index; an array or a setting is wrong.
         """
-        cloud, settings, most = as_cloud(map, "m"), core_settings(config), capped_threads(threads)
+        cloud, settings, most = as_cloud(map, "m", name="map"), core_settings(config), capped_threads(threads)
         arrays = core_arrays(cloud)
         index = cls.__new__(cls)
         index._unit, index._kind, index._map, index._of_array = "m", "verified, metric", cloud, is_array(map)
         index._core = out_of_index(
-            Path(path),
+            given_path(path),
             lambda path: _core.MapIndex.opened(path, arrays, config=settings, threads=most),
             lambda path: cls(cloud, config=config, threads=threads, compact=True).save(path),
         )
@@ -211,8 +213,9 @@ class Index:
         """
         if not self._core.is_compact:
             raise PomonaError(f"{path}: found an index that is not compact, expected one made with compact=True")
-        require_outputs([Output(Path(path), INDEX)], [], otherwise="remove it first")
-        with whole_file(path) as partial:
+        target = given_path(path)
+        require_outputs([Output(target, INDEX)], [], otherwise="remove it first")
+        with whole_file(target) as partial:
             self._core.save(partial)
 
     def __len__(self) -> int:
@@ -228,8 +231,9 @@ class Index:
         self, query: Cloud, *, noise_m: float | None = None, up: Up | None = None, per_frame: bool = False
     ) -> Match:
         """Find `query` in the map; arguments as in `pomona.match`."""
+        noise, vertical, by_frame = given_noise(noise_m), core_vertical(up), given_flag("per_frame", per_frame)
         return self._ask(
-            query, lambda core, arrays: core.search(arrays, noise_m=noise_m, up=core_vertical(up), per_frame=per_frame)
+            query, lambda core, arrays: core.search(arrays, noise_m=noise, up=vertical, per_frame=by_frame)
         )
 
     def pairs_under(self, query: Cloud, map_from_query: ArrayLike, *, noise_m: float | None = None) -> Match:
@@ -249,16 +253,12 @@ class Index:
         PomonaError
             An array is wrong, or the index is not one of the verified method.
         """
-        pose = np.asarray(map_from_query, np.float64)
-        if pose.shape != (4, 4):
-            raise PomonaError(f"map_from_query: found an array of shape {pose.shape}, expected (4, 4)")
-        return self._ask(
-            query, lambda core, arrays: core.pairs_under(arrays, map_from_query=pose.tolist(), noise_m=noise_m)
-        )
+        pose, noise = given_pose(map_from_query), given_noise(noise_m)
+        return self._ask(query, lambda core, arrays: core.pairs_under(arrays, map_from_query=pose, noise_m=noise))
 
     def _ask(self, query: Cloud, question: Callable[[_core.MapIndex, Any], _core.Match]) -> Match:
         start = time.perf_counter()
-        cloud = as_cloud(query, self._unit)
+        cloud = as_cloud(query, self._unit, name="query")
         try:
             found = question(self._core, core_arrays(cloud))
         except (ValueError, TypeError, OverflowError) as error:
@@ -270,7 +270,7 @@ class Index:
         return _told(found, len(cloud), len(self._map), start)
 
 
-OF_NO_CLOUD = ("configuration", "noise_m", "per_frame", "setting", "up")
+OF_NO_CLOUD = ("configuration", "map_from_query", "noise_m", "per_frame", "setting", "up")
 """What the core's errors begin with where they are not about the fruits."""
 
 
@@ -403,9 +403,7 @@ def match_expected(
         An array or a setting is wrong.
     """
     start = time.perf_counter()
-    pose = np.asarray(map_from_query, np.float64)
-    if pose.shape != (4, 4):
-        raise PomonaError(f"map_from_query: found an array of shape {pose.shape}, expected (4, 4)")
+    pose, noise = given_pose(map_from_query), given_noise(noise_m)
     asked, known = (
         side if isinstance(side, ReadyCloud) else ReadyCloud(side, threads=threads) for side in (query, map)
     )
@@ -413,9 +411,9 @@ def match_expected(
         found = _core.match_expected(
             asked._core,
             known._core,
-            map_from_query=pose.tolist(),
+            map_from_query=pose,
             config=core_settings(config),
-            noise_m=noise_m,
+            noise_m=noise,
             threads=capped_threads(threads),
         )
     except (ValueError, TypeError, OverflowError) as error:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pomona.atomic import whole_file
+from pomona.csv_rows import write_rows
 from pomona.errors import PomonaError
 from pomona.reading import parsed_json, read_given_text, shown
 
@@ -23,12 +25,14 @@ PAIR_COLUMNS = ("query", "map", "probability", "distance_m")
 def write_pairs(path: Path, match: Match, query: FruitCloud, map: FruitCloud) -> None:
     """Write one pair a line as CSV; fruits go by id, or by row number in a cloud without ids."""
     with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(PAIR_COLUMNS)
-        for (q, m), probability, distance_m in zip(
-            match.pairs.tolist(), match.probabilities.tolist(), match.distances_m.tolist(), strict=True
-        ):
-            writer.writerow((query.label(q), map.label(m), f"{probability:.6f}", f"{distance_m:.6f}"))
+        write_rows(file, chain([PAIR_COLUMNS], _rows_of(match, query, map)))
+
+
+def _rows_of(match: Match, query: FruitCloud, map: FruitCloud) -> Iterator[tuple[str, ...]]:
+    for (q, m), probability, distance_m in zip(
+        match.pairs.tolist(), match.probabilities.tolist(), match.distances_m.tolist(), strict=True
+    ):
+        yield query.label(q), map.label(m), f"{probability:.6f}", f"{distance_m:.6f}"
 
 
 def read_pairs(path: Path, query: FruitCloud, map: FruitCloud) -> list[tuple[int, int]]:

@@ -216,6 +216,6 @@ def path_inside(where: str, folder: Path, name: str) -> Path:
 
 
 def shown(value: object) -> str:
-    """Represent what was found, cut where it is long."""
-    text = repr(value)
+    """Represent what was found in one line, cut where it is long."""
+    text = " ".join(map(str.strip, repr(value).splitlines()))
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."

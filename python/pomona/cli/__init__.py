@@ -31,7 +31,7 @@ from pomona.cli import (
     validate,
     view,
 )
-from pomona.cli.terminal import say, tell
+from pomona.cli.terminal import require_written, say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
 
@@ -88,10 +88,7 @@ app.add_typer(synth.app, name="synth")
 def main() -> None:
     """Run the command line; wrong input is one line on stderr and exit code 2, a bug is a trace."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("always", PomonaWarning)
-            warnings.showwarning = _warn
-            code = app(standalone_mode=False)
+        code = _run()
     except PomonaError as error:
         _refuse(str(error))
     except _UsageError as error:
@@ -101,6 +98,17 @@ def main() -> None:
             raise
         _refuse(f"{error.filename}: {error.strerror}")
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _run() -> object:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", PomonaWarning)
+            warnings.showwarning = _warn
+            return app(standalone_mode=False)
+    except OSError:
+        require_written()  # the help is printed by Typer, past `say`
+        raise
 
 
 def _refuse(line: str) -> NoReturn:

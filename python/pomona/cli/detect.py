@@ -36,7 +36,10 @@ def detect(
     ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
-    """Find the fruits in PICTURE and write a box around each."""
+    """Find the fruits in PICTURE and write a box around each.
+
+    A picture that cannot be read is skipped and told; nothing is written where none can be.
+    """
     from pomona.atomic import whole_file
     from pomona.cli.progress import counting
     from pomona.detect.on_pictures import detect_in
@@ -51,13 +54,15 @@ def detect(
     refuse_inputs(outputs, [*named.values(), model_named(model)])
     detector = OnnxDetector.open(model_named(model), min_score=min_score, tiles=tiles, augment=augment)
     with counting("detecting", len(named)) as progress:
-        found = detect_in(named, detector, plot, progress)
+        found, skipped = detect_in(named, detector, plot, progress)
     with whole_file(output) as partial:
         partial.write_text(table_of(found.items()), encoding="utf-8")
     if json:
-        say_json({"output": str(output), "model": str(detector.path), "n_boxes": _counts(found)})
+        told = {"output": str(output), "model": str(detector.path), "n_boxes": _counts(found), "skipped": skipped}
+        say_json(told)
     else:
         say(*(f"{name}: {amount(count, 'fruit')}" for name, count in _counts(found).items()))
+        say(*(f"{name}: skipped" for name in skipped))
 
 
 def _counts(found: dict[str, Detections]) -> dict[str, int]:

@@ -31,7 +31,7 @@ def localize(
         ...,
         "-o",
         "--output",
-        help="Poses to write, map_from_camera: TUM text, or KITTI (.kitti); - is the standard output.",
+        help="Poses to write, map_from_camera: TUM text (.tum, .txt) or KITTI's (.kitti); - is the standard output.",
     ),
     single: bool = single_option,
     detections: Path | None = detections_option,
@@ -60,14 +60,16 @@ def localize(
     """
     from pomona.cli import localize_output
     from pomona.detect.opening import open_detector
+    from pomona.file_names import require_suffix
     from pomona.localize import Localizer
-    from pomona.localize.files import write_way
+    from pomona.localize.files import POSE_SUFFIXES, write_way
     from pomona.localize.following import localize as localized
     from pomona.outputs import refuse_inputs
     from pomona.recording import open_recording, selected
     from pomona.recording.bags.topics import parsed_topics
     from pomona.settings import Settings
 
+    require_suffix(output, POSE_SUFFIXES)
     overrides = Settings.load(config, {}).overrides
     vertical = parsed_up(up) if up else None
     chosen = None if topics is None else parsed_topics(topics)

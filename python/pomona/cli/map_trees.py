@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.map_words import orchard_argument, waiting
 from pomona.cli.terminal import say, say_json
 
@@ -24,6 +25,9 @@ def map_trees(
         None, "--segments", metavar="METRES", help="Part rows in which no trees can be told into lengths of this."
     ),
     renumber: bool = typer.Option(False, "--renumber", help="Count from 1 again; else trees keep their numbers."),
+    forget: bool = typer.Option(
+        False, "--forget", help="Look for trees where --trees gave some before; those that are drawn in the map stay."
+    ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Find the rows and trees of ORCHARD from its fruits, number the trees along their row and write them.
@@ -45,6 +49,7 @@ def map_trees(
             spacing_m=spacing_m,
             segment_m=segment_m,
             renumber=renumber,
+            forget=forget,
             waiting=waiting(orchard),
         )
     if json:
@@ -63,8 +68,14 @@ def _row_as_lines(row: TreeRow) -> list[str]:
         return [
             f"row: {row.n_fruits} fruits, no trees can be told; --segments METRES parts it, --trees FILE names them"
         ]
-    what = "segments" if row.kind == "segments" else f"trees, {row.source}"
+    on_trees = sum(n_fruits for _, _, n_fruits in row.trees)
+    others = [("no tree", row.n_fruits - on_trees)] if on_trees < row.n_fruits else []
+    count = len(row.trees)
+    what = amount(count, "segment") if row.kind == "segments" else f"{amount(count, 'tree')}, {row.source}"
     return [
-        f"row {row.number}: {row.n_fruits} fruits, {len(row.trees)} {what}, {row.spacing_m:.2f} m apart",
-        *(f"  {name}: {n_fruits} fruits" for name, _, n_fruits in row.trees),
+        f"row {row.number}: {amount(row.n_fruits, 'fruit')}, {what}, {row.spacing_m:.2f} m apart",
+        *(
+            f"  {name}: {amount(n_fruits, 'fruit')}"
+            for name, n_fruits in [*((tree[0], tree[2]) for tree in row.trees), *others]
+        ),
     ]

@@ -47,7 +47,7 @@ def match(
     unit: Unit | None = typer.Option(None, help="Unit of the coordinates in the files; m, or free with --scale free."),
     query_unit: Unit | None = typer.Option(None, help="Unit of the coordinates of QUERY, where it is another."),
     output: Annotated[Path | None, Writes(PAIRS)] = typer.Option(
-        None, "-o", "--output", help="Write the pairs here as CSV; - is the standard output."
+        None, "-o", "--output", help="Write the pairs here, .csv; - is the standard output."
     ),
     plot: Annotated[Path | None, Writes(PICTURE)] = typer.Option(None, help="Draw the match here: .png, .svg or .pdf."),
     plot_view: PlotView = typer.Option(
@@ -62,9 +62,12 @@ def match(
     """
     from pomona.cli.progress import working
     from pomona.cloud import FruitCloud
+    from pomona.file_names import require_suffix
     from pomona.pairs import write_pairs
     from pomona.settings import Settings
 
+    if output is not None:
+        require_suffix(output, (".csv",))
     settings = Settings.load(config, call_flags(method, scale, noise_m, up, per_frame, threads))
     if plot is not None:
         from pomona.plot import require_picture_name

@@ -54,11 +54,12 @@ def summary(recording: Recording, survey: Survey, written: Mapping[int, Path]) -
     import numpy as np
 
     diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
+    n_come_to = sum(len(part.trajectory) for part in survey.parts) + len(survey.skipped)
     return {
         "output": [str(written[survey.longest])]
         + [str(path) for number, path in written.items() if number != survey.longest],
         "recording": str(recording.path),
-        "n_frames": len(recording),
+        "n_frames": len(recording) if survey.stopped is None else n_come_to,
         "n_skipped_frames": len(survey.skipped),
         "stopped_after_frame": survey.stopped,
         "n_boxes": survey.detections,

@@ -69,13 +69,30 @@ def libraries_on_stderr() -> Iterator[None]:
         _kept_stdout.reset(before)
 
 
+def require_written() -> None:
+    """Refuse to go on where something that another printed on the standard output, the help, did not come out.
+
+    Raises
+    ------
+    PomonaError
+        Where it cannot be written.
+    """
+    if sys.stdout is not None:
+        _flush(sys.stdout)
+
+
 def _print(stream: TextIO | None, lines: tuple[str, ...]) -> None:
     if stream is None:  # closed by whoever started the program
         return
     text = "".join(f"{shown(line)}\n" for line in lines)
     encoding = stream.encoding or "utf-8"
+    _flush(stream, text.encode(encoding, "backslashreplace").decode(encoding))
+
+
+def _flush(stream: TextIO, text: str = "") -> None:
+    """Write text, and what is still waiting to be written."""
     try:
-        stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+        stream.write(text)
         stream.flush()
     except OSError as error:
         _forget(stream)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,19 @@ from pomona.reading import shown
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
 
-__all__ = ["BLANKABLE", "MOST_WHOLE", "NUMBERS", "WHOLE", "assemble", "check_names", "number", "split", "typed_columns"]
+__all__ = [
+    "BLANKABLE",
+    "MOST_WHOLE",
+    "NUMBERS",
+    "WHOLE",
+    "assemble",
+    "check_names",
+    "columns_for_file",
+    "covariances_of",
+    "number",
+    "split",
+    "typed_columns",
+]
 
 POSITION = ("x", "y", "z")
 COVARIANCE = ("cxx", "cyy", "czz", "cxy", "cxz", "cyz")
@@ -80,18 +93,23 @@ def number(name: str, cell: str) -> float:
     return value
 
 
+def covariances_of(columns: Mapping[str, Any]) -> NDArray[np.float64] | None:
+    """Put the columns of a covariance together, (N, 3, 3); None where there are none."""
+    if COVARIANCE[0] not in columns:
+        return None
+    covariances = np.empty((len(columns["x"]), 3, 3))
+    for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
+        covariances[:, i, j] = covariances[:, j, i] = columns[name]
+    return covariances
+
+
 def assemble(columns: Mapping[str, Any], make: type[FruitCloud]) -> FruitCloud:
     """Put columns together as a cloud; numbers as arrays, text as sequences of str."""
-    covariances: NDArray[np.float64] | None = None
-    if COVARIANCE[0] in columns:
-        covariances = np.empty((len(columns["x"]), 3, 3))
-        for name, (i, j) in zip(COVARIANCE, COVARIANCE_CELLS, strict=True):
-            covariances[:, i, j] = covariances[:, j, i] = columns[name]
     return make(
         positions=np.column_stack([columns[name] for name in POSITION]).astype(np.float64),
         ids=tuple(columns["id"]) if "id" in columns else None,
         diameters_m=columns.get("diameter_m"),
-        covariances=covariances,
+        covariances=covariances_of(columns),
         n_views=np.asarray(columns["n_views"]).astype(np.int64) if "n_views" in columns else None,
         extras={name: tuple(column) for name, column in columns.items() if name not in NUMBERS and name != "id"},
     )
@@ -114,6 +132,13 @@ def split(cloud: FruitCloud) -> dict[str, Any]:
         if name in NUMBERS or name == "id":
             raise PomonaError(f"extras: found the name {name!r}, expected one that no column of ours has")
         columns[name] = column
+    return columns
+
+
+def columns_for_file(path: Path, cloud: FruitCloud) -> dict[str, Any]:
+    """Take a cloud apart as `split` does, and refuse names that a reader would not tell apart: it strips them."""
+    columns = split(cloud)
+    check_names([name.strip() for name in columns], str(path))
     return columns
 
 

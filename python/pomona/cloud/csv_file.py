@@ -6,6 +6,7 @@ import csv
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -13,7 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
-from pomona.cloud.columns import BLANKABLE, MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
+from pomona.cloud.columns import (
+    BLANKABLE,
+    COVARIANCE,
+    MOST_WHOLE,
+    NUMBERS,
+    WHOLE,
+    assemble,
+    check_names,
+    columns_for_file,
+    covariances_of,
+    number,
+)
+from pomona.cloud.covariances import are_covariances
+from pomona.csv_rows import write_rows
 from pomona.errors import PomonaError
 from pomona.reading import require_file, shown
 
@@ -46,11 +60,10 @@ def read(path: Path, make: type[FruitCloud]) -> FruitCloud:
 
 def write(path: Path, cloud: FruitCloud) -> None:
     """Write a cloud in metres; numbers in the fewest digits that read back the same, unknown diameters blank."""
-    columns = split(cloud)
+    columns = columns_for_file(path, cloud)
+    rows = zip(*(_cells(name, column) for name, column in columns.items()), strict=True)
     with whole_file(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*(_cells(name, column) for name, column in columns.items()), strict=True))
+        write_rows(file, chain([columns], rows))
 
 
 def _cells(name: str, column: Any) -> list[Any]:
@@ -110,6 +123,9 @@ def _read_table(file: IO[str], names: list[str], header_lines: int) -> dict[str,
             return None
     if "id" in columns and not _names_each_once(columns["id"]):
         return None
+    covariances = covariances_of(columns)
+    if covariances is not None and not are_covariances(covariances).all():
+        return None
     return columns
 
 
@@ -127,6 +143,7 @@ def _read_cells(path: Path, file: IO[str], names: list[str], header_lines: int) 
     while reader.line_num < header_lines:
         next(reader)
     columns: dict[str, list[Any]] = {name: [] for name in names}
+    lines: list[int] = []
     line_of_id: dict[str, int] = {}
     for row, cells in enumerate(cells for cells in reader if not _blank(cells)):
         line = f"{path}: line {reader.line_num}"
@@ -137,9 +154,22 @@ def _read_cells(path: Path, file: IO[str], names: list[str], header_lines: int) 
                 columns[name].append(number(name, cell) if name in NUMBERS else cell)
             except ValueError as error:
                 raise PomonaError(f"{line} (row {row}), column {name}: found {shown(cell)}, {error}") from None
+        lines.append(reader.line_num)
         if "id" in columns:
             _require_new(columns["id"][-1], line_of_id, reader.line_num, line)
-    return {name: np.array(column) if name in NUMBERS else column for name, column in columns.items()}
+    table: dict[str, Any] = {name: np.array(cells) if name in NUMBERS else cells for name, cells in columns.items()}
+    _require_covariances(path, table, lines)
+    return table
+
+
+def _require_covariances(path: Path, columns: dict[str, Any], lines: list[int]) -> None:
+    """Refuse numbers that are no covariance together, though each may be one's; `lines` are those of the rows."""
+    covariances = covariances_of(columns)
+    right = np.array([]) if covariances is None else are_covariances(covariances)
+    if not right.all():
+        row = int(np.argmin(right))
+        where = f"{path}: line {lines[row]} (row {row}), columns {','.join(COVARIANCE)}"
+        raise PomonaError(f"{where}: found a matrix that is not positive semi-definite, expected a covariance")
 
 
 def _blank(cells: list[str]) -> bool:

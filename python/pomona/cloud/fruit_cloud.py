@@ -12,18 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from pomona.arrays import checked_array
 from pomona.cards import as_card
+from pomona.cloud.columns import MOST_WHOLE
+from pomona.cloud.covariances import are_covariances
 from pomona.cloud.facts import facts
+from pomona.cloud.text_columns import checked_extras, checked_ids
 from pomona.cloud.units import Unit
 from pomona.errors import PomonaError
+from pomona.file_names import given_path
+from pomona.reading import shown
 from pomona.views import Views
 
 __all__ = ["FruitCloud"]
 
 UNEVEN = 1e-3
 """Part by which lengths may differ by direction: a matrix that was printed with four digits still goes."""
-
-BEYOND_ROUNDING = 1e-12
-"""A minor of a matrix of entries up to 1 above this is above zero."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,7 +37,7 @@ class FruitCloud:
     positions : (N, 3) float64
         Centres of the fruits, metres.
     ids : tuple of N str, optional
-        Names of the fruits, each used once.
+        Names of the fruits, each used once; any text but none.
     diameters_m : (N,) float64, optional
         Diameters in metres, NaN where unknown.
     covariances : (N, 3, 3) float64, optional
@@ -50,7 +52,8 @@ class FruitCloud:
     Raises
     ------
     PomonaError
-        When an array has the wrong shape, a number is not finite, a covariance is none or an id is used twice.
+        When an array has the wrong shape, a number is not finite, a covariance is none, an id is empty or used twice,
+        or a text has half a character in it, which no file can hold.
     """
 
     positions: NDArray[np.float64]
@@ -73,13 +76,12 @@ class FruitCloud:
             _require_covariances(covariances)
             object.__setattr__(self, "covariances", covariances)
         if self.n_views is not None:
-            object.__setattr__(self, "n_views", checked_array("n_views", self.n_views, np.int64, (n,)))
+            object.__setattr__(self, "n_views", _counts(self.n_views, n))
         if self.ids is not None:
-            object.__setattr__(self, "ids", _column("ids", self.ids, n))
-            _require_unique(self.ids)
-        if self.views is not None and len(self.views) and not _within(self.views.fruits, n):
-            raise PomonaError(f"views.fruits: a sighting names a row outside 0..{n - 1}")
-        object.__setattr__(self, "extras", {name: _column(name, cells, n) for name, cells in self.extras.items()})
+            object.__setattr__(self, "ids", checked_ids(self.ids, n))
+        if self.views is not None:
+            _require_views(self.views, n)
+        object.__setattr__(self, "extras", checked_extras(self.extras, n))
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -109,22 +111,32 @@ class FruitCloud:
         """
         from pomona.cloud.files import read_cloud
 
-        return read_cloud(Path(path), unit, cls)
+        return read_cloud(given_path(path), unit, cls)
 
     def write(self, path: str | Path) -> None:
         """Write a .csv or .ply file, in metres; the file appears whole or not at all.
 
         A session (.gpkg) also has a name and a date: `pomona.orchard.write_session` writes it.
+
+        Raises
+        ------
+        PomonaError
+            The file cannot be written, or not so that it could be read again: two columns have the same name but for
+            blanks around it, or a PLY cannot name one.
         """
         from pomona.cloud.files import write_cloud
 
-        write_cloud(Path(path), self)
+        write_cloud(given_path(path), self)
 
     def select(self, rows: ArrayLike) -> FruitCloud:
-        """Return the fruits ``rows`` (row numbers, each once, or a mask) in that order, with their sightings."""
-        picked = np.arange(len(self))[np.asarray(rows)] if np.size(rows) else np.empty(0, np.int64)
-        if len(np.unique(picked)) != len(picked):
-            raise PomonaError("select: a row is named twice, expected each row once")
+        """Return the fruits ``rows`` (row numbers, each once, or a mask) in that order, with their sightings.
+
+        Raises
+        ------
+        PomonaError
+            A row is not there, or named twice.
+        """
+        picked = _rows(rows, len(self))
 
         def text(column: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(column[row] for row in picked)
@@ -202,28 +214,10 @@ def _require_finite(name: str, array: NDArray[np.float64]) -> None:
 
 
 def _require_covariances(covariances: NDArray[np.float64]) -> None:
-    """Refuse what is not symmetric positive semi-definite beyond rounding."""
     _require_finite("covariances", covariances)
-    # Scaled first: squares of what is finite need not be.
-    largest = np.abs(covariances).max(axis=(1, 2), keepdims=True, initial=0.0)
-    scaled = np.divide(covariances, largest, out=np.zeros_like(covariances), where=largest > 0)
-    tolerance = 1e-9 * np.linalg.norm(scaled, axis=(1, 2))
-    wrong = np.abs(scaled - scaled.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0) > tolerance
-    doubtful = np.flatnonzero(~_are_surely_positive(scaled))
-    wrong[doubtful] |= np.linalg.eigvalsh(scaled[doubtful]).min(axis=1, initial=np.inf) < -tolerance[doubtful]
-    if wrong.any():
-        raise PomonaError(f"covariances: row {int(np.argmax(wrong))} is not symmetric positive semi-definite")
-
-
-def _are_surely_positive(scaled: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which matrices, symmetric with entries up to 1, have leading minors above zero by more than rounding.
-
-    Those are positive definite; the eigenvalues of the others are asked for, at ten times the cost.
-    """
-    a, b, c, d, e, f = (scaled[:, row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    second = a * b - d * d
-    third = c * second - a * f * f - b * e * e + 2.0 * d * e * f
-    return np.asarray((a > BEYOND_ROUNDING) & (second > BEYOND_ROUNDING) & (third > BEYOND_ROUNDING))
+    right = are_covariances(covariances)
+    if not right.all():
+        raise PomonaError(f"covariances: row {int(np.argmin(right))} is not symmetric positive semi-definite")
 
 
 def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
@@ -236,21 +230,13 @@ def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
     return diameters_m
 
 
-def _column(name: str, cells: Any, n: int) -> tuple[str, ...]:
-    column = tuple(str(cell) for cell in cells)
-    if len(column) != n:
-        raise PomonaError(f"{name}: found {len(column)} values, expected {n}, one a fruit")
-    return column
-
-
-def _require_unique(ids: tuple[str, ...]) -> None:
-    if len(set(ids)) == len(ids):
-        return
-    first_row: dict[str, int] = {}
-    for row, name in enumerate(ids):
-        if name in first_row:
-            raise PomonaError(f"ids: rows {first_row[name]} and {row} are both {name!r}, expected each id once")
-        first_row[name] = row
+def _counts(values: ArrayLike, n: int) -> NDArray[np.int64]:
+    counts: NDArray[np.int64] = checked_array("n_views", values, np.int64, (n,))
+    wrong = (counts < -MOST_WHOLE) | (counts > MOST_WHOLE)  # no reader of a file believes them
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise PomonaError(f"n_views: row {row} is {counts[row]}, expected a number of frames")
+    return counts
 
 
 def _require_similarity(transform: NDArray[np.float64]) -> None:
@@ -264,8 +250,25 @@ def _require_similarity(transform: NDArray[np.float64]) -> None:
         raise PomonaError("map_from_query: found a mirror, expected a rigid or similarity transform")
 
 
-def _within(rows: NDArray[np.int64], n: int) -> bool:
-    return bool(rows.min() >= 0 and rows.max() < n)
+def _require_views(views: Views, n: int) -> None:
+    if not isinstance(views, Views):
+        raise PomonaError(f"views: found {shown(views)}, expected pomona.Views")
+    if len(views) and not 0 <= views.fruits.min() <= views.fruits.max() < n:
+        raise PomonaError(f"views.fruits: a sighting names a row outside 0..{n - 1}")
+
+
+def _rows(rows: ArrayLike, n: int) -> NDArray[np.int64]:
+    """Return row numbers of N, which may be given as a mask or from the end."""
+    try:
+        asked = np.asarray(rows)
+        picked = np.arange(n)[asked] if asked.size else np.empty(0, np.int64)
+    except (IndexError, ValueError):
+        picked = None
+    if picked is None or picked.ndim != 1:
+        raise PomonaError(f"select: found {shown(rows)}, expected numbers of {n} rows, or a mask of them")
+    if len(np.unique(picked)) != len(picked):
+        raise PomonaError("select: a row is named twice, expected each row once")
+    return picked
 
 
 def _select_views(views: Views, picked: NDArray[np.int64], n: int) -> Views:

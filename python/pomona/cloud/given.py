@@ -28,7 +28,7 @@ Cloud: TypeAlias = FruitCloud | WithCloud | ArrayLike | PathLike[str]
 """Fruits, (N, 3) metres, what holds a cloud, or the name of a file with one: .csv, .ply or .gpkg."""
 
 
-def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
+def as_cloud(cloud: Cloud, unit: Unit = "m", *, name: str = "cloud") -> FruitCloud:
     """Take a cloud for itself, read it where it is the name of a file, and an array as positions.
 
     Parameters
@@ -37,6 +37,8 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
         The fruits.
     unit : {"m", "cm", "mm", "free"}
         Of the coordinates, where it is a file; arrays are taken as they are.
+    name : str
+        What the caller calls it, for the error where there is none.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def as_cloud(cloud: Cloud, unit: Unit = "m") -> FruitCloud:
     if isinstance(held, FruitCloud):
         return held
     if cloud is None:
-        raise PomonaError("cloud: found None, expected fruits, (N, 3) metres, or the name of a file with them")
+        raise PomonaError(f"{name}: found None, expected fruits, (N, 3) metres, or the name of a file with them")
     return FruitCloud(positions=cloud)  # type: ignore[arg-type] # looked at and converted there
 
 

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
-from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, number, split
+from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, columns_for_file, number
 from pomona.cloud.typed import as_floats, as_whole
 from pomona.errors import PomonaError
 from pomona.likes import PLY_MARK
 from pomona.reading import parsed_json, require_file, shown, whole_number
+from pomona.unicode_text import UNICODE, broken_at
 
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
@@ -77,14 +78,12 @@ def write(path: Path, cloud: FruitCloud) -> None:
     """Write a cloud in metres, binary; coordinates as doubles, so that they read back the same."""
     arrays: dict[str, NDArray[Any]] = {}
     comments: list[str] = []
-    for name, column in split(cloud).items():
+    for name, column in columns_for_file(path, cloud).items():
         numbers = column if isinstance(column, np.ndarray) else _as_numbers(column, whole=name == "id")
         if numbers is None:
-            comments += [
-                f"comment text {_word(path, name)} {row} {json.dumps(cell)}" for row, cell in enumerate(column)
-            ]
+            comments += [_comment(path, name, row, cell) for row, cell in enumerate(column)]
         else:
-            arrays[_word(path, name)] = numbers.astype("<i4" if numbers.dtype.kind == "i" else "<f8")
+            arrays[_word(path, name)] = numbers.astype("<i4" if _fits_int(numbers) else "<f8")
     table = np.zeros(len(cloud), dtype=[(name, array.dtype) for name, array in arrays.items()])
     for name, array in arrays.items():
         table[name] = array
@@ -114,6 +113,19 @@ def _as_numbers(cells: tuple[str, ...], *, whole: bool) -> NDArray[np.int32] | N
     return None if floats is None else np.array(floats, dtype=np.float64)
 
 
+def _fits_int(numbers: NDArray[Any]) -> bool:
+    """Tell whether numbers are whole and of the 32 bits that PLY has."""
+    return numbers.dtype.kind == "i" and bool((np.abs(numbers) < 2**31).all())
+
+
+def _comment(path: Path, name: str, row: int, cell: str) -> str:
+    line = f"comment text {_word(path, name)} {row} {json.dumps(cell)}"
+    if len(line) >= MAX_HEADER_LINE:
+        found = f"a text of {len(cell)} characters"
+        raise PomonaError(f"{path}: column {name}, row {row}: found {found}, expected less, or a CSV")
+    return line
+
+
 def _word(path: Path, name: str) -> str:
     if not (name.isascii() and name.isprintable() and name and " " not in name):
         raise PomonaError(f"{path}: column {name!r} cannot be named in a PLY header, expected ASCII without blanks")
@@ -141,6 +153,8 @@ def _read_header(path: Path, file: IO[bytes]) -> Header:
         line = raw.decode("ascii", "replace").strip()
         if not raw:
             raise PomonaError(f"{where}: the file ends inside the header, expected 'end_header'")
+        if len(raw) == MAX_HEADER_LINE and not raw.endswith(b"\n"):  # or its rest would be a line of its own
+            raise PomonaError(f"{where}: found a line of more than {MAX_HEADER_LINE} bytes, expected a PLY header")
         match line.split(maxsplit=4):
             case ["end_header"]:
                 break
@@ -179,6 +193,8 @@ def _json_text(where: str, value: str) -> str:
         text = None
     if not isinstance(text, str):
         raise PomonaError(f"{where}: found {shown(value)}, expected a quoted text")
+    if broken_at([text]) is not None:
+        raise PomonaError(f"{where}: found {shown(text)}, expected {UNICODE}")
     return text
 
 

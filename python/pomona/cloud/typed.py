@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 __all__ = ["as_floats", "as_whole", "typed"]
 
-# Written as a number is written and no other way: 007 is a name, 1_000 and inf are text.
-WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,15})")
+# Written as a number is written and no other way: 007 and -0 are names, 1_000 and inf are text.
+WHOLE = re.compile(r"0|-?[1-9][0-9]{0,15}")
 NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]{1,3})?")
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from pomona.amounts import amount
 from pomona.detect.detections import Detections
 from pomona.detect.drawn_boxes import draw_boxes, drawn_name
 from pomona.detect.onnx import OnnxDetector
 from pomona.detect.picture_file import read_picture
+from pomona.errors import PomonaWarning
+from pomona.recording.pictures import UnreadablePictureError
 
 __all__ = ["detect_in"]
 
@@ -18,8 +22,8 @@ def detect_in(
     detector: OnnxDetector,
     drawn: Path | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
-) -> dict[str, Detections]:
-    """Find the fruits of each picture by its name.
+) -> tuple[dict[str, Detections], dict[str, str]]:
+    """Find the fruits of each picture by its name; one that cannot be read is skipped, and a warning says so.
 
     Parameters
     ----------
@@ -31,17 +35,34 @@ def detect_in(
     progress : callable
         Told how many of how many are done.
 
+    Returns
+    -------
+    found : dict
+        Boxes by name.
+    skipped : dict
+        Why a picture was skipped, by name.
+
     Raises
     ------
     UnreadablePictureError
-        One of them is no picture.
+        None of them can be read.
     """
     found: dict[str, Detections] = {}
+    skipped: dict[str, str] = {}
     for name, path in pictures.items():
-        picture = read_picture(path)
+        try:
+            picture = read_picture(path)
+        except UnreadablePictureError as error:
+            skipped[name] = str(error)
+            if len(skipped) == len(pictures):
+                raise
+            continue
         found[name] = detector.detect(picture)
         if drawn is not None:
             drawn.mkdir(exist_ok=True)
             draw_boxes(drawn / drawn_name(name), picture, found[name])
-        progress(len(found), len(pictures))
-    return found
+        progress(len(found) + len(skipped), len(pictures))
+    if skipped:
+        message = f"skipped {len(skipped)} of {amount(len(pictures), 'picture')}, first {next(iter(skipped.values()))}"
+        warnings.warn(message, PomonaWarning, stacklevel=2)
+    return found, skipped

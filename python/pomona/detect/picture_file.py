@@ -24,11 +24,13 @@ def pictures_in(places: Iterable[Path]) -> dict[str, Path]:
     Raises
     ------
     PomonaError
-        A folder holds no picture, two pictures have the same name, or a name is not UTF-8, as tables of boxes are.
+        A picture is not there, a folder holds none, two have the same name, or a name is not UTF-8, as tables of
+        boxes are.
     """
     found: dict[str, Path] = {}
     for place in places:
         for path in _of_folder(place) if place.is_dir() else [place]:
+            require_file(path, "a picture")
             _require_text(path)
             if path.name in found:
                 raise PomonaError(f"{path}: found the name of {found[path.name]}, expected names that differ")

@@ -70,6 +70,7 @@ def triangulate(
         trajectory=trajectory,
         configuration={"scan": {**about, **_of_date(date)}},
         input_hashes=hashes_of(recording, boxes.inputs),
+        force=True,  # what may be replaced was asked before the work began
     )
 
 

@@ -10,7 +10,10 @@ from pomona.errors import PomonaWarning
 from pomona.localize.course import Way
 from pomona.recording.poses import KITTI_SUFFIX, write_poses
 
-__all__ = ["write_way"]
+__all__ = ["POSE_SUFFIXES", "write_way"]
+
+POSE_SUFFIXES = (".tum", ".txt", KITTI_SUFFIX)
+"""Of poses in a map; the first two are TUM text."""
 
 
 def write_way(path: Path, way: Way) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import warnings
 from collections.abc import Iterator
@@ -15,22 +16,24 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud, Unit
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_places
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.file_names import given_path
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import read_session
+from pomona.store.values import iso_date
 
 __all__ = ["load_session"]
 
 
-def load_session(path: str | Path, *, date: str | None = None, unit: Unit | None = None) -> Session:
+def load_session(path: str | Path, *, date: str | datetime.date | None = None, unit: Unit | None = None) -> Session:
     """Read a session file, or a bare cloud (.csv, .ply) as a session that is called as its file.
 
     Parameters
     ----------
     path : str or Path
         A session (.gpkg) or a cloud (.csv, .ply).
-    date : str, optional
-        ISO 8601 date of the visit; needed for a cloud and for a session whose date was guessed, instead of the
-        session's own otherwise.
+    date : str or datetime.date, optional
+        Local date, or date and time, of the visit, as text in ISO 8601; needed for a cloud and for a session whose date
+        was guessed, instead of the session's own otherwise.
     unit : {"m", "cm", "mm", "free"}, optional
         Unit of the coordinates; metres otherwise, and then they must look like metres.
 
@@ -40,10 +43,10 @@ def load_session(path: str | Path, *, date: str | None = None, unit: Unit | None
         When the file cannot be read, has no date that anybody has noted, or has no distances or diameters of fruits
         and nobody says that they are right: ``unit="m"``.
     """
-    path = Path(path)
+    path, day = given_path(path), None if date is None else iso_date(date)
     read = _session if path.suffix.lower() == ".gpkg" else _cloud
     with _doubts_refused(is_said=unit is not None):
-        session = read(path, date, unit)
+        session = read(path, day, unit)
         if unit is None:
             check_places(path, session.cloud.positions)
             _check_diameters(path, session.cloud.diameters_m)
@@ -65,7 +68,7 @@ def _session(path: Path, date: str | None, unit: Unit | None) -> Session:
 
 
 def _cloud(path: Path, date: str | None, unit: Unit | None) -> Session:
-    cloud = FruitCloud.read(path, unit=unit or "m")
+    cloud = FruitCloud.read(path, unit="m" if unit is None else unit)
     if date is None:
         raise PomonaError(
             f"{path}: a bare cloud has no date, give the day of the visit: --date YYYY-MM-DD, in Python date="

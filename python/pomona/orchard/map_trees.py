@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sqlite3
+import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
 from pomona.orchard.writing import update_layers
@@ -79,6 +80,7 @@ def find_trees(
     spacing_m: float | None = None,
     segment_m: float | None = None,
     renumber: bool = False,
+    forget: bool = False,
     timeout_s: float = TIMEOUT_S,
     waiting: Waiting | None = None,
 ) -> list[TreeRow]:
@@ -97,6 +99,8 @@ def find_trees(
         Where no trees can be told, part the row into lengths of this.
     renumber : bool
         Whether to count from 1 again; else trees keep their numbers.
+    forget : bool
+        Whether to look for trees where some were given before; else those stay.
     timeout_s, waiting
         As for `add_session`.
 
@@ -104,6 +108,11 @@ def find_trees(
     ------
     PomonaError
         When the file is not a map of ours, a length cannot be, or a tree that is given stands beside no row.
+
+    Warns
+    -----
+    PomonaWarning
+        Where a length has no effect, for the trees of a row are known.
     """
     for name, length_m in (("--spacing", spacing_m), ("--segments", segment_m)):
         low, high = SPACINGS_M
@@ -111,12 +120,22 @@ def find_trees(
             raise PomonaError(f"{name}: found {length_m:g} m, expected {low:g} to {10.0 * high:g}")
     with writing(Path(path), "map", timeout_s=timeout_s, waiting=waiting) as (connection, _):
         fruits = _fruits(connection)
-        known = [*given, *_drawn(connection, replaced=bool(given))]
+        known = [*given, *_drawn(connection, replaced=forget or bool(given))]
         known = known or _named(connection, fruits)
         found = _Finding(connection, fruits, known, spacing_m, segment_m, renumber)
         rows = found.rows()
         update_layers(connection)
-        return rows
+    _tell_idle({"--spacing": spacing_m, "--segments": segment_m}, rows)
+    return rows
+
+
+def _tell_idle(lengths_m: Mapping[str, float | None], rows: Sequence[TreeRow]) -> None:
+    """Say which lengths told nothing: where trees are known, none is looked for."""
+    known = [f"row {row.number}" for row in rows if row.source == GIVEN]
+    idle = [name for name, length_m in lengths_m.items() if length_m is not None]
+    if known and idle:
+        message = f"{' and '.join(idle)}: no effect in {', '.join(known)}, whose trees were given or drawn"
+        warnings.warn(f"{message}; --forget looks for trees where some were given", PomonaWarning, stacklevel=3)
 
 
 class _Finding:

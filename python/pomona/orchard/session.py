@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from pomona import __version__
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.fruit_crop import FruitCrop
+from pomona.reading import shown
 from pomona.store.values import FARTHEST_M, is_scale_free, iso_date
 from pomona.trajectory import Trajectory
+from pomona.unicode_text import UNICODE, broken_at
 
 __all__ = ["GUESSED", "Session"]
 
@@ -59,15 +62,30 @@ class Session:
     crops: Mapping[int, FruitCrop] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self._require_kinds()
         if not self.name.strip():
             raise PomonaError("session: found an empty name, expected one that is used once in a map")
         object.__setattr__(self, "date", iso_date(self.date))
         _json("configuration", self.configuration)
         if len(self.cloud) and np.abs(self.cloud.positions).max() > FARTHEST_M:
             raise PomonaError(f"session {self.name}: found a fruit beyond {FARTHEST_M:g} m")
-        _require_unicode((self.name, self.recording, *(self.cloud.ids or ())))
-        for column in self.cloud.extras.values():
-            _require_unicode(column)
+        texts = (self.name, self.recording)
+        if (broken := broken_at(texts)) is not None:
+            raise PomonaError(f"session: found {shown(texts[broken])}, expected {UNICODE}")
+
+    def _require_kinds(self) -> None:
+        """Refuse what is something else than was asked for; whoever calls from Python has no compiler to say so."""
+        _require_kind("name", self.name, str, "str")
+        _require_kind("recording", self.recording, str, "str")
+        _require_kind("cloud", self.cloud, FruitCloud, "FruitCloud")
+        _require_kind("trajectory", self.trajectory, Trajectory | None, "Trajectory")
+        for name, mapping in (("configuration", self.configuration), ("input_hashes", self.input_hashes)):
+            _require_kind(name, mapping, Mapping, "a mapping")
+        _require_kind("crops", self.crops, Mapping, "a mapping")
+        for row, crop in self.crops.items():
+            if row not in range(len(self.cloud)):
+                raise PomonaError(f"session: crops: found row {shown(row)}, expected one of {len(self.cloud)} fruits")
+            _require_kind("crops", crop, FruitCrop, "FruitCrop")
 
     @property
     def is_date_guessed(self) -> bool:
@@ -104,13 +122,9 @@ class Session:
         return _json("input_hashes", self.input_hashes)
 
 
-def _require_unicode(texts: Iterable[str]) -> None:
-    """Refuse half characters, which JSON can say and no file can hold."""
-    for text in texts:
-        try:
-            text.encode()
-        except UnicodeEncodeError:
-            raise PomonaError(f"session: found {text!r}, expected characters of Unicode") from None
+def _require_kind(name: str, found: object, kind: Any, expected: str) -> None:
+    if not isinstance(found, kind):
+        raise PomonaError(f"session: {name}: found {type(found).__name__}, expected {expected}")
 
 
 def _json(name: str, value: object) -> str:

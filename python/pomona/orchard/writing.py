@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import sqlite3
 from collections.abc import Collection, Mapping
@@ -14,14 +15,18 @@ from numpy.typing import NDArray
 from pomona import geopackage
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
+from pomona.file_names import given_path, require_suffix
 from pomona.fruit_crop import FruitCrop
 from pomona.identity import VisitPair
+from pomona.likes import Like, database_of
 from pomona.orchard.earth_layers import write_earth_layers
 from pomona.orchard.session import Session
+from pomona.outputs import Output, require_outputs
 from pomona.settings import Settings
 from pomona.store import schema
 from pomona.store.numbering import last_ids
 from pomona.store.opening import blank
+from pomona.store.values import iso_date
 from pomona.trajectory import Trajectory
 
 __all__ = [
@@ -37,6 +42,8 @@ __all__ = [
     "update_layers",
     "write_session",
 ]
+
+SESSION = Like("a session", lambda path: database_of(path) == "session")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +65,13 @@ def write_session(
     cloud: FruitCloud,
     *,
     name: str,
-    date: str,
+    date: str | datetime.date,
     recording: str,
     trajectory: Trajectory | None = None,
     configuration: Mapping[str, object] | None = None,
     input_hashes: Mapping[str, str] | None = None,
     crops: Mapping[int, FruitCrop] | None = None,
+    force: bool = False,
 ) -> None:
     """Write one visit as a map with one session (GeoPackage); the file appears whole or not at all.
 
@@ -75,8 +83,8 @@ def write_session(
         Fruits in the session's frame, metres; ids are the session's own names of the fruits.
     name : str
         Name of the session, used once in a map.
-    date : str
-        Local ISO 8601 date or date and time, for example ``2021-09-27`` or ``2021-09-27T11:40:12``.
+    date : str or datetime.date
+        Local date or date and time, as text in ISO 8601, for example ``2021-09-27`` or ``2021-09-27T11:40:12``.
     recording : str
         Where the session came from.
     trajectory : Trajectory, optional
@@ -87,16 +95,29 @@ def write_session(
         File name to SHA-256 of the inputs.
     crops : mapping of int to FruitCrop, optional
         Small pictures of fruits, by row of the cloud.
+    force : bool
+        Replace another file too; never a map.
 
     Raises
     ------
     PomonaError
-        When the date is not one, the configuration is not JSON or the file cannot be written.
+        When an argument is of another kind, the date is not one, the configuration is not JSON, the file has another
+        suffix, is there and no session, or cannot be written.
     """
+    target = given_path(path)
+    require_suffix(target, (".gpkg",))
     session = Session(
-        name, date, recording, cloud, trajectory, configuration or {}, input_hashes or {}, crops=crops or {}
+        name,
+        iso_date(date),
+        recording,
+        cloud,
+        trajectory,
+        {} if configuration is None else configuration,
+        {} if input_hashes is None else input_hashes,
+        crops={} if crops is None else crops,
     )
-    with whole_file(path) as partial, blank(partial, Path(path)) as connection:
+    require_outputs([Output(target, SESSION)], [], force=force, otherwise="force=True replaces it")
+    with whole_file(target) as partial, blank(partial, target) as connection:
         schema.create(connection, "session")
         session_id = insert_session(connection, session, np.eye(4))
         fruit_ids = insert_fruits(connection, session_id, session.date, cloud)

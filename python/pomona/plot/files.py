@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
+from pomona.file_names import given_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,8 +30,15 @@ def require_picture_name(path: Path) -> None:
         raise PomonaError(f"{path}: found {found}, expected a picture named {', '.join(PICTURE_SUFFIXES)}")
 
 
-def save_picture(figure: Figure, path: Path) -> None:
-    """Write a figure as its suffix says; the file appears whole or not at all."""
+def save_picture(figure: Figure, path: str | Path) -> None:
+    """Write a figure as its suffix says; the file appears whole or not at all.
+
+    Raises
+    ------
+    PomonaError
+        The suffix is none of `PICTURE_SUFFIXES`, or the file cannot be written.
+    """
+    path = given_path(path)
     require_picture_name(path)
     with whole_file(path) as partial:
         figure.savefig(partial, format=path.suffix.lower()[1:])

@@ -97,7 +97,8 @@ def observed_cloud(connection: sqlite3.Connection, session_id: int, make: type[F
     with content("observations"):
         return make(
             positions=geopackage.points_of(geoms),
-            ids=tuple(labels) if labels and None not in labels else None,
+            # Earlier versions took an empty name from Python and PLY.
+            ids=tuple(labels) if labels and all(labels) else None,
             diameters_m=_numbers(diameters_m),
             covariances=_covariances(cells),
             n_views=None if not n_views or None in n_views else np.array(n_views, dtype=np.int64),

@@ -75,6 +75,7 @@ def write_survey(
             crops=part.crops,
             configuration=configuration,
             input_hashes=hashes,
+            force=True,  # what may be replaced was asked before the work began
         )
     return files
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +48,11 @@ class Calibration:
         Distance from the left to the right camera, None for a camera with depth and no second picture.
     depth_unit_m : float
         Metres per step of the depth pictures.
+
+    Raises
+    ------
+    PomonaError
+        A number is none that a camera can have, whoever made it; files are held to narrower bounds.
     """
 
     width: int
@@ -55,6 +63,17 @@ class Calibration:
     cy: float
     baseline_m: float | None = None
     depth_unit_m: float = 0.001
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            _require(name, getattr(self, name), "a whole number of pixels", lambda size: size >= 1 and size % 1 == 0)
+        for name in ("fx", "fy"):
+            _require(name, getattr(self, name), "pixels above 0", lambda focal_px: focal_px > 0)
+        for name in ("cx", "cy"):
+            _require(name, getattr(self, name), "pixels", lambda _: True)
+        if self.baseline_m is not None:
+            _require("baseline_m", self.baseline_m, "metres above 0, or None", lambda baseline_m: baseline_m > 0)
+        _require("depth_unit_m", self.depth_unit_m, "metres above 0", lambda unit_m: unit_m > 0)
 
     @classmethod
     def read(cls, path: str | Path, *, depth_unit_m: float = 0.001) -> Calibration:
@@ -103,6 +122,16 @@ class Calibration:
         x = (points_px[..., 0] - self.cx) / self.fx
         y = (points_px[..., 1] - self.cy) / self.fy
         return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
+def _require(name: str, value: Any, expected: str, is_right: Callable[[float], bool]) -> None:
+    """Refuse what is no finite number, or not a right one."""
+    try:
+        number = float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:
+        number = math.nan
+    if not (math.isfinite(number) and is_right(number)):
+        raise PomonaError(f"{name}: found {shown(value)}, expected {expected}")
 
 
 def checked_baseline_m(where: str, baseline_m: float) -> float:
