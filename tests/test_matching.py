@@ -256,7 +256,7 @@ def test_arrays_that_cannot_be_in_metres_are_told_of_where_nothing_is_found(whic
 
 
 def test_no_cloud_is_named_as_none() -> None:
-    with pytest.raises(pomona.PomonaError, match=r"^cloud: found None, expected fruits"):
+    with pytest.raises(pomona.PomonaError, match=r"^query: found None, expected fruits"):
         pomona.match(None, row())  # type: ignore[arg-type]
 
 

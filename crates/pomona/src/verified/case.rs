@@ -85,6 +85,11 @@ impl<'a> Finding<'a> {
 }
 
 impl Finding<'_> {
+    /// Evidence of what is settled, nats; none where nothing is.
+    pub(super) fn evidence(&self) -> f64 {
+        self.settled.as_ref().map_or(f64::NEG_INFINITY, |settled| settled.evidence)
+    }
+
     /// Share of the fruits of the query that are found, of those that the map can show in their depths all along the row.
     pub(super) fn share_of_row(&self) -> f64 {
         let found: f64 = self.settled.iter().flat_map(|settled| &settled.beliefs.probabilities).sum();

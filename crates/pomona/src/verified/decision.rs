@@ -11,6 +11,7 @@ use super::offsets;
 use super::proposal::Effort;
 use super::search::{FIRST_FRUITS, of_some_fruits};
 use super::seeds::Seed;
+use super::settlement::SELDOM;
 use super::soft;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
@@ -228,14 +229,14 @@ impl<'a> Search<'a> {
         laid.retain(|finding| self.is_pose(finding));
         let least = outlying(self.config.false_alarm_rate, REACHED_LAID);
         let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
-        let Some(answer) =
-            answer.filter(|answer| answer.overlap.log_odds > least && !self.mirror_explains_more(answer))
-        else {
+        let Some(answer) = answer.filter(|answer| answer.overlap.log_odds > least) else {
             return;
         };
         let answer = self.laid_again(&answer, &few);
+        // Visits to one side are laid along each other by as many nats more as chance may have, and paired worse so.
+        let says_more = accepted.iter().all(|found| answer.evidence() > found.evidence() + SELDOM);
         // Rows that lie on each other all along and show few of the fruits that they then should have in common are strangers.
-        if answer.share_of_row() > LEAST_AGAIN {
+        if says_more && answer.share_of_row() > LEAST_AGAIN {
             accepted.push(answer);
             others.extend(laid);
         }

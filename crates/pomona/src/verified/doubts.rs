@@ -4,7 +4,7 @@ use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
 use super::decision::SURE;
 use super::growth::grow;
-use super::hypothesis::{GATE, Hypothesis, Model, refined};
+use super::hypothesis::{GATE, Model, refined};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::patches::Landing;
@@ -14,7 +14,7 @@ use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::moments::Moments;
 use crate::neighbours::tree::single;
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
 pub(super) const RIVAL_CANDIDATES: usize = 24;
@@ -60,20 +60,14 @@ impl<'a> Search<'a> {
         2 * same > near.len()
     }
 
-    /// Sums over the fruits of the overlap and their predictions.
-    pub(super) fn overlap_moments(&self, finding: &Finding) -> Moments {
+    /// Whether the fruits of the overlap leave the line by more than noise does: on a line the turn about it, and its direction, stay open.
+    pub(super) fn turns_are_fixed(&self, finding: &Finding) -> bool {
         let mut moments = Moments::default();
         for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
             if let Some(at) = prediction {
                 moments.add(p, &at.place, 1.0);
             }
         }
-        moments
-    }
-
-    /// Whether the fruits of the overlap leave the line by more than noise does: on a line the turn about it, and its direction, stay open.
-    pub(super) fn turns_are_fixed(&self, finding: &Finding) -> bool {
-        let moments = self.overlap_moments(finding);
         if moments.weight <= 0.0 {
             return false;
         }
@@ -108,28 +102,6 @@ impl<'a> Search<'a> {
         let image = |p: &Vector3<f64>| Point3::from(p - across * (2.0 * across.dot(p)));
         let positions = self.query.points.iter().map(image).collect();
         Landscape::with_spacing(&FruitCloud::from_positions(positions), Some(self.query.spacing))
-    }
-
-    /// Whether the mirror image of the query, laid on the same fruits, explains more than the query does: a row laid along a row is
-    /// mirrored there, for those next to the middle of a mirrored row lie on themselves.
-    pub(super) fn mirror_explains_more(&self, finding: &Finding) -> bool {
-        let moments = self.overlap_moments(finding);
-        let eigen = moments.spread().symmetric_eigen();
-        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let Overlap { pose, middle, sigma, log_odds, .. } = finding.overlap;
-        // No rotation but a reflection, which every step keeps as it is.
-        let reflection = Matrix3::identity() - normal * normal.transpose() * 2.0;
-        let rotation = pose.rotation * Rotation3::from_matrix_unchecked(reflection);
-        let translation = pose.image(&middle) - rotation * middle * pose.scale;
-        let seed = Hypothesis {
-            pose: Similarity { rotation, translation, scale: pose.scale },
-            place: middle,
-            sigma,
-            log_odds,
-        };
-        let mut mirrored = Finding::new(grow(self.query, self.map, &seed, &finding.growth.patches.model), seed);
-        self.polish(&mut mirrored);
-        mirrored.overlap.log_odds > MIRRORED * log_odds
     }
 
     /// Tries to leave the local optimum of a finding: turned starts, refined, the best grown; more evidence wins.

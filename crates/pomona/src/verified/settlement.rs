@@ -30,7 +30,7 @@ const MAX_LEVERAGE: f64 = 0.8;
 
 /// Evidence, nats, by which noise that is long in the depth of a row must exceed noise that is a sphere, where constellations find
 /// the row: one pair of visits in twenty is so, beforehand. Rows that only lie along rows are as often seen from opposite sides.
-const SELDOM: f64 = 3.0;
+pub(super) const SELDOM: f64 = 3.0;
 
 /// Variance in the depth of a row over the mean, from which on length is asked about. Below it, long noise had less evidence in all
 /// searches that were looked into; without it half of all rows would be settled twice.
