@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from growth_maker import BLOOM, GrownRow, grow_row
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.growth.blocks import blocks_of
+from pomona.growth.bearing_trees import BearingTrees
+from pomona.growth.blocks import Block, blocks_of
+from pomona.growth.chance import Chance
 from pomona.growth.curve_families import FAMILIES, CurveFamily, FamilyName
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.fitting import fit_shape
@@ -30,6 +32,7 @@ from pomona.growth.size_table import SizeTable
 from pomona.growth.straying import SPELL_DAYS, straying
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.synth.seasons import SEASONS
+from pomona.viewer.season_page import Wishes, season_document
 
 Pomona = Callable[..., tuple[int, str, str]]
 
@@ -90,14 +93,25 @@ def test_the_likelihood_is_that_of_one_large_gaussian(name: str) -> None:
     np.testing.assert_allclose(model.expected().sizes, gain @ np.linalg.solve(covariance, away), atol=1e-9)
 
 
+N_DRAWS = 4096
+
+
+def chance_of(n_visits: int) -> Chance:
+    return Chance("test", N_DRAWS, 9, n_visits)
+
+
 def test_draws_scatter_about_their_expectation() -> None:
-    model = Hierarchy(small_table(), FAMILIES["expolinear"], SHAPE)
-    rng = np.random.default_rng(0)
-    drawn = [model.draw(rng) for _ in range(4000)]
-    expected = model.expected()
+    model, chance = Hierarchy(small_table(), FAMILIES["expolinear"], SHAPE), chance_of(3)
+    drawn, expected = [], model.expected()
+    for _ in range(N_DRAWS):
+        chance.next_draw()
+        drawn.append(model.draw(chance))
     for name in ("visits", "trees", "sizes", "onsets_days"):
         values = np.array([getattr(one, name) for one in drawn])
         np.testing.assert_allclose(values.mean(axis=0), getattr(expected, name), atol=4 * values.std() / 60)
+    # A fruit's size given all others: two fruits of one tree, measured alike, are as unsure.
+    spread = np.array([one.sizes for one in drawn]).std(axis=0)
+    assert spread[0] == pytest.approx(spread[2], rel=0.1)
 
 
 def test_straying_is_the_sum_of_days_that_are_alike() -> None:
@@ -112,8 +126,11 @@ def test_straying_is_the_sum_of_days_that_are_alike() -> None:
 def test_draws_of_straying_and_errors_add_up_to_what_visits_share() -> None:
     table, times = small_table(), np.array([100.0, 114.0, 130.0, 190.0])
     model = Hierarchy(table, FAMILIES["expolinear"], SHAPE)
-    effects, rng = model.expected(), np.random.default_rng(0)
-    drawn = np.array([model.draw_stray(effects, times, rng) for _ in range(4000)])
+    effects, chance, strays = model.expected(), chance_of(3), []
+    for _ in range(N_DRAWS):
+        chance.next_draw()
+        strays.append(model.draw_stray(effects, times, chance))
+    drawn = np.array(strays)
     covariance = SHAPE.stray_per_day**2 * straying(times)
     shared = covariance[:3, :3] + SHAPE.visit_spread**2 * np.eye(3)
     gain = covariance[:, :3] @ np.linalg.inv(shared)
@@ -308,6 +325,47 @@ def test_what_cannot_be_is_one_line(pomona: Pomona, row: GrownRow, tmp_path: Pat
     assert not (tmp_path / "g").exists()
 
 
+@pytest.mark.parametrize(
+    ("dates", "said"),
+    [
+        (("2004-06-14", "2024-06-29"), "found visits from 2004-06-14 to 2024-06-29, expected those of one season"),
+        (("0224-06-14", "2024-06-29"), "found a visit on 0224-06-14, expected a year from 1900 to 2199"),
+        (("0001-01-01", "0001-01-16"), "found a visit on 0001-01-01, expected a year from 1900 to 2199"),
+        (("9999-12-01", "9999-12-31"), "found a visit on 9999-12-01, expected a year from 1900 to 2199"),
+    ],
+)
+def test_visits_of_several_seasons_are_no_growth(
+    pomona: Pomona, tmp_path: Path, dates: tuple[str, str], said: str
+) -> None:
+    path = grow_row(tmp_path / "o.gpkg", days=(50, 65), n_trees=1).path
+    with closing(geopackage.connect(path)) as connection, connection:
+        sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
+        connection.executemany("UPDATE sessions SET date = ? WHERE id = ?", zip(dates, sessions, strict=True))
+    for verb in (["growth", path, "-o", tmp_path / "g"], ["thinning", path]):
+        code, printed, told = pomona(*verb)
+        assert (code, printed, told.count("\n")) == (2, "", 1)
+        assert said in told
+    # The page shows what there is, and says why there is no growth.
+    assert said in season_document(path, Wishes())["no_growth"]
+
+
+@pytest.mark.parametrize("limits_mm", [[70.0, 60.0], [np.nan], [], [0.0, 60.0], [[60.0, 70.0]], "large"])
+def test_limits_that_do_not_rise_are_refused(grown: SeasonGrowth, limits_mm: object) -> None:
+    with pytest.raises(PomonaError, match=r"limits_mm: found .*, expected rising limits in mm"):
+        growth_of(grown.fruits, limits_mm=limits_mm)
+
+
+def test_a_harvest_is_a_day_however_it_is_said(grown: SeasonGrowth) -> None:
+    few = grown.fruits
+    for told in (HARVEST, HARVEST.isoformat(), datetime.combine(HARVEST, datetime.max.time())):
+        found = growth_of(few, harvest=told)
+        assert found.harvest == HARVEST
+        assert found.days[-1] == HARVEST
+    for told in ("soon", 20240925, np.datetime64("2024-09-25")):
+        with pytest.raises(PomonaError, match=r"--harvest: found .*, expected a day as 2024-09-10"):
+            growth_of(few, harvest=told)
+
+
 def test_one_day_is_no_growth(pomona: Pomona, tmp_path: Path) -> None:
     row = grow_row(tmp_path / "once.gpkg", days=(50,))
     code, _, told = pomona("growth", row.path, "-o", tmp_path / "g")
@@ -366,6 +424,24 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
     assert rows == [("east", 30), ("west", 59)]
     over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
     assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
+
+
+def test_fruits_of_no_tree_are_a_block_where_others_have_one(
+    pomona: Pomona, row: GrownRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told_otherwise(cloud: FruitCloud) -> BearingTrees:
+        numbers = np.repeat([0, 1, 2], [30, 55, 5])
+        return BearingTrees(("1", "tree 2", ""), numbers, cloud.positions[:, 0], ("", "", ""))
+
+    monkeypatch.setattr("pomona.growth.measured.bearing_trees", told_otherwise)
+    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g")
+    assert (code, told) == (0, "")
+    lines = {line[:20].strip(): int(line.split()[-3]) for line in printed.splitlines()[-4:]}
+    assert lines == {"all": 90, "tree 1": 30, "tree 2": 55, "no tree": 5}
+    blocks = [(one["block"], one["name"], one["n_fruits"]) for one in rows_of(tmp_path / "g" / "blocks.csv")]
+    assert blocks == [("all", "", "90"), ("tree", "1", "30"), ("tree", "tree 2", "55"), ("tree", "", "5")]
+    titles = [Block(kind, name, np.ones(1, bool)).title for kind, name in (("row", "row 1"), ("row", "1"), ("all", ""))]
+    assert titles == ["row 1", "row 1", "all"]
 
 
 def test_what_is_likelier_no_fruit_counts_in_no_block(grown: SeasonGrowth) -> None:

@@ -96,12 +96,12 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
         lines.append(f"  outliers: {amount(found['n_outliers'], 'fruit')}, see fruits.csv")
     forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
     lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
-    return lines + [_line_of_block(block) for block in found["blocks"]]
+    titles = [block.title for block in grown.blocks]
+    return lines + [_line_of_block(*each) for each in zip(titles, found["blocks"], strict=True)]
 
 
-def _line_of_block(block: dict[str, Any]) -> str:
-    name = " ".join(filter(None, (block["block"], block["name"])))
-    line = f"  {name[:18]:>18} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
+def _line_of_block(title: str, block: dict[str, Any]) -> str:
+    line = f"  {title[:18]:>18} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
     line += f"{block['rate_mm_per_day']:>9.2f}"
     if block["forecast_mm"] is None:
         return line

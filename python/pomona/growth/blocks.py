@@ -25,7 +25,7 @@ class Block:
     ----------
     kind : {"all", "row", "tree"}
     name : str
-        Of the row or the tree.
+        Of the row or the tree; blank for all, and for the fruits of no tree.
     members : (N,) bool
     """
 
@@ -33,16 +33,24 @@ class Block:
     name: str
     members: NDArray[np.bool_]
 
+    @property
+    def title(self) -> str:
+        """What to call it: a name that says what it is, as of row 1, says it once."""
+        if not self.name:
+            return ALL if self.kind == ALL else f"no {self.kind}"
+        return self.name if self.name.lower().startswith(self.kind) else f"{self.kind} {self.name}"
+
 
 def blocks_of(fruits: MeasuredFruits) -> tuple[Block, ...]:
-    """All hanging fruits, then those of each row where the map has several, then those of each tree."""
+    """All hanging fruits, those of each row where the map has several, those of each tree, and then of no tree."""
     hanging, trees = fruits.hanging, fruits.trees
     rows = np.array(fruits.cloud.extras.get("row", ("",) * len(hanging)))
     of_rows = [
         Block("row", name, hanging & (rows == name)) for name in sorted(set(rows.tolist()) - {""}, key=as_counted)
     ]
-    named = [(number, name) for number, name in enumerate(trees.names) if name]
-    of_trees = [Block("tree", name, hanging & (trees.numbers == number)) for number, name in named]
+    # Where no tree is known, the fruits of none are all.
+    known = enumerate(trees.names if any(trees.names) else ())
+    of_trees = [Block("tree", name, hanging & (trees.numbers == number)) for number, name in known]
     return (Block(ALL, "", hanging), *(block for block in (*of_rows, *of_trees) if block.members.any()))
 
 

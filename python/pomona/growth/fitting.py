@@ -13,23 +13,20 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import gammaln
+from scipy.special import gammaincinv, gammaln, ndtri
 
 from pomona.growth.curve_families import CurveFamily
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.size_table import SizeTable
 
-__all__ = ["FittedShape", "fit_shape"]
+__all__ = ["N_NUMBERS", "FittedShape", "fit_shape", "likeliest_shape"]
 
 Numbers = NDArray[np.float64]
-
-_PROPOSED, _LEAST_PROPOSED = 5, 300
-"""Shapes that are proposed for each that is kept, and at least: about one in three proposals counts."""
 
 _TAILS = 5.0
 """Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
 
-_MOST_FRUITS = 300
+_MOST_FRUITS = 1000
 """That a shape is fitted to; eight numbers need no more."""
 
 _GRADIENT = 0.05
@@ -52,6 +49,9 @@ _SPREADS = (
     (2.0, 0.6),  # of a diameter, mm
     (1e-4, 1.0),  # of the block's relative growth a day, against the curve
 )
+
+N_NUMBERS = len(_SPREADS) + 2
+"""Of a shape."""
 
 
 class _Posterior:
@@ -104,25 +104,61 @@ class FittedShape:
     _mode: Numbers
     _root: Numbers
 
-    def draws(self, rng: np.random.Generator, count: int) -> tuple[Shape, ...]:
-        """Draw so many equally likely shapes, by the exact posterior and not by its curvature."""
-        n_proposed = max(_PROPOSED * count, _LEAST_PROPOSED)
-        drawn, log_density = _student(rng, n_proposed, self._root, self._mode)
+    def weighed(self, first: Numbers, even: Numbers) -> tuple[tuple[Shape, ...], Numbers]:
+        """Spread shapes over the posterior, and weigh them by the exact one and not by its curvature.
+
+        They are spread as wide as a first round of others finds the posterior (adaptive importance sampling, Oh and
+        Berger 1992): at the mode the scales of visits are all but right, and the curve seems surer than it is.
+
+        Parameters
+        ----------
+        first, even : (D, 9) float64
+            Points in the unit cube: for the eight numbers, and for how far into the tails.
+
+        Returns
+        -------
+        tuple of D Shape, and (D,) float64
+            The sum of the weights is 1.
+        """
+        tried, weights = self._round(first, self._mode, self._root)
+        middle = weights @ tried
+        away = tried - middle
+        root = np.asarray(np.linalg.cholesky(away.T @ (weights[:, None] * away)), np.float64)
+        drawn, weights = self._round(even, middle, root)
+        return tuple(self._posterior.shape(z) for z in drawn), weights
+
+    def _round(self, even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
+        drawn, log_density = _student(even, middle, root)
         log_weights = np.array([self._posterior(z) for z in drawn]) - log_density
-        chosen = _resampled(rng, count, np.exp(log_weights - log_weights.max()))
-        return tuple(self._posterior.shape(drawn[row]) for row in chosen)
+        weights = np.exp(log_weights - log_weights.max())
+        # One shape in a corner that few reach must not speak for all (truncated importance sampling, Ionides 2008).
+        weights = np.minimum(weights, np.sqrt(len(weights)) * weights.mean())
+        return drawn, weights / weights.sum()
 
 
 def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
     """Fit the shape of one family to a table of at least two visits at different times."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    start = np.zeros(len(_SPREADS) + 2)
-    mode: Numbers = minimize(posterior.cost, start, method="BFGS", jac=posterior.slope_of_cost, tol=_GRADIENT).x
+    mode = _climbed(posterior, None)
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
-    # Where the differences see no bend, the prior's own is there.
-    root = np.asarray(axes / np.sqrt(np.maximum(values, 1.0)))
+    # Where the differences see no bend, the prior's own is there. The triangle is one of a kind; axes have any sign.
+    root = np.linalg.cholesky((axes / np.maximum(values, 1.0)) @ axes.T)
     volume = 0.5 * len(mode) * np.log(2.0 * np.pi) + np.linalg.slogdet(root)[1]
     return FittedShape(family, posterior.shape(mode), posterior(mode) + float(volume), posterior, mode, root)
+
+
+def likeliest_shape(table: SizeTable, family: CurveFamily, start: Numbers | None = None) -> tuple[Shape, Numbers]:
+    """Find the mode alone; also as the start of a next search, (8,)."""
+    posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
+    mode = _climbed(posterior, start)
+    return posterior.shape(mode), mode
+
+
+def _climbed(posterior: _Posterior, start: Numbers | None) -> Numbers:
+    """Climb to the mode, from the middle of the prior or from a start."""
+    start = np.zeros(N_NUMBERS) if start is None else start
+    found = minimize(posterior.cost, start, method="BFGS", jac=posterior.slope_of_cost, tol=_GRADIENT)
+    return np.asarray(found.x)
 
 
 def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
@@ -137,19 +173,12 @@ def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
     return np.asarray(curvature / _STEP**2)
 
 
-def _student(rng: np.random.Generator, count: int, root: Numbers, mode: Numbers) -> tuple[Numbers, Numbers]:
-    """Draw from a multivariate t, and give the logarithms of its density there."""
-    n = len(mode)
-    normal = rng.normal(size=(count, n))
-    stretch = np.sqrt(_TAILS / rng.chisquare(_TAILS, count))
-    drawn = mode + (normal * stretch[:, None]) @ root.T
-    squares = ((normal * stretch[:, None]) ** 2).sum(axis=1)
+def _student(even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
+    """Turn points in the unit cube into ones of a multivariate t, and give the logarithms of its density there."""
+    n = len(middle)
+    stretch = np.sqrt(0.5 * _TAILS / gammaincinv(0.5 * _TAILS, even[:, n]))
+    away = ndtri(even[:, :n]) * stretch[:, None]
     constant = gammaln((_TAILS + n) / 2) - gammaln(_TAILS / 2) - n / 2 * np.log(_TAILS * np.pi)
     constant -= np.linalg.slogdet(root)[1]
-    return drawn, np.asarray(constant - (_TAILS + n) / 2 * np.log1p(squares / _TAILS))
-
-
-def _resampled(rng: np.random.Generator, count: int, weights: Numbers) -> NDArray[np.int64]:
-    """So many rows drawn by weight, systematically: those that are kept."""
-    ends = np.cumsum(weights) / weights.sum()
-    return np.minimum(np.searchsorted(ends, (np.arange(count) + rng.random()) / count), len(weights) - 1)
+    log_density = constant - (_TAILS + n) / 2 * np.log1p((away**2).sum(axis=1) / _TAILS)
+    return middle + away @ root.T, np.asarray(log_density)

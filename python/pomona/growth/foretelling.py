@@ -9,8 +9,11 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.growth.chance import Chance, evenly_spread
+from pomona.growth.fitting import N_NUMBERS
 from pomona.growth.hierarchy import Hierarchy
 from pomona.growth.mixed_quantiles import mixed_quantile
+from pomona.growth.shares import equal_shares
 from pomona.growth.weighing import WeighedCurve
 
 __all__ = ["NINETY", "Foretold", "Summary", "foretell"]
@@ -20,10 +23,11 @@ Numbers = NDArray[np.float64]
 NINETY = (0.05, 0.95)
 """Quantiles of the 90 % intervals."""
 
-_SEED = 22
+_DRAWS, _LEAST_DRAWS, _SHARES = 512, 128, 300
+"""Of a curve that is sure, and of each, by weight; and into how many equal shares all are put together."""
 
-_DRAWS, _LEAST = 300, 3
-"""Of all curves together, and of one that is drawn from at all: one alone has no spread."""
+_LEAST_BELIEF, _LEAST_WEIGHT = 0.01, 1e-6
+"""Of a curve, and of a draw: what is believed less adds nothing but time."""
 
 _FINEST = 1e-9
 """Standard deviation of a logarithm, at least."""
@@ -46,7 +50,7 @@ class Foretold:
     rates_mm_per_day, rate_sigmas_mm_per_day, relative_rates_per_day : (N,) float64
         At the last visit.
     summaries : mapping of str to (D, ...) float64
-        What was asked of all fruits together, for each of D draws.
+        What was asked of all fruits together: means over D equal shares of the probability of each number.
     scales : (S,) float64
         Error of all sizes of each visit, as a factor.
     """
@@ -62,9 +66,16 @@ class Foretold:
 
 
 def foretell(
-    curves: Sequence[WeighedCurve], moments: Sequence[datetime], *, n_visits: int, summaries: Mapping[str, Summary]
+    curves: Sequence[WeighedCurve],
+    moments: Sequence[datetime],
+    *,
+    n_visits: int,
+    rows: NDArray[np.int64],
+    summaries: Mapping[str, Summary],
 ) -> Foretold:
-    """Draw all fruits together again and again, of each curve as often as it is believed; keep means and summaries.
+    """Draw all fruits together again and again, each draw by its weight; keep means and summaries.
+
+    What is told of the visits is the same whatever later moments are asked for.
 
     Parameters
     ----------
@@ -72,22 +83,28 @@ def foretell(
     moments : sequence of Q datetime
         The visits, then later ones.
     n_visits : int
+    rows : (N,) int64
+        Of each fruit that is told of, the row in the tables of the curves.
     summaries : mapping of str to Summary
     """
-    rng = np.random.default_rng(_SEED)
-    counts = _counts([curve.weight for curve in curves])
+    beliefs = np.array([curve.weight for curve in curves])
+    beliefs = np.where(beliefs < _LEAST_BELIEF, 0.0, beliefs)
+    beliefs /= beliefs.sum()
     rates, relative, scales = _Moments(), _Moments(), _Moments()
     told: dict[str, list[Numbers]] = {name: [] for name in summaries}
+    weights: list[float] = []
     logs: list[_Moments] = []
-    for curve, count in zip(curves, counts, strict=True):
-        logs += [_Moments()] if count else []
-        for log_sizes, relative_rates, visits in _draws(curve, count, moments, rng):
+    for curve, belief in zip(curves, beliefs.tolist(), strict=True):
+        logs += [_Moments()] if belief else []
+        for weight, own_logs, own_rates, visits in _draws(curve, belief, moments):
+            log_sizes, relative_rates = own_logs[rows], own_rates[rows]
             sizes_mm = np.exp(log_sizes)
             rates_mm = relative_rates * sizes_mm[:, n_visits - 1]
             for kept, drawn in ((logs[-1], log_sizes), (rates, rates_mm), (relative, relative_rates), (scales, visits)):
-                kept.add(drawn)
+                kept.add(drawn, weight)
             for name, summary in summaries.items():
                 told[name].append(summary(sizes_mm, rates_mm))
+            weights.append(weight)
     low, middle, high = (np.exp(_quantile(level, logs)) for level in (NINETY[0], 0.5, NINETY[1]))
     return Foretold(
         sizes_mm=middle,
@@ -96,61 +113,69 @@ def foretell(
         rates_mm_per_day=rates.mean,
         rate_sigmas_mm_per_day=rates.sigma,
         relative_rates_per_day=relative.mean,
-        summaries={name: np.array(drawn) for name, drawn in told.items()},
+        summaries={name: equal_shares(np.array(drawn), np.array(weights), _SHARES) for name, drawn in told.items()},
         scales=np.exp(scales.mean),
     )
 
 
-def _counts(weights: Sequence[float]) -> list[int]:
-    """Part the draws by weight; a curve of which fewer than `_LEAST` would come is left out."""
-    shares = np.array(weights)
-    shares = np.where(shares * _DRAWS < _LEAST, 0.0, shares)
-    ends = np.round(np.cumsum(shares) / shares.sum() * _DRAWS).astype(int)
-    return [int(count) for count in np.diff(ends, prepend=0)]
-
-
 def _quantile(level: float, logs: Sequence[_Moments]) -> Numbers:
     means, sigmas = [one.mean for one in logs], [np.maximum(one.sigma, _FINEST) for one in logs]
-    return mixed_quantile(level, [one.count / _DRAWS for one in logs], means, sigmas)
+    return mixed_quantile(level, [one.weight for one in logs], means, sigmas)
+
+
+def _count(belief: float) -> int:
+    """Part the draws by belief, in powers of two."""
+    return max(_LEAST_DRAWS, 1 << int(np.ceil(np.log2(max(_DRAWS * belief, 1.0)))))
 
 
 def _draws(
-    curve: WeighedCurve, count: int, moments: Sequence[datetime], rng: np.random.Generator
-) -> Iterator[tuple[Numbers, Numbers, Numbers]]:
-    """Give log sizes (N, Q), relative rates a day (N,) at the last visit and errors of visits (S,), draw by draw."""
+    curve: WeighedCurve, belief: float, moments: Sequence[datetime]
+) -> Iterator[tuple[float, Numbers, Numbers, Numbers]]:
+    """Give weight, log sizes (N, Q), relative rates a day (N,) at the last visit, errors of visits (S,); draw by draw.
+
+    The sum of the weights is the belief in the curve.
+    """
     table, family = curve.table, curve.fitted.family
     times, n_visits = curve.clock.times(moments), len(table.times)
     per_day = curve.clock.per_day(moments[n_visits - 1])
-    for shape in curve.fitted.draws(rng, count) if count else ():
+    with_next_day = np.insert(times, n_visits, table.times[-1] + _A_DAY)
+    chance = Chance(curve.name, _count(belief), N_NUMBERS + 1, n_visits)
+    first = evenly_spread(f"{curve.name}: first", _DRAWS, N_NUMBERS + 1)
+    shapes, weights = curve.fitted.weighed(first, chance.shapes) if belief else ((), np.empty(0))
+    for shape, weight in zip(shapes, belief * weights, strict=True):
+        chance.next_draw()
+        if weight < _LEAST_WEIGHT:
+            continue
         model = Hierarchy(table, family, shape)
-        effects = model.draw(rng)
+        effects = model.draw(chance)
         own = effects.mean + effects.trees[table.trees] + effects.sizes
         # The onset moves the curve itself here, not its tangent.
         later = times - effects.onsets_days[:, None]
         x = shape.rate_per_day * (table.times[-1] - effects.onsets_days - shape.onset_day)
-        strayed = model.draw_stray(effects, np.append(times, table.times[-1] + _A_DAY), rng)
-        strays_by = (strayed[-1] - strayed[n_visits - 1]) / _A_DAY
+        strayed = model.draw_stray(effects, with_next_day, chance)
+        strays_by = (strayed[n_visits] - strayed[n_visits - 1]) / _A_DAY
         yield (
-            own[:, None] + model.log_size(later) + strayed[:-1],
+            float(weight),
+            own[:, None] + model.log_size(later) + np.delete(strayed, n_visits),
             per_day * (shape.rate_per_day * family.slope(x) + strays_by),
             effects.visits - strayed[:n_visits],
         )
 
 
 class _Moments:
-    """Mean and standard deviation of arrays that come one by one (Welford 1962)."""
+    """Mean and standard deviation of weighted arrays that come one by one (West 1979)."""
 
     def __init__(self) -> None:
-        self.count = 0
+        self.weight = 0.0
         self.mean: Numbers = np.zeros(())
         self._squares: Numbers = np.zeros(())
 
-    def add(self, values: Numbers) -> None:
-        self.count += 1
+    def add(self, values: Numbers, weight: float) -> None:
+        self.weight += weight
         away = values - self.mean
-        self.mean = self.mean + away / self.count
-        self._squares = self._squares + away * (values - self.mean)
+        self.mean = self.mean + away * (weight / self.weight)
+        self._squares = self._squares + weight * away * (values - self.mean)
 
     @property
     def sigma(self) -> Numbers:
-        return np.asarray(np.sqrt(self._squares / max(self.count - 1, 1)))
+        return np.asarray(np.sqrt(self._squares / self.weight))

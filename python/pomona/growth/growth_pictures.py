@@ -130,7 +130,7 @@ def draw_variability(growth: SeasonGrowth) -> Figure:
 def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
     drawn = growth.foretold.summaries["blocks"]
     now = len(growth.fruits.days) - 1
-    trees = [row for row, block in enumerate(growth.blocks) if block.kind == "tree"] or [0]
+    trees = [row for row, block in enumerate(growth.blocks) if block.kind == "tree" and block.name] or [0]
     x = np.array([growth.fruits.trees.along_m[growth.blocks[row].members].mean() for row in trees])
     for column, colour in ((now, BLUE), (now + 1, ORANGE))[: 2 if growth.harvest else 1]:
         of_day = drawn[:, trees, column]
@@ -139,8 +139,7 @@ def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
         axes.errorbar(x, mean, errors, fmt="o", color=colour, capsize=3, label=f"{growth.days[column]}")
     if len(trees) <= _MOST_TREE_NAMES:
         for place, row in zip(x, trees, strict=True):
-            name = growth.blocks[row].name
-            text = f"tree {drawn_name(name)}" if name else "all"
+            text = drawn_name(growth.blocks[row].title)
             axes.text(place, 0.02, text, transform=axes.get_xaxis_transform(), ha="center", color=INK)
     axes.margins(y=0.25)
     axes.legend(frameon=False, labelcolor=INK, ncols=2)

@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
+from pomona.growth.chance import Chance
 from pomona.growth.curve_families import CurveFamily
+from pomona.growth.own_numbers import OwnNumbers
 from pomona.growth.size_table import SizeTable
-from pomona.growth.straying import straying
+from pomona.growth.straying import straying, straying_root
 
 __all__ = ["Effects", "Hierarchy", "Shape"]
 
@@ -29,6 +31,9 @@ Numbers = NDArray[np.float64]
 
 _FINEST_MM = 0.01
 """Nothing measures a fruit to less; sizes that agree to the last digit were copied, and say no more than that."""
+
+_LEAST_PRECISION = 1e-9
+"""Of a logarithm that is foretold: of a size that is all but unknown, where rounding leaves less than nothing."""
 
 _SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.2
 """A fruit's usual diameter at the onset, give or take a fifth: of apples and their like, whatever the family."""
@@ -98,11 +103,9 @@ class Hierarchy:
         self._starts = table.tree_starts
         self._curve = self.log_size(table.times)
         self._slopes = -shape.rate_per_day * family.slope(self._x(table.times))
-        seen = table.seen
-        weights = seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
-        self._weights = weights
-        self._residuals = np.where(seen, table.logs - self._curve, 0.0)
-        self._of_fruits()
+        self._residuals = np.where(table.seen, table.logs - self._curve, 0.0)
+        self._whole = table.seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
+        self._own = self._own_numbers(table.trust * self._whole)
         self._of_trees()
         self._of_visits()
 
@@ -114,30 +117,18 @@ class Hierarchy:
     def _x(self, times: Numbers) -> Numbers:
         return np.asarray(self.shape.rate_per_day * (times - self.shape.onset_day))
 
-    def _of_fruits(self) -> None:
-        """Precision (N, 2, 2) of each fruit's size and onset, and what its measurements say of them."""
-        weights, slopes = self._weights, self._slopes
-        spreads = self.shape.fruit_spread, self.shape.onset_spread_days
-        self._p11 = spreads[0] ** -2 + weights.sum(axis=1)
-        self._p12 = weights @ slopes
-        self._p22 = spreads[1] ** -2 + weights @ slopes**2
-        self._determinants = self._p11 * self._p22 - self._p12**2
-        # With P = L L', rows of L^-1 X' W: two vectors over the visits for each fruit.
-        first = weights / np.sqrt(self._p11)[:, None]
-        left = np.sqrt(self._determinants / self._p11)[:, None]
-        second = weights * (slopes - (self._p12 / self._p11)[:, None]) / left
-        self._rows = np.stack([first, second], axis=1)
+    def _own_numbers(self, weights: Numbers) -> OwnNumbers:
+        return OwnNumbers.of(weights, self._slopes, (self.shape.fruit_spread, self.shape.onset_spread_days))
 
     def _of_trees(self) -> None:
         """Sum over the fruits of each tree: precision (T, S, S) and information (T, S) about its visits."""
-        weights, residuals, rows = self._weights, self._residuals, self._rows
-        told = np.einsum("nks,ns->nk", rows, residuals)
-        information = weights * residuals - np.einsum("nks,nk->ns", rows, told)
-        self._fit = float((weights * residuals**2).sum() - (told**2).sum())
-        shared = rows.transpose(0, 2, 1) @ rows
+        own = self._own
+        information, fits = own.said_by(self._residuals)
+        self._fit = float(fits.sum())
+        shared = own.rows.transpose(0, 2, 1) @ own.rows
         self._precision = -np.add.reduceat(shared, self._starts)
         diagonal = np.einsum("tss->ts", self._precision)
-        diagonal += np.add.reduceat(weights, self._starts)
+        diagonal += np.add.reduceat(own.weights, self._starts)
         self._information = np.add.reduceat(information, self._starts)
         self._to_tree = self._precision.sum(axis=2)
         self._tree_precision = self._to_tree.sum(axis=1) + self.shape.tree_spread**-2
@@ -165,10 +156,13 @@ class Hierarchy:
         return float(np.log(_SIZE_AT_ONSET_MM) - onset)
 
     def log_likelihood(self) -> float:
-        """Logarithm of the density of all measurements, everything linear integrated out."""
-        shape, n_fruits = self.shape, len(self._p11)
-        of_noise = -np.log(self._weights[self._weights > 0] / (2.0 * np.pi)).sum() + self._fit
-        of_fruits = np.log(self._determinants).sum()
+        """Logarithm of the density of all measurements, everything linear integrated out.
+
+        A density that is trusted by a share counts to the power of it, so what is not trusted says nothing.
+        """
+        shape, table, n_fruits = self.shape, self.table, len(self.table.logs)
+        of_noise = -(table.trust[table.seen] * np.log(self._whole[table.seen] / (2.0 * np.pi))).sum() + self._fit
+        of_fruits = np.log(self._own.determinants).sum()
         of_fruits += 2.0 * n_fruits * np.log(shape.fruit_spread * shape.onset_spread_days)
         of_trees = np.log(self._tree_precision * shape.tree_spread**2).sum()
         of_trees -= (self._tree_information**2 / self._tree_precision).sum()
@@ -181,51 +175,57 @@ class Hierarchy:
         """Return the expectations of all effects."""
         return self._effects(self._expected, None)
 
-    def draw(self, rng: np.random.Generator) -> Effects:
+    def draw(self, chance: Chance) -> Effects:
         """Draw all effects together, given the measurements."""
-        noise = solve_triangular(self._factor[0], rng.normal(size=len(self._expected)), lower=True, trans=1)
-        return self._effects(self._expected + noise, rng)
+        noise = solve_triangular(self._factor[0], chance.shared("visits"), lower=True, trans=1)
+        return self._effects(self._expected + noise, chance)
 
-    def draw_stray(self, effects: Effects, times: Numbers, rng: np.random.Generator) -> Numbers:
+    def draw_stray(self, effects: Effects, times: Numbers, chance: Chance) -> Numbers:
         """Draw how far growth has strayed by each time, (Q,), given what the visits share; the rest is their error.
 
         Parameters
         ----------
         effects : Effects
         times : (Q,) float64
-            The visits', and later ones.
-        rng : Generator
+            The visits', the day after the last of them, and others, of which no draw of the former depends.
+        chance : Chance
         """
         n = len(self.table.times)
         covariance = self.shape.stray_per_day**2 * straying(times)
+        noise = np.append(chance.shared("straying"), chance.single("later", len(times) - n - 1))
         # Matheron's rule: a draw from the prior, moved by what it misses of the visits.
-        values, axes = np.linalg.eigh(covariance)
-        stray = axes @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(times)))
-        missed = effects.visits - stray[:n] - self.shape.visit_spread * rng.normal(size=n)
+        stray = self.shape.stray_per_day * (straying_root(times) @ noise)
+        missed = effects.visits - stray[:n] - self.shape.visit_spread * chance.shared("errors")
         return np.asarray(stray + covariance[:, :n] @ np.linalg.solve(self._shared, missed))
 
-    def _effects(self, together: Numbers, rng: np.random.Generator | None) -> Effects:
+    def _effects(self, together: Numbers, chance: Chance | None) -> Effects:
         """Go back from the visits to the trees and the fruits; without chance, to their expectations."""
-        n_trees, n_fruits = len(self._starts), len(self._p11)
-        z = np.zeros((n_trees + 2 * n_fruits,)) if rng is None else rng.normal(size=n_trees + 2 * n_fruits)
-        of_trees, first, second = np.split(z, [n_trees, n_trees + n_fruits])
+        own, table = self._own, self.table
         visits, mean = together[:-1], float(together[-1])
-        trees = self._tree_information - self._to_tree @ (visits + mean)
-        trees = trees / self._tree_precision + of_trees / np.sqrt(self._tree_precision)
-        left = self._weights * (self._residuals - visits - mean - trees[self.table.trees][:, None])
-        left[self._weights == 0.0] = 0.0
+        trees = (self._tree_information - self._to_tree @ (visits + mean)) / self._tree_precision
+        if chance is not None:
+            trees = trees + chance.single("trees", len(trees)) / np.sqrt(self._tree_precision)
+        left = own.weights * (self._residuals - visits - mean - trees[table.trees][:, None])
         b1, b2 = left.sum(axis=1), left @ self._slopes
-        onsets = (self._p11 * b2 - self._p12 * b1) / self._determinants + second * np.sqrt(
-            self._p11 / self._determinants
-        )
-        sizes = (b1 - self._p12 * onsets) / self._p11 + first / np.sqrt(self._p11)
+        first, second = self._of_fruits(chance)
+        onsets = (own.p11 * b2 - own.p12 * b1) / own.determinants + second * np.sqrt(own.p11 / own.determinants)
+        sizes = (b1 - own.p12 * onsets) / own.p11 + first / np.sqrt(own.p11)
         return Effects(mean, visits, trees, sizes, onsets)
 
-    def surprise(self) -> Numbers:
-        """Residual of each measurement in its standard deviations, had it not been used for its fruit; (N, S)."""
-        effects = self.expected()
-        fitted = effects.mean + effects.visits + (effects.trees[self.table.trees] + effects.sizes)[:, None]
-        residuals = self._residuals - fitted - effects.onsets_days[:, None] * self._slopes
-        leverage = np.einsum("nks,nks->ns", self._rows, self._rows) / np.maximum(self._weights, 1e-300)
-        scaled = residuals * np.sqrt(self._weights) / np.sqrt(np.maximum(1.0 - leverage, 1e-9))
-        return np.where(self._weights > 0, scaled, np.nan)
+    def _of_fruits(self, chance: Chance | None) -> Numbers:
+        """Two standard normal numbers for each fruit, (2, N), or none of chance."""
+        if chance is None:
+            return np.zeros((2, len(self.table.logs)))
+        return chance.single("fruits", 2 * len(self.table.logs)).reshape(2, -1)[:, self.table.ranks]
+
+    def surprise(self) -> tuple[Numbers, Numbers]:
+        """Return by how many standard deviations each size is off, and these of its logarithm, (N, S); NaN for none.
+
+        Each is foretold by the other sizes of its fruit, all trusted, and by what its visit and its tree are expected
+        to be.
+        """
+        effects, seen, own = self.expected(), self.table.seen, self._own_numbers(self._whole)
+        around = effects.mean + effects.visits + effects.trees[self.table.trees][:, None]
+        said = own.said_by(np.where(seen, self._residuals - around, 0.0))[0]
+        roots = np.sqrt(np.maximum(own.precisions(), _LEAST_PRECISION))
+        return np.where(seen, said / roots, np.nan), np.where(seen, 1.0 / roots, np.nan)

@@ -15,11 +15,16 @@ from pomona.growth.bearing_trees import BearingTrees, bearing_trees
 from pomona.orchard import Observations, OrchardMap
 from pomona.orchard.hanging import may_hang
 
-__all__ = ["MeasuredFruits", "measured_fruits", "require_two_days"]
-
+__all__ = ["SEASON_DAYS", "MeasuredFruits", "measured_fruits", "require_one_season", "require_two_days"]
 
 SIZES_MM = (1.0, 1000.0)
 """No fruit is smaller or larger: what says so is no measurement."""
+
+SEASON_DAYS = 200
+"""From bloom to the last harvest: a later day is one of another season, of which the curves know nothing."""
+
+_YEARS = (1900, 2199)
+"""Of recordings: another year is a slip of the pen or of a clock, and pictures have no calendar for the outermost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +98,9 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         raise PomonaError(f"{path}: found no diameters, expected sessions that measured them")
     trees = bearing_trees(cloud)
     fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    # Visits of one moment by their names: the map has them in the order in which they were added.
+    moments = [datetime.fromisoformat(visit.date) for visit in visits]
+    columns = np.array(sorted(columns.tolist(), key=lambda column: (moments[column], names[column])))
     fruits = fruits[np.argsort(trees.numbers[fruits], kind="stable")]
     return MeasuredFruits(
         path=Path(path),
@@ -100,7 +108,7 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         ids=ids[fruits],
         trees=trees.select(fruits),
         sessions=tuple(names[column] for column in columns),
-        moments=tuple(datetime.fromisoformat(visits[column].date) for column in columns),
+        moments=tuple(moments[column] for column in columns),
         diameters_mm=diameters_mm[np.ix_(fruits, columns)],
         labels=tuple(tuple(labels[fruit, column] for column in columns) for fruit in fruits),
     )
@@ -134,4 +142,22 @@ def require_two_days(fruits: MeasuredFruits) -> None:
     if len(set(fruits.days)) < 2:
         raise PomonaError(
             f"{fruits.path}: found diameters of one day, {fruits.days[0]}, expected two or more: add another visit"
+        )
+
+
+def require_one_season(fruits: MeasuredFruits) -> None:
+    """Refuse visits of several seasons, which no curve joins, and days that are none of recordings.
+
+    Raises
+    ------
+    PomonaError
+    """
+    first, last = fruits.days[0], fruits.days[-1]
+    odd = next((day for day in (first, last) if not _YEARS[0] <= day.year <= _YEARS[1]), None)
+    if odd is not None:
+        raise PomonaError(f"{fruits.path}: found a visit on {odd}, expected a year from {_YEARS[0]} to {_YEARS[1]}")
+    if (last - first).days > SEASON_DAYS:
+        raise PomonaError(
+            f"{fruits.path}: found visits from {first} to {last}, expected those of one season, at most {SEASON_DAYS} "
+            "days apart"
         )

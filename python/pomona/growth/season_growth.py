@@ -1,4 +1,4 @@
-"""The story of growth: sizes out of the map, a curve chosen, what is odd put aside, every fruit told."""
+"""The story of growth: sizes out of the map, each trusted by its share, curves weighed, every fruit told."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from datetime import date, datetime, time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pomona.errors import PomonaError
 from pomona.growth.blocks import Block, block_means, blocks_of
 from pomona.growth.foretelling import Foretold, foretell
-from pomona.growth.measured import MeasuredFruits, measured_fruits, require_two_days
-from pomona.growth.oddities import odd_fruits, odd_measurements
+from pomona.growth.fruit_order import reckoned_order
+from pomona.growth.harvest_day import harvest_after
+from pomona.growth.measured import MeasuredFruits, measured_fruits, require_one_season, require_two_days
+from pomona.growth.oddities import odd_fruits
 from pomona.growth.season_clock import CALENDAR, DegreeDays, SeasonClock, read_temperatures
-from pomona.growth.size_classes import FIVE_MM, class_counts, class_masses
+from pomona.growth.size_classes import FIVE_MM, class_counts, class_masses, rising_limits
 from pomona.growth.size_table import SizeTable
+from pomona.growth.trust import put_aside, trust_in_sizes
 from pomona.growth.weighing import WeighedCurve, weighed_curves
 
 __all__ = ["SeasonGrowth", "grow_season", "growth_of"]
-
-SEASON_DAYS = 200
-"""From bloom to the last harvest: a later day is one of another season, of which these curves know nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +46,7 @@ class SeasonGrowth:
         Of the visits, and then the harvest where it was asked for.
     harvest : date or None
     odd : (N,) bool
-        Fruits with a size that does not belong to them, or that grow like no other.
+        Fruits with a size that likelier does not belong to them, or that grow like no other.
     put_aside : (N, S) bool
         Those sizes.
     """
@@ -83,9 +82,9 @@ class SeasonGrowth:
 def grow_season(
     orchard: str | Path,
     *,
-    harvest: date | None = None,
+    harvest: date | str | None = None,
     temperature: str | Path | None = None,
-    limits_mm: NDArray[np.float64] = FIVE_MM,
+    limits_mm: ArrayLike = FIVE_MM,
 ) -> SeasonGrowth:
     """Tell the growth of every fruit of a map.
 
@@ -93,8 +92,8 @@ def grow_season(
     ----------
     orchard : str or Path
         The map (.gpkg).
-    harvest : date, optional
-        Day to foretell, after the last visit.
+    harvest : date or str, optional
+        Day to foretell, after the last visit; as text 2024-09-10.
     temperature : str or Path, optional
         CSV with ``date,mean_c`` or ``date,min_c,max_c``: degree days are tried beside days.
     limits_mm : (C - 1,) float64
@@ -103,48 +102,45 @@ def grow_season(
     Raises
     ------
     PomonaError
-        When the map has sizes of one day only, the harvest lies before the last visit or in another season, or a file
-        is wrong.
+        When the map has sizes of one day only or of several seasons, the harvest is no day, lies before the last visit
+        or in another season, the limits do not rise, or a file is wrong.
     """
     fruits = measured_fruits(orchard)
     require_two_days(fruits)
+    require_one_season(fruits)
     return growth_of(fruits, harvest=harvest, clocks=_clocks(fruits, temperature), limits_mm=limits_mm)
 
 
 def growth_of(
     fruits: MeasuredFruits,
     *,
-    harvest: date | None = None,
+    harvest: date | str | None = None,
     clocks: Sequence[SeasonClock] = (CALENDAR,),
-    limits_mm: NDArray[np.float64] = FIVE_MM,
+    limits_mm: ArrayLike = FIVE_MM,
 ) -> SeasonGrowth:
     """Tell the growth of fruits whose sizes are at hand; see `grow_season`."""
-    if harvest is not None and harvest < fruits.days[-1]:
-        raise PomonaError(f"--harvest: found {harvest}, expected the last visit's day or later: {fruits.days[-1]}")
-    if harvest is not None and (harvest - fruits.days[-1]).days > SEASON_DAYS:
-        raise PomonaError(
-            f"--harvest: found {harvest}, expected a day of the same season, at most {SEASON_DAYS} days after the last "
-            f"visit: {fruits.days[-1]}"
-        )
-    moments, trees = fruits.moments, fruits.trees.numbers
-    put_aside = odd_measurements(SizeTable.of(fruits.diameters_mm, trees, CALENDAR.times(moments)))
-    kept_mm = np.where(put_aside, np.nan, fruits.diameters_mm)
-    curves = weighed_curves(kept_mm, trees, moments, clocks)
-    odd = put_aside.any(axis=1) | odd_fruits(curves[0].table, curves[0].fitted)
-    wanted = [*moments, *([max(moments[-1], datetime.combine(harvest, time()))] if harvest else [])]
+    day, limits = harvest_after(fruits.days[-1], harvest), rising_limits(limits_mm)
+    order, trees = reckoned_order(fruits)
+    rows, sizes_mm, moments = np.argsort(order), fruits.diameters_mm[order], fruits.moments
+    trust = trust_in_sizes(SizeTable.of(sizes_mm, trees, CALENDAR.times(moments)))
+    curves = weighed_curves(sizes_mm, trees, trust, moments, clocks)
+    aside = put_aside(trust)
+    odd = aside.any(axis=1) | odd_fruits(curves[0].table, curves[0].fitted)
+    wanted = [*moments, *([max(moments[-1], datetime.combine(day, time()))] if day else [])]
     blocks = blocks_of(fruits)
     foretold = foretell(
         curves,
         wanted,
         n_visits=len(moments),
+        rows=rows,
         summaries={
             "blocks": block_means(blocks),
-            "counts": class_counts(limits_mm, fruits.hanging),
-            "masses_kg": class_masses(limits_mm, fruits.hanging),
+            "counts": class_counts(limits, fruits.hanging),
+            "masses_kg": class_masses(limits, fruits.hanging),
         },
     )
     days = tuple(moment.date() for moment in wanted)
-    return SeasonGrowth(fruits, curves, blocks, limits_mm, foretold, days, harvest, odd, put_aside)
+    return SeasonGrowth(fruits, curves, blocks, limits, foretold, days, day, odd[rows], aside[rows])
 
 
 def _clocks(fruits: MeasuredFruits, temperature: str | Path | None) -> tuple[SeasonClock, ...]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pomona.errors import PomonaError
 from pomona.growth.foretelling import Summary
 from pomona.reading import shown
 
-__all__ = ["FIVE_MM", "class_counts", "class_masses", "parsed_classes"]
+__all__ = ["FIVE_MM", "class_counts", "class_masses", "parsed_classes", "rising_limits"]
 
 FIVE_MM = np.arange(40.0, 101.0, 5.0)
 """Limits of the usual classes, mm."""
@@ -26,11 +26,27 @@ def parsed_classes(text: str) -> NDArray[np.float64]:
     PomonaError
     """
     try:
-        limits = np.array([float(part) for part in text.split(",")])
-    except ValueError:
+        return rising_limits([float(part) for part in text.split(",")])
+    except (PomonaError, ValueError):
+        raise PomonaError(
+            f"--classes: found {shown(text)}, expected rising limits in mm, for example 60,65,70,75"
+        ) from None
+
+
+def rising_limits(limits_mm: ArrayLike) -> NDArray[np.float64]:
+    """Take limits of size classes, (C - 1,): one at least, all above 0, each above the one before.
+
+    Raises
+    ------
+    PomonaError
+    """
+    try:
+        limits = np.asarray(limits_mm, dtype=np.float64)
+    except (TypeError, ValueError):
         limits = np.empty(0)
-    if not len(limits) or not np.isfinite(limits).all() or limits[0] <= 0 or (np.diff(limits) <= 0).any():
-        raise PomonaError(f"--classes: found {shown(text)}, expected rising limits in mm, for example 60,65,70,75")
+    is_row = limits.ndim == 1 and limits.size > 0 and bool(np.isfinite(limits).all())
+    if not is_row or limits[0] <= 0 or (np.diff(limits) <= 0).any():
+        raise PomonaError(f"limits_mm: found {shown(limits_mm)}, expected rising limits in mm, above 0")
     return limits
 
 

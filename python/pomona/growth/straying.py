@@ -12,12 +12,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SPELL_DAYS", "straying"]
+__all__ = ["SPELL_DAYS", "straying", "straying_root"]
 
 Numbers = NDArray[np.float64]
 
 SPELL_DAYS = 30.0
 """Over which a spell fades, the length of a dry one."""
+
+_FINEST_DAYS = 1e-4
+"""Straying that is nothing, by which times that say the same are told apart."""
 
 
 def straying(times: Numbers) -> Numbers:
@@ -32,3 +35,8 @@ def straying(times: Numbers) -> Numbers:
     fading = np.exp(-elapsed)
     both = 2.0 * np.minimum(elapsed[:, None], elapsed) + fading[:, None] + fading - 1.0
     return np.asarray(SPELL_DAYS**2 * (both - np.exp(-np.abs(elapsed[:, None] - elapsed))))
+
+
+def straying_root(times: Numbers) -> Numbers:
+    """Return a lower triangle R of which R R' is the covariance, (Q, Q), in days: no row depends on later times."""
+    return np.asarray(np.linalg.cholesky(straying(times) + _FINEST_DAYS**2 * np.eye(len(times))), np.float64)

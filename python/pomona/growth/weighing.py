@@ -58,6 +58,7 @@ class WeighedCurve:
 def weighed_curves(
     diameters_mm: NDArray[np.float64],
     trees: NDArray[np.int64],
+    trust: NDArray[np.float64],
     moments: Sequence[datetime],
     clocks: Sequence[SeasonClock],
 ) -> tuple[WeighedCurve, ...]:
@@ -69,6 +70,8 @@ def weighed_curves(
         NaN where a visit did not measure the fruit; fruits in order of their trees.
     trees : (N,) int64
         Ascending, from 0.
+    trust : (N, S) float64
+        In each size.
     moments : sequence of S datetime
         Ascending, of two days or more.
     clocks : sequence of SeasonClock
@@ -76,7 +79,7 @@ def weighed_curves(
     n_first = _visits_of_two_days(moments)
     tried: list[tuple[FittedShape, SeasonClock, SizeTable, float]] = []
     for clock in clocks:
-        table = SizeTable.of(diameters_mm, trees, clock.times(moments))
+        table = SizeTable.of(diameters_mm, trees, clock.times(moments)).trusted(trust)
         for family in FAMILIES.values():
             fitted = fit_shape(table, family)
             gain = 0.0

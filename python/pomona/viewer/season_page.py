@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pomona import __version__
 from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import bearing_trees
-from pomona.growth.measured import measured_fruits
+from pomona.growth.measured import measured_fruits, require_one_season
 from pomona.growth.season_growth import grow_season
 from pomona.growth.size_classes import FIVE_MM
 from pomona.orchard import OrchardMap
@@ -105,6 +105,7 @@ def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
     """Tell growth and what follows from it; of a map that cannot have any, why."""
     try:
         measured = measured_fruits(path)
+        require_one_season(measured)
     except PomonaError as reason:
         return _no_growth(str(reason))
     if len(set(measured.days)) < 2:

@@ -1,0 +1,62 @@
+r"""The two numbers of each fruit, its size and its onset: how sure they are given its measurements, and what is left.
+
+With the weights $W_i$ of its measurements, their columns $X_i = (1, g)$ and the covariance $D$ of its two numbers,
+their precision is $P_i = D^{-1} + X_i^T W_i X_i$. What the measurements say of everything else, the two integrated out,
+is $M_i = W_i - W_i X_i P_i^{-1} X_i^T W_i$.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["OwnNumbers"]
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class OwnNumbers:
+    """Of N fruits on S visits.
+
+    Attributes
+    ----------
+    weights : (N, S)
+        W, the precisions of the measurements, 0 for none.
+    p11, p12 : (N,)
+        Of P.
+    determinants : (N,)
+        Of P.
+    rows : (N, 2, S)
+        With P = L L', rows of L^-1 X' W.
+    """
+
+    weights: Numbers
+    p11: Numbers
+    p12: Numbers
+    determinants: Numbers
+    rows: Numbers
+
+    @classmethod
+    def of(cls, weights: Numbers, slopes: Numbers, spreads: tuple[float, float]) -> OwnNumbers:
+        """Take (N, S) weights, (S,) slopes g of the curve, and the standard deviations of sizes and of onsets."""
+        p11 = spreads[0] ** -2 + weights.sum(axis=1)
+        p12 = weights @ slopes
+        p22 = spreads[1] ** -2 + weights @ slopes**2
+        determinants = p11 * p22 - p12**2
+        first = weights / np.sqrt(p11)[:, None]
+        left = np.sqrt(determinants / p11)[:, None]
+        second = weights * (slopes - (p12 / p11)[:, None]) / left
+        return cls(weights, p11, p12, determinants, np.stack([first, second], axis=1))
+
+    def said_by(self, residuals: Numbers) -> tuple[Numbers, Numbers]:
+        """Return M r, (N, S), and r' M r, (N,), of residuals r."""
+        told = np.einsum("nks,ns->nk", self.rows, residuals)
+        said = self.weights * residuals - np.einsum("nks,nk->ns", self.rows, told)
+        return said, (self.weights * residuals**2).sum(axis=1) - (told**2).sum(axis=1)
+
+    def precisions(self) -> Numbers:
+        """Return the diagonal of M, (N, S): of each measurement as foretold by the others of its fruit."""
+        return np.asarray(self.weights - np.einsum("nks,nks->ns", self.rows, self.rows))
