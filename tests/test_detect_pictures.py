@@ -211,7 +211,12 @@ def test_no_input_is_destroyed(pomona, tmp_path):
     folder = tmp_path / "pictures"
     shutil.copytree(PICTURES, folder)
     before = (folder / NAMES[0]).read_bytes()
-    assert pomona("detect", folder, "-o", folder / NAMES[0], "--force")[0] == 2
+    code, _, err = pomona("detect", folder, "-o", folder / NAMES[0], "--force")
+    assert (code, "found suffix '.jpg', expected .csv" in err) == (2, True)
+    table = folder / "no_table.csv"
+    shutil.copy(folder / NAMES[0], table)
+    assert pomona("detect", table, "-o", table, "--force")[0] == 2
+    assert table.read_bytes() == before
     code, _, err = pomona("detect", folder, "-o", tmp_path / "b.csv", "--plot", folder, "--force")
     assert code == 2
     assert "expected another place to write" in err

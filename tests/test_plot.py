@@ -212,4 +212,6 @@ def test_refuses_a_name_that_is_no_picture(tmp_path: Path) -> None:
         save_picture(Figure(), tmp_path / "match.txt")
     with pytest.raises(PomonaError, match="path: found None, expected the name of a file"):
         save_picture(Figure(), None)
+    with pytest.raises(PomonaError, match="figure: found None, expected one of matplotlib"):
+        save_picture(None, tmp_path / "none.png")
     assert list(tmp_path.iterdir()) == []

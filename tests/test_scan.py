@@ -324,6 +324,8 @@ def test_a_wrong_output_is_refused_before_the_work(pomona, row, tmp_path):
         assert_refused(pomona("scan", row, "-o", output), output, named)
     output = tmp_path / "session.gpkg"
     assert_refused(pomona("scan", row, "-o", output, "--date", "9 August"), output, "--date", "ISO 8601")
+    zoned = ("--date", "2024-08-09T14:30:00+02:00")
+    assert_refused(pomona("scan", row, "-o", output, *zoned), output, "--date", "local time")
 
 
 def test_info_says_what_is_there(pomona, row):

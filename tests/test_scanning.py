@@ -1,5 +1,6 @@
 """`pomona.scan`: what the verb does, as a function; and instance masks as boxes."""
 
+import datetime
 from pathlib import Path
 
 import cv2
@@ -42,7 +43,7 @@ def draw_masks(folder: Path) -> None:
 
 
 def test_gives_what_the_verb_writes(row: Path, tmp_path: Path) -> None:
-    survey = pomona.scan(row, output=tmp_path / "row.gpkg", name="row 3", date="2024-08-10")
+    survey = pomona.scan(row, output=tmp_path / "row.gpkg", name="row 3", date=datetime.date(2024, 8, 10))
     assert survey.cloud.ids == tuple(FRUITS)
     np.testing.assert_allclose(survey.cloud.positions, [fruit.centre for fruit in FRUITS.values()], atol=0.001)
     session = read_session(tmp_path / "row.gpkg")
@@ -91,6 +92,8 @@ def test_takes_a_detector_of_ones_own(row: Path, tmp_path: Path) -> None:
     with pytest.raises(PomonaError, match="keep: found a detector of your own"):
         pomona.scan(row, detections=nameless, keep=tmp_path / "kept")
     assert not (tmp_path / "kept").exists()
+    with pytest.raises(PomonaError, match="date: found the date 5, expected ISO 8601"):
+        pomona.scan(row, date=5)  # type: ignore[arg-type]
 
 
 def test_shows_itself_and_is_matched(row: Path) -> None:

@@ -19,13 +19,14 @@ from pomona.orchard.session import GUESSED
 from pomona.outputs import Output, refuse_inputs, require_outputs
 from pomona.recording import Recording, open_recording, selected
 from pomona.recording.checks.swapped import check_sides
+from pomona.store.values import iso_date
 from pomona.streams import is_stream
 from pomona.survey import Kept, Progress, Survey, write_survey
 from pomona.survey import scan as survey_of
 from pomona.survey.files import identity
 from pomona.survey.part_files import parts_there
 
-__all__ = ["SUFFIXES", "Scan", "guessed_date", "prepared", "require_date", "require_session_name", "scan"]
+__all__ = ["SUFFIXES", "Scan", "guessed_date", "prepared", "require_session_name", "scan"]
 
 SUFFIXES = (".gpkg", ".csv", ".ply")
 """Of what a scan writes."""
@@ -103,7 +104,7 @@ def scan(
     model: str | Path | None = None,
     output: str | Path | None = None,
     name: str | None = None,
-    date: str | None = None,
+    date: str | datetime.date | None = None,
     depth: str = "auto",
     odometry: bool = False,
     slam: bool = False,
@@ -132,8 +133,10 @@ def scan(
         ONNX detector that finds the boxes.
     output : str or Path, optional
         Write the session here (.gpkg), or its fruits alone (.csv, .ply).
-    name, date : str, optional
+    name : str, optional
         Of the session; else the recording's.
+    date : str or datetime.date, optional
+        Of the session: local date, or date and time, as text in ISO 8601; else the recording's.
     depth : str
         ``auto``, ``stereo``, ``dense`` or the file of a stereo network.
     odometry, slam, retrack : bool
@@ -166,7 +169,7 @@ def scan(
     if target is not None:
         require_session_name(target)
         require_outputs([Output(path, SCANNED) for path in (target, *parts_there(target))], [])
-    require_date(date)
+    day = None if date is None else iso_date(date, "date")
     ready = prepared(
         open_recording(recording, own_poses=not (odometry or slam)) if isinstance(recording, str | Path) else recording,
         detections=_boxes_given(detections),
@@ -186,7 +189,7 @@ def scan(
     )
     survey = ready.run(progress, stop)
     if target is not None:
-        ready.write(target, survey, name=name, date=date)
+        ready.write(target, survey, name=name, date=day)
     return survey
 
 
@@ -242,15 +245,6 @@ def require_session_name(output: Path) -> None:
     nameless = not output.suffix and is_stream(output)
     if not nameless and output.suffix.lower() not in SUFFIXES:
         raise PomonaError(f"{output}: found suffix {output.suffix!r}, expected {', '.join(SUFFIXES)}")
-
-
-def require_date(date: str | None) -> None:
-    """Refuse what is no date before the work."""
-    try:
-        if date is not None:
-            datetime.datetime.fromisoformat(date)
-    except ValueError:
-        raise PomonaError(f"--date: found {date!r}, expected ISO 8601, for example 2024-08-09") from None
 
 
 def _made_from(recording: Recording, boxes: FoundBoxes) -> dict[str, Any]:

@@ -62,7 +62,9 @@ export function treeSummaries({ season, target }: Page): TreeSummary[] {
   const blocks = season.growth?.blocks ?? [];
   return season.trees.map(({ name, label }, tree) => {
     const { clusters, ...count } = counts[tree];
-    const block = blocks.find((one) => (name ? one.kind === "tree" && one.name === name : one.kind === "all")) ?? null;
+    // Where no tree is known, the fruits of none are all.
+    const kind = season.trees.length > 1 || name ? "tree" : "all";
+    const block = blocks.find((one) => one.kind === kind && one.name === name) ?? null;
     return { tree, label, ...count, clustersToThin: clusters.size, block };
   });
 }

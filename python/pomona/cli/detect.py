@@ -47,8 +47,10 @@ def detect(
     from pomona.detect.picture_boxes import table_of
     from pomona.detect.picture_file import pictures_in
     from pomona.detect.shipped import model_named
+    from pomona.file_names import require_suffix
     from pomona.outputs import refuse_inputs
 
+    require_suffix(output, (".csv",))
     named = pictures_in(pictures)
     outputs = [output, *([plot] if plot else [])]
     refuse_inputs(outputs, [*named.values(), model_named(model)])

@@ -96,11 +96,12 @@ def scan(
     from pomona.cli.progress import first_interrupt
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
-    from pomona.scanning import prepared, require_date, require_session_name
+    from pomona.scanning import prepared, require_session_name
     from pomona.settings import Settings
+    from pomona.store.values import iso_date
 
     require_session_name(output)
-    require_date(date)
+    day = None if date is None else iso_date(date, "--date")
     overrides = Settings.load(config, {}).overrides
     chosen = None if topics is None else parsed_topics(topics)
     # What is overridden is not read.
@@ -138,7 +139,7 @@ def scan(
         survey = ready.run(progress, stop)
     if _is_left(output, survey):
         raise typer.Exit(INTERRUPTED)
-    written = ready.write(output, survey, name=name, date=date)
+    written = ready.write(output, survey, name=name, date=day)
     _write_extras(keep, preview, opened, survey)
     found = scan_output.summary(opened, survey, written)
     if json:

@@ -49,14 +49,14 @@ def triangulate(
     from pomona.free_scale.triangulate import triangulate as written
     from pomona.outputs import refuse_inputs
     from pomona.reconstruction import open_reconstruction
-    from pomona.scanning import require_date
     from pomona.settings import Settings
+    from pomona.store.values import iso_date
     from pomona.triangulation.model_recording import ModelRecording
     from pomona.triangulation.seen_fruits import open_boxes
 
     if output.suffix.lower() != ".gpkg":
         raise PomonaError(f"{output}: found suffix {output.suffix!r}, expected .gpkg")
-    require_date(date)
+    day = None if date is None else iso_date(date, "--date")
     overrides = Settings.load(config, {}).overrides
     recording = ModelRecording.open(open_reconstruction(reconstruction), pictures)
     boxes = open_boxes(recording, detections, model, min_score=min_score)
@@ -65,7 +65,7 @@ def triangulate(
     upgrade = None if orchard is None else metric(seen.cloud, orchard, config=overrides, threads=threads)
     is_lost = upgrade is not None and not upgrade
     if not is_lost:
-        written(output, seen.cloud, recording, boxes, upgrade=upgrade, name=name, date=date)
+        written(output, seen.cloud, recording, boxes, upgrade=upgrade, name=name, date=day)
     found = {"n_fruits": len(seen.cloud)} if upgrade is None else upgrade.numbers
     if json:
         say_json({"output": None if is_lost else str(output), **found})

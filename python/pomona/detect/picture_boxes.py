@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.csv_rows import write_rows
 from pomona.detect.detections import Detections
 from pomona.errors import PomonaError
 from pomona.reading import number_in, read_text, shown
@@ -40,15 +41,11 @@ class NamedBox:
 
 def table_of(found: Iterable[tuple[str, Detections]]) -> str:
     """Write boxes of named pictures as a table."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    # Python's csv takes a carriage return for the end of a line, but quotes it by itself only from 3.13 on.
-    quoted = csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL)
-    writer.writerow(COLUMNS)
+    text = io.StringIO(newline="")
+    write_rows(text, [COLUMNS])
     for name, detections in found:
-        write = (quoted if "\r" in name else writer).writerow
-        for corners, score in zip(detections.boxes_px, detections.scores, strict=True):
-            write((name, *(f"{corner:.2f}" for corner in corners), f"{score:.4f}"))
+        boxes = zip(detections.boxes_px, detections.scores, strict=True)
+        write_rows(text, ((name, *(f"{px:.2f}" for px in corners_px), f"{score:.4f}") for corners_px, score in boxes))
     return text.getvalue()
 
 

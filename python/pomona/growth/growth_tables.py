@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
+from pomona.csv_rows import write_rows
 from pomona.growth.foretelling import NINETY
 from pomona.growth.season_growth import SeasonGrowth
 
@@ -74,9 +75,7 @@ def write_tables(folder: Path, growth: SeasonGrowth, *, pack_kg: float) -> tuple
 def write_table(path: Path, columns: Sequence[str], lines: Iterable[Line]) -> None:
     """Write a CSV; numbers with four decimals at most, None and NaN as nothing."""
     with whole_file(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([_cell(value) for value in line] for line in lines)
+        write_rows(file, itertools.chain([columns], ([_cell(value) for value in line] for line in lines)))
 
 
 def _cell(value: object) -> object:

@@ -10,13 +10,14 @@ from pomona.amounts import amount
 from pomona.arrays import checked_array
 from pomona.cloud import as_cloud
 from pomona.errors import PomonaError
+from pomona.matching import Match
+from pomona.reading import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from pomona.cloud import Cloud, FruitCloud
-    from pomona.matching import Match
 
 __all__ = ["PlotView", "draw_match"]
 
@@ -51,6 +52,8 @@ def draw_match(
 
     if view not in get_args(PlotView):
         raise PomonaError(f"view: found {view!r}, expected one of {', '.join(get_args(PlotView))}")
+    if not isinstance(match, Match):
+        raise PomonaError(f"match: found {shown(match)}, expected what pomona.match gives")
     draw = draw_lines if view == "lines" else draw_row
     # Nothing is said of the unit of a file that was matched already.
     in_query, in_map = as_cloud(query, "free"), as_cloud(map, "free")

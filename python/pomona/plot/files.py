@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pomona.atomic import whole_file
 from pomona.errors import PomonaError
 from pomona.file_names import given_path
+from pomona.reading import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,8 +37,10 @@ def save_picture(figure: Figure, path: str | Path) -> None:
     Raises
     ------
     PomonaError
-        The suffix is none of `PICTURE_SUFFIXES`, or the file cannot be written.
+        The suffix is none of `PICTURE_SUFFIXES`, the file cannot be written, or there is no figure.
     """
+    if not hasattr(figure, "savefig"):
+        raise PomonaError(f"figure: found {shown(figure)}, expected one of matplotlib, as draw_match gives it")
     path = given_path(path)
     require_picture_name(path)
     with whole_file(path) as partial:

@@ -23,16 +23,16 @@ def is_scale_free(configuration: object) -> bool:
     return isinstance(scan, Mapping) and scan.get("scale") == FREE
 
 
-def iso_date(day: str | date) -> str:
-    """Return a local date, or date and time, as files hold it; refuse anything else with a `PomonaError`."""
+def iso_date(day: str | date, source: str = "session") -> str:
+    """Return a local date, or date and time, as files hold it; refuse anything else of a source."""
     text = day.isoformat() if isinstance(day, date) else day
     try:
         moment = datetime.fromisoformat(text)
     except (TypeError, ValueError):
         raise PomonaError(
-            f"session: found the date {text!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
+            f"{source}: found the date {text!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
         ) from None
     if moment.tzinfo is not None:
         # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
-        raise PomonaError(f"session: found the date {text!r} with a time zone, expected the orchard's local time")
+        raise PomonaError(f"{source}: found the date {text!r} with a time zone, expected the orchard's local time")
     return moment.date().isoformat() if len(text) <= len("2021-09-27") else moment.isoformat()

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pomona.atomic import whole_file
 from pomona.cloud import FruitCloud
+from pomona.csv_rows import write_rows
 from pomona.export import export_cloud
 from pomona.orchard import write_session
 from pomona.recording import Recording
@@ -105,9 +106,7 @@ def _write_poses(path: Path, part: Part) -> None:
 
 def _write_tracks(path: Path, part: Part) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("frame", "xmin", "ymin", "xmax", "ymax", "score", "id"))
-        writer.writerows(_tracks(part))
+        write_rows(file, itertools.chain([("frame", "xmin", "ymin", "xmax", "ymax", "score", "id")], _tracks(part)))
 
 
 STAGES: Mapping[str, Callable[[Path, Part], None]] = {"poses_tum.txt": _write_poses, "tracks.csv": _write_tracks}
