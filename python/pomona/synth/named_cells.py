@@ -245,9 +245,19 @@ PLANTINGS = {
         fruits_per_tree=(30, 50),
         height_m=2.8,
     ),
+    "singles": RowShape(
+        wood="arms",
+        wires_m=(0.6, 1.05, 1.5, 1.95, 2.4),
+        reach_along_m=0.6,
+        scatter_m=(0.015, 0.025),
+        cluster_sizes=(1.0,),
+        least_gap_m=0.09,
+        fruits_per_tree=(24, 30),
+        height_m=2.6,
+    ),
 }
 """How trees are trained: walls of wires, upright or as a V, both also as thin as the noise, a cordon with bunches
-below, roofs, thin trees, some with branches in tiers, and hedges."""
+below, roofs, thin trees, some with branches in tiers, hedges, and a thin wall thinned by hand to single fruits."""
 
 PLANTING_CELLS = tuple(
     cell

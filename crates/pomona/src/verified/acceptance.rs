@@ -71,20 +71,20 @@ pub(crate) fn reached(rate: f64, poses: f64, share: f64) -> f64 {
     offset + per_pose * poses.max(1.0).ln() + stretch * (share.ln() - rate.ln())
 }
 
-/// Share of the evidence needed that a pose must have both as it grew and once it is settled, every fruit predicted
-/// without its own partner.
+/// Shares of the evidence needed that a pose must have: once it is settled, every fruit predicted without its own partner, and in
+/// pairs that are believed.
 pub(super) struct Kept {
     /// Where the threshold is what chance reaches anywhere.
-    pub(super) threshold: f64,
+    pub(super) threshold: [f64; 2],
     /// Where a pose stands out of all others: what true poses keep. Poses on wires that have far more than all others
     /// keep 0.5 to 0.75.
-    pub(super) outlier: f64,
+    pub(super) outlier: [f64; 2],
     /// The same of rows laid along rows, whose fruits in common are few: true poses keep 0.5 to 0.9. Wrong ones on wires may keep
     /// as much; what these lack is the share of the row.
-    pub(super) laid: f64,
+    pub(super) laid: [f64; 2],
 }
 
-pub(super) const KEPT: Kept = Kept { threshold: 0.8, outlier: 0.9, laid: 0.6 };
+pub(super) const KEPT: Kept = Kept { threshold: [0.8, 0.9], outlier: [0.9; 2], laid: [0.6; 2] };
 
 /// Rate of the log-odds from which on a wrong pose shows a pattern of the planting: chance alone gives as much to one query
 /// in twenty.

@@ -131,7 +131,7 @@ pub(super) struct Log {
 impl Findings<'_> {
     /// Nothing yet, where `effort` was spent and so much evidence is asked for.
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
-        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.threshold * threshold);
+        let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.threshold[0] * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
         Self { accepted: Vec::new(), others: Vec::new(), log }
     }
@@ -190,15 +190,17 @@ impl<'a> Search<'a> {
     ///
     /// Where fruits hang on wires or in cones, a wrong pose lays rows of fruits along rows of fruits, and many lie somewhat
     /// nearer than strangers do. That adds up, but once each is asked who is who, most pairs are likelier wrong than right.
-    pub(super) fn holds(&self, finding: &mut Finding, kept: f64, log: &mut Log) -> bool {
-        let (grown, least) = (finding.overlap.log_odds, kept * log.threshold);
+    pub(super) fn holds(&self, finding: &mut Finding, kept: [f64; 2], log: &mut Log) -> bool {
+        let grown = finding.overlap.log_odds;
+        let [least, believed] = kept.map(|share| share * log.threshold);
         if grown <= least {
             return false;
         }
         let settled = self.settle(finding);
         log.settled = log.settled.max(settled);
         log.settled_threshold = least;
-        settled > least && grown.max(settled) > log.threshold && grown * self.believed(finding) > least
+        let most = grown.max(settled);
+        settled > least && most > log.threshold && most * self.believed(finding) > believed
     }
 
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where they are fewer than a seed and one

@@ -1,7 +1,7 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
 use super::acceptance::PATTERN;
-use super::case::{Finding, Findings, Search};
+use super::case::{Finding, Findings, Log, Search};
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
@@ -11,13 +11,19 @@ impl Search<'_> {
     /// The answer to what was found.
     pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
         let mut stages = self.stages(&findings);
-        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best, &findings.log)) {
-            stages.push(("mirrored", 1.0));
+        if let Some(doubt) = findings.accepted.first().and_then(|best| self.doubt_of(best, &findings.log)) {
+            stages.push((doubt, 1.0));
             findings.accepted.clear();
         }
-        let answer = self.answer(findings, stages);
-        // Where no pair is probable enough to be reported, there is nothing to answer with.
-        if answer.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, answer.stages) } else { answer }
+        self.answer(findings, stages)
+    }
+
+    /// What rules the best finding out, by the name of its stage.
+    fn doubt_of(&self, best: &Finding, log: &Log) -> Option<&'static str> {
+        if best.fits_moved(log) {
+            return Some("moved");
+        }
+        self.fits_better_mirrored(best, log).then_some("mirrored")
     }
 
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.

@@ -44,8 +44,9 @@ const REACHED_LAID: f64 = 17.0;
 /// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
 const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 
-/// Rows found with less than this many times the evidence needed are laid along rows too: of few fruits in common seeds show a part.
-const CLEAR: f64 = 2.0;
+/// Rows found with less than this many times the evidence needed are laid along rows too, for of few fruits in common seeds show a
+/// part; and may be no more than what the planting gives to wrong poses.
+pub(super) const CLEAR: f64 = 2.0;
 
 /// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
 pub(super) const SURE: f64 = 6.0;

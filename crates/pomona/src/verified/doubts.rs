@@ -145,6 +145,6 @@ impl<'a> Search<'a> {
     }
 }
 
-fn is_most(share: f64) -> bool {
+pub(super) fn is_most(share: f64) -> bool {
     share > 0.5
 }

@@ -12,8 +12,11 @@ use nalgebra::{Matrix3, Vector3};
 /// Noise under which fruits meet, in spacings: 2 to 4 cm in an orchard.
 const NOISE: f64 = 0.1;
 
-/// How far the cloud is moved, in spacings: beyond a cluster, and not beyond the neighbours that are listed.
-const MOVED: [f64; 2] = [0.6, 1.6];
+/// A cluster is narrower than this, in spacings: a cloud that is moved so far along itself meets other fruits.
+pub(super) const BEYOND_A_CLUSTER: f64 = 0.6;
+
+/// How far the cloud is moved, in spacings: not beyond the neighbours that are listed.
+const MOVED: [f64; 2] = [BEYOND_A_CLUSTER, 1.6];
 
 /// Standard deviations of a count that are taken off: of three axes the one that shows most counts, and a dozen fruits show a layer
 /// where there is none.

@@ -39,6 +39,7 @@ mod growth;
 mod hypothesis;
 mod landscape;
 mod layers;
+mod moved;
 mod offsets;
 mod outlier;
 mod overlap;

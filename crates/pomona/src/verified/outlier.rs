@@ -17,12 +17,12 @@ const COMPARED: usize = 3;
 
 impl<'a> Search<'a> {
     /// Takes the best pose out of those that were not accepted, where it stands out of the others, has the `least` evidence and
-    /// keeps the share `kept` of what is asked for.
+    /// keeps the shares `kept` of what is asked for.
     pub(super) fn single_out(
         &self,
         others: &mut Vec<Finding<'a>>,
         least: f64,
-        kept: f64,
+        kept: [f64; 2],
         log: &mut Log,
     ) -> Option<Finding<'a>> {
         best_first(others);

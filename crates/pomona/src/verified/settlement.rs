@@ -43,6 +43,8 @@ pub(crate) struct Settled {
     pub(crate) beliefs: Beliefs,
     /// What speaks for the pose when every fruit is predicted without its own partner, nats ([`super::evidence`]).
     pub(crate) evidence: f64,
+    /// Which way the noise points.
+    pub(super) direction: Direction,
 }
 
 struct Settlement<'a> {
@@ -60,15 +62,15 @@ struct Settlement<'a> {
 /// constellations find the row, that is asked only if pairs lie off more in depth than else.
 pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>) -> Settled {
     let laid = growth.patches.model.row;
-    let (sphere, seen) = settle_under(growth, noise_m, Direction::default());
-    let long = |axes| settle_under(growth, noise_m, Direction::long_in_depth(&axes)).0;
+    let sphere = settle_under(growth, noise_m, Direction::default());
+    let long = |axes| settle_under(growth, noise_m, Direction::long_in_depth(&axes));
     let least = sphere.evidence + if laid.is_some() { 0.0 } else { SELDOM };
-    let row = laid.or_else(|| row_axes(growth.patches.map).filter(|axes| seen.in_depth(axes) > TOLD));
+    let row = laid.or_else(|| row_axes(growth.patches.map).filter(|axes| sphere.direction.in_depth(axes) > TOLD));
     row.map(long).filter(|long| long.evidence > least).unwrap_or(sphere)
 }
 
-/// Settles under noise of an expected direction; returns what pairs show of it too.
-fn settle_under(growth: &Growth, noise_m: Option<f64>, direction: Direction) -> (Settled, Direction) {
+/// Settles under noise of an expected direction.
+fn settle_under(growth: &Growth, noise_m: Option<f64>, direction: Direction) -> Settled {
     let expected = match noise_m {
         Some(sigma) => KnownNoise { sigma, width: GIVEN },
         None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
@@ -86,7 +88,7 @@ fn settle_under(growth: &Growth, noise_m: Option<f64>, direction: Direction) -> 
     }
     let evidence = evidence(&settlement.patches);
     let Patchwork { pose, sigma, predictions, direction, .. } = settlement.patches;
-    (Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence }, direction)
+    Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence, direction }
 }
 
 impl Settlement<'_> {
@@ -193,7 +195,7 @@ mod tests {
         let mut growth = grow(&query, &map, &seed, &model);
         growth.reach_all();
         let [sphere, long] = [Direction::default(), Direction::long_in_depth(&axes)]
-            .map(|direction| settle_under(&growth, None, direction).0.evidence);
+            .map(|direction| settle_under(&growth, None, direction).evidence);
         let Settled { evidence, overlap, .. } = settle(&growth, None);
         [long - sphere, evidence - sphere, overlap.sigma]
     }
