@@ -231,6 +231,22 @@ def test_drawn_and_given_trees_are_taken_as_they_are(tmp_path: Path) -> None:
     assert problems(path) == []
 
 
+@pytest.mark.parametrize("n_trees", [2, 5])
+def test_a_map_that_knows_no_trees_has_those_that_would_be_found(tmp_path: Path, n_trees: int) -> None:
+    """The way of the cameras says where the row goes: of two trees nothing is told without."""
+    places, _ = grown_row("spindle", n_trees, 1.2, 1)
+    path = tmp_path / "orchard.gpkg"
+    add_session(path, visit(places, "2024-08-01"))
+    fruits = OrchardMap(path).fruits()
+    told = bearing_trees(fruits)
+    moved = bearing_trees(fruits.transformed(np.block([[TURN, np.ones((3, 1))], [np.zeros(3), 1.0]])))
+    (row,) = find_trees(path)
+    assert len(row.trees) == n_trees
+    wanted = sorted(n_fruits for _, _, n_fruits in row.trees)
+    for trees in (told, moved):
+        assert sorted(np.bincount(trees.numbers[np.array(trees.of_fruits()) != ""])) == wanted
+
+
 def test_walls_are_parted_into_segments(tmp_path: Path) -> None:
     places, _ = grown_row("wall", 5, 1.2, 1)
     path = tmp_path / "orchard.gpkg"

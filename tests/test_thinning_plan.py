@@ -14,6 +14,8 @@ from growth_maker import GrownRow, grow_row
 from pomona import geopackage
 from pomona.growth.clusters import clusters_of
 from pomona.growth.fruit_drop import drop_of
+from pomona.viewer.season_page import Wishes, season_document
+from test_page_document import unpacked
 
 Pomona = Callable[..., tuple[int, str, str]]
 
@@ -82,10 +84,49 @@ def test_fruits_of_no_tree_are_not_called_all(pomona: Pomona, row: GrownRow, tmp
     assert pomona("map", "trees", path, "--trees", tmp_path / "trees.csv")[0] == 0
     with closing(geopackage.connect(path)) as connection, connection:
         connection.execute("UPDATE fruits SET tree_id = NULL WHERE id <= 4")
-    code, printed, _ = pomona("thinning", path, "--target", 20)
+    code, printed, _ = pomona("thinning", path, "--target", 2)
     assert code == 0
     counts = {line[:14].strip(): int(line[14:22]) for line in printed.splitlines() if line[14:22].strip().isdigit()}
     assert counts == {"A": 26, "B": 30, "no tree": 4}
+    # They are no third tree that keeps two.
+    assert "4 fruits of no tree: none of them is thinned" in printed
+    *trees, of_none = json.loads(pomona("thinning", path, "--target", 2, "--json")[1])["trees"]
+    assert [tree["n_staying"] - tree["n_to_thin"] for tree in trees] == [2, 2]
+    assert (of_none["tree"], of_none["n_fruits"], of_none["n_to_thin"]) == (None, 4, 0)
+    told = season_document(path, Wishes(target=2))
+    places = unpacked(told["thinning"]["place"])
+    assert (places > 2).sum() == sum(tree["n_to_thin"] for tree in trees)
+
+
+def test_trees_are_those_that_map_trees_finds(pomona: Pomona, tmp_path: Path) -> None:
+    """Also where much in the map is likelier no fruit: that hid the trees."""
+    assert pomona("demo", "-o", tmp_path / "row")[0] == 0
+    path = tmp_path / "row" / "orchard.gpkg"
+
+    def counts() -> list[tuple[int, int]]:
+        code, printed, told = pomona("thinning", path, "--target", 80, "--json")
+        assert (code, told) == (0, "")
+        return [(tree["n_fruits"], tree["n_to_thin"]) for tree in json.loads(printed)["trees"]]
+
+    before = counts()
+    places = unpacked(season_document(path, Wishes(target=80))["thinning"]["place"])
+    assert pomona("map", "trees", path)[0] == 0
+    assert before == counts()
+    assert len(before) == 5
+    assert (places > 80).sum() == sum(n_to_thin for _, n_to_thin in before)
+
+
+def test_a_target_for_each_tree_needs_trees(pomona: Pomona, tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", days=(35, 42), n_trees=1, noise_mm=0.5).path
+    code, printed, _ = pomona("thinning", path)
+    assert code == 0
+    assert printed.splitlines()[-1].split()[:2] == ["all", "30"]
+    for verb in (("thinning", path), ("report", path, "-o", tmp_path / "report.html")):
+        code, printed, told = pomona(*verb, "--target", 20)
+        assert (code, printed) == (2, "")
+        assert told.count("\n") == 1
+        assert "found no trees, expected those that shall keep 20 each" in told
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_of_apples_near_the_harvest_none_is_foretold_to_drop(pomona: Pomona, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import THINNING
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
 def thinning(
     orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg), with visits on two days or more."),
-    target: int | None = typer.Option(None, min=0, metavar="FRUITS", help="That each tree shall keep."),
+    target: int | None = typer.Option(
+        None, min=0, metavar="FRUITS", help="That each tree shall keep; fruits of no tree are not thinned."
+    ),
     output: Annotated[Path | None, Writes(THINNING)] = typer.Option(
         None, "-o", "--output", help="CSV with a line for each hanging fruit: cluster, rate, probability, what to do."
     ),
@@ -29,7 +32,8 @@ def thinning(
     """Tell which fruits will drop by the growth-rate rule, and which to thin to come to a target load.
 
     Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop. What a
-    tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first.
+    tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first. Trees are those of
+    the map, and where it has none those that `pomona map trees` would find; without any a target is refused.
     """
     from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM
     from pomona.growth.season_growth import grow_season
@@ -51,6 +55,8 @@ def thinning(
     for tree in trees:
         counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"
         say(f"  {(tree['tree'] or _of_none(trees))[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
+    if target is not None and not trees[-1]["tree"]:
+        say(f"  {amount(trees[-1]['n_fruits'], 'fruit')} of no tree: none of them is thinned")
 
 
 def _of_none(trees: list[dict[str, Any]]) -> str:
@@ -65,6 +71,8 @@ def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:
     found = []
     for number, name in enumerate(grown.fruits.trees.names):
         of_tree = numbers == number
+        if not name and number and not of_tree.any():
+            continue
         thin = of_tree & (actions == "thin")
         n_fruits, n_dropping = int(of_tree.sum()), int((of_tree & (actions == "drops")).sum())
         found.append(

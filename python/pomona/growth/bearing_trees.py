@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
+from pomona.orchard import FruitsInMap
+from pomona.orchard.hanging import tell_trees
 from pomona.plot.projections import side_and_plan
 from pomona.tree_rows.names import tree_names
 
@@ -51,12 +53,13 @@ class BearingTrees:
 def bearing_trees(cloud: FruitCloud) -> BearingTrees:
     """Tell the trees of a map's fruits.
 
-    Named by the column ``tree`` where the map has one, a blank cell for the fruits of no tree; else those that the
-    fruits themselves tell, see `pomona.tree_rows`.
+    Named by the column ``tree`` where the map has one, a blank cell for the fruits of no tree; else those that
+    `pomona map trees` would find: told by the fruits themselves, see `pomona.tree_rows`, but for what is likelier no
+    fruit, which then hangs on no tree.
     """
     axis = side_and_plan(cloud.positions)[0].axes[0]
     along_m = cloud.positions @ axis
-    of_fruits = np.array(cloud.extras.get("tree") or tree_names(cloud.positions), dtype=object)
+    of_fruits = np.array(cloud.extras.get("tree") or _found(cloud), dtype=object)
     row_of = dict(zip(of_fruits.tolist(), cloud.extras.get("row", ("",) * len(cloud)), strict=True)) | {"": ""}
     middles = {name: along_m[of_fruits == name].mean() for name in set(of_fruits.tolist()) - {""}}
     names = sorted(middles, key=lambda name: (as_counted(row_of[name]), middles[name]))
@@ -64,6 +67,17 @@ def bearing_trees(cloud: FruitCloud) -> BearingTrees:
     number_of = {name: number for number, name in enumerate(names)}
     numbers = np.array([number_of[name] for name in of_fruits], np.int64)
     return BearingTrees(tuple(names), numbers, along_m, tuple(row_of[name] for name in names))
+
+
+def _found(cloud: FruitCloud) -> list[str]:
+    """Return the name of the tree of each fruit, (N,), as the fruits tell it."""
+    unsaid = ("",) * len(cloud)
+    states, chances = (cloud.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
+    telling = np.flatnonzero(tell_trees(states, [float(chance) if chance else None for chance in chances]))
+    names, ways = [""] * len(cloud), cloud.ways if isinstance(cloud, FruitsInMap) else ()
+    for fruit, name in zip(telling.tolist(), tree_names(cloud.positions[telling], ways), strict=True):
+        names[fruit] = name
+    return names
 
 
 def as_counted(name: str) -> tuple[tuple[int, str], ...]:

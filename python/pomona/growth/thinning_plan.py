@@ -33,8 +33,8 @@ class ThinningPlan:
     drop : FruitDrop
         Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known.
     places : (M,) float64
-        Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. NaN
-        for what drops.
+        Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. 0
+        for what hangs on no tree, which no target thins, and NaN for what drops.
     actions : tuple of M str
         `keep`, `drops` or `thin`.
     """
@@ -61,9 +61,14 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     Raises
     ------
     PomonaError
-        When no fruit was measured on both of the last two days.
+        When no fruit was measured on both of the last two days, or there is a target for each tree and none is known.
     """
     fruits = growth.fruits
+    if target_per_tree is not None and not any(fruits.trees.names):
+        raise PomonaError(
+            f"{fruits.path}: found no trees, expected those that shall keep {target_per_tree} each: in its rows none "
+            "can be told, `pomona map trees` takes them with --trees FILE or parts rows with --segments METRES"
+        )
     rows = np.flatnonzero(fruits.hanging)
     rates, noise = _rates(growth)
     if not rates_are_known(growth):
@@ -75,8 +80,11 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     sizes_mm = growth.foretold.sizes_mm[rows, len(fruits.days) - 1]
     drops = np.nan_to_num(drop.probabilities) > 0.5
     places = np.full(len(rows), np.nan)
-    for tree in range(len(fruits.trees.names)):
+    for tree, name in enumerate(fruits.trees.names):
         of_tree = np.flatnonzero((fruits.trees.numbers[rows] == tree) & ~drops)
+        if not name:
+            places[of_tree] = 0.0
+            continue
         given_first = _order_of_thinning(of_tree, clusters, sizes_mm)
         places[given_first] = np.arange(len(of_tree), 0, -1)
     thin = np.zeros(len(rows), dtype=bool) if target_per_tree is None else places > target_per_tree

@@ -6,7 +6,7 @@ from pomona.orchard.fruit_ids import Change
 from pomona.orchard.integrity import problems
 from pomona.orchard.loading import load_session
 from pomona.orchard.merging import Merged, merge_maps
-from pomona.orchard.orchard_map import Observations, OrchardMap, Visit
+from pomona.orchard.orchard_map import FruitsInMap, Observations, OrchardMap, Visit
 from pomona.orchard.removing import Removed, remove_session
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import read_session
@@ -17,6 +17,7 @@ __all__ = [
     "FORMAT_VERSION",
     "Added",
     "Change",
+    "FruitsInMap",
     "Merged",
     "Observations",
     "OrchardMap",

@@ -1,13 +1,15 @@
-"""Which fruits of a map still hang, for all that it knows."""
+"""Which fruits of a map still hang, for all that it knows, and which tell where trees stand."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 
-__all__ = ["LIKELY", "may_hang"]
+__all__ = ["LIKELY", "may_hang", "tell_trees"]
 
 LIKELY = 0.5
 """Probability of being a fruit above which one that was missed is one."""
@@ -25,3 +27,18 @@ def may_hang(fruits: FruitCloud) -> NDArray[np.bool_]:
     states, chances = (fruits.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
     judged = zip(states, chances, strict=True)
     return np.array([state != "gone" and (state != "missed" or float(p or 1) > LIKELY) for state, p in judged], bool)
+
+
+def tell_trees(states: Sequence[str], chances: Sequence[float | None]) -> NDArray[np.bool_]:
+    """Tell the fruits, (N,), that say where trees stand.
+
+    Those that are gone do. What was seen once, looked for in vain and is likelier no fruit does not.
+
+    Parameters
+    ----------
+    states : sequence of N str
+    chances : sequence of N float or None
+        Probability of being a fruit; None where nothing was said.
+    """
+    judged = zip(states, chances, strict=True)
+    return np.array([p is None or p > LIKELY or state in ("new", "seen") for state, p in judged], bool)

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from pomona import geopackage
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.given_trees import KnownTree
+from pomona.orchard.hanging import tell_trees
 from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
 from pomona.orchard.writing import update_layers
 from pomona.store.cells import finite_json
@@ -29,9 +31,6 @@ __all__ = ["TreeRow", "find_trees"]
 
 BESIDE_ROW_M = 2.0
 """A tree that is given stands no farther from the curve of its row: its foot, or its top."""
-
-BELIEVED = 0.5
-"""What was seen once, looked for in vain and is less likely a fruit than this tells no tree."""
 
 TREE_COLUMN = "tree"
 """Where a session says on which tree it saw a fruit."""
@@ -286,19 +285,11 @@ def _in_segments(line: RowLine, crowns: Crowns) -> tuple[NDArray[np.int64], NDAr
 
 def _fruits(connection: sqlite3.Connection) -> _Fruits:
     ids, geoms, states, chances = columns_of(connection, "fruits", ("id", "geom", "state", "fruit_probability"))
-    sessions, places = columns_of(connection, "poses", ("session_id", "geom"))
-    cameras, of_session = geopackage.points_of(places), np.array(sessions, np.int64)
     return _Fruits(
         ids=np.array(ids, np.int64),
         positions=geopackage.points_of(geoms),
-        believed=np.array(
-            [
-                chance is None or chance > BELIEVED or state in ("new", "seen")
-                for state, chance in zip(states, chances, strict=True)
-            ],
-            bool,
-        ),
-        ways=tuple(cameras[of_session == session] for session in np.unique(of_session)),
+        believed=tell_trees(states, chances),
+        ways=camera_ways(connection),
     )
 
 

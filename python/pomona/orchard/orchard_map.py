@@ -5,18 +5,20 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pomona import geopackage
 from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
 from pomona.earth import Anchor
+from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.earth_layers import stored_anchor
 from pomona.orchard.fruit_ids import Change
 from pomona.store.cells import finite_json
@@ -25,7 +27,7 @@ from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of, one_of
 from pomona.store.stored_fruits import fruits_in_map
 
-__all__ = ["Observations", "OrchardMap", "Visit"]
+__all__ = ["FruitsInMap", "Observations", "OrchardMap", "Visit"]
 
 COUNTS = "SELECT session_id, count(*), count(match_probability) FROM observations GROUP BY session_id"
 """What each session saw, and of how much a visit before had seen it."""
@@ -137,6 +139,26 @@ class Observations:
         return to_geopandas(self.columns(), self.positions_in_map)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class FruitsInMap(FruitCloud):
+    """The fruits of a map, which are where cameras drove along them.
+
+    Attributes
+    ----------
+    ways : tuple of (F, 3) float64
+        Where cameras went, in the frame of the fruits, for each session that knows it.
+    """
+
+    ways: tuple[NDArray[np.float64], ...] = ()
+
+    def transformed(self, map_from_query: ArrayLike) -> FruitsInMap:
+        """Return fruits and ways in another frame, as `FruitCloud.transformed` does."""
+        moved = super().transformed(map_from_query)
+        assert isinstance(moved, FruitsInMap)
+        transform = np.asarray(map_from_query, np.float64)
+        return replace(moved, ways=tuple(way @ transform[:3, :3].T + transform[:3, 3] for way in self.ways))
+
+
 class OrchardMap:
     """A map or session file for reading; every call sees the file as it is at that moment.
 
@@ -190,10 +212,10 @@ class OrchardMap:
         with snapshot(self.path) as (connection, _):
             return stored_anchor(connection)
 
-    def fruits(self) -> FruitCloud:
+    def fruits(self) -> FruitsInMap:
         """Return every fruit where it was last seen, with its identity as id."""
         with self._reading() as connection:
-            return fruits_in_map(connection, FruitCloud)
+            return fruits_in_map(connection, partial(FruitsInMap, ways=camera_ways(connection)))
 
     @property
     def cloud(self) -> FruitCloud:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ __all__ = [
     "session_row",
     "stored_cloud",
 ]
+
+Made = TypeVar("Made", bound="FruitCloud")
 
 COVARIANCE = ("cxx", "cxy", "cxz", "cxy", "cyy", "cyz", "cxz", "cyz", "czz")
 
@@ -137,8 +139,8 @@ def seen_by_sessions(
 
 
 def fruits_in_map(
-    connection: sqlite3.Connection, make: type[FruitCloud], fruit_ids: Collection[int] | None = None
-) -> FruitCloud:
+    connection: sqlite3.Connection, make: Callable[..., Made], fruit_ids: Collection[int] | None = None
+) -> Made:
     """Return every fruit, or those of these ids, where it was last seen, with the covariance of that sighting."""
     which, at_last = "", AT_LAST.format("")
     if fruit_ids is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,10 +17,10 @@ def tree_name(row: int, n_rows: int, number: int) -> str:
     return str(number) if n_rows == 1 else f"{row}-{number}"
 
 
-def tree_names(positions: NDArray[np.float64]) -> tuple[str, ...]:
-    """Return the tree of each fruit, (N,), blank where none can be told."""
+def tree_names(positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]] = ()) -> tuple[str, ...]:
+    """Return the tree of each fruit, (N,), blank where none can be told; `ways` as for `told_rows`."""
     names = np.full(len(positions), "", dtype=object)
-    lines = told_rows(positions)
+    lines = told_rows(positions, ways)
     for row, (line, planting) in enumerate(lines, 1):
         bearers, _ = planting.bearers(line.along_m, line.beside_m)
         told = bearers >= 0
