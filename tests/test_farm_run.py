@@ -185,6 +185,11 @@ def test_one_recording_that_fails_stops_its_own_row_only(farm):
     status = subprocess.run(command("status", "farm.toml"), cwd=farm, capture_output=True, text=True, check=True)
     assert "\nb    x    -\n" in status.stdout
     assert f"map b: failed: {lines[-1]['reasons']['map b']}" in status.stdout
+    skip = f'skip = ["b/{broken.stem}"]'
+    assert lines[-1]["reasons"]["map b"].endswith(f"; the row goes on without it by {skip} in the plan's [recordings]")
+    (farm / "farm.toml").write_text(PLAN.replace("[map]", f"{skip}\n[map]"))
+    assert begun(run(farm)) == {"map b", "export b csv"}
+    (farm / "farm.toml").write_text(PLAN)
     broken.write_bytes(whole)
     assert begun(run(farm)) == {"map b", "export b csv"}
 

@@ -155,7 +155,7 @@ class _Driver:
             raise PomonaError(f"its process was lost {TRIES} times")
         is_verdict = outcome.exit_code == NOT_FOUND and step.kind == "map" and "Traceback" not in outcome.err
         if outcome.exit_code and not is_verdict:
-            raise PomonaError(_last_line(outcome))
+            raise PomonaError(f"{_last_line(outcome)}{self._way_out(step, _last_line(outcome))}")
         if stamps(step.inputs) != self.keys.stamps[step.name]:
             raise PomonaError("its input changed while it was read, expected a recording that has ended")
         for output in step.outputs:
@@ -164,6 +164,16 @@ class _Driver:
         if step.kind == "scan":
             return tuple(json.loads(outcome.out.splitlines()[-1])["output"])
         return tuple(os.path.relpath(output, self.plan.folder) for output in step.outputs)
+
+    def _way_out(self, step: FarmStep, why: str) -> str:
+        """Say how the row goes on without the recording that a step failed of, where it is plain which that is."""
+        named = dict(step.recordings)
+        if step.kind == "map":
+            for need in step.needs:
+                named |= dict.fromkeys(self.lines[need].outputs, self.run.steps[need].recordings[0][1])
+        blamed = [title for path, title in named.items() if step.kind == "scan" or why.startswith(f"{Path(path)}: ")]
+        skip = json.dumps(blamed[:1], ensure_ascii=False)
+        return f"; the row goes on without it by skip = {skip} in the plan's [recordings]" if blamed else ""
 
     def _remove_others(self, step: FarmStep, outputs: tuple[str, ...]) -> None:
         """Remove the parts that an earlier scan of the recording had and this one has not."""

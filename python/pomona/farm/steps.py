@@ -49,6 +49,8 @@ class FarmStep:
         The flags that the plan gives its verb.
     settings_files : tuple of Path
         Those of the inputs that the flags name.
+    recordings : tuple of (str, str)
+        Those that its commands name, as they do, and what the plan calls them to leave them out.
     """
 
     name: str
@@ -60,6 +62,7 @@ class FarmStep:
     outputs: tuple[Path, ...]
     settings: tuple[str, ...] = ()
     settings_files: tuple[Path, ...] = ()
+    recordings: tuple[tuple[str, str], ...] = ()
 
     def arguments(self, made: Mapping[str, Sequence[str]]) -> list[list[str]]:
         """Write the commands out, given what the steps before it made."""
@@ -105,6 +108,7 @@ def _scan(plan: FarmPlan, visit: RecordedVisit, beside: _Beside) -> FarmStep:
         needs=(),
         outputs=(output,),
         settings=settings,
+        recordings=((_shown(plan, visit.path), visit.title),),
     )
 
 
@@ -136,6 +140,7 @@ def _map(plan: FarmPlan, row: str, visits: list[RecordedVisit], scans: Mapping[R
         outputs=(orchard,),
         settings=settings,
         settings_files=plan.files["map"],
+        recordings=tuple((_shown(plan, visit.path), visit.title) for visit in visits if visit not in scans),
     )
 
 
