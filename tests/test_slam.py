@@ -276,7 +276,7 @@ def test_a_frame_that_cannot_be_looked_for_leaves_a_way_as_it_was() -> None:
     ("call", "complaint"),
     [
         (lambda: FruitSlam(config={"localization": {"own_n": 1.0}}), "own_n"),
-        (lambda: FruitSlam(config={"localization": 3}), "expected struct LocalizationConfig"),
+        (lambda: FruitSlam(config={"localization": 3}), "config: localization: found 3, expected a table"),
         (lambda: FruitSlam(config=[1]), "config: found a list, expected tables"),  # type: ignore[arg-type]
         (lambda: way_by_fruits(FruitCloud(np.eye(3))), "clouds: found FruitCloud, expected a FruitCloud of each frame"),
         (lambda: way_by_fruits(3), "clouds: found int, expected a FruitCloud of each frame"),  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pomona.core_settings import require_kinds
 from pomona.errors import PomonaError
 from pomona.reading import read_given_text, shown
 from pomona.threads import require_threads
@@ -54,7 +55,8 @@ class Settings:
         Raises
         ------
         PomonaError
-            The file is missing, is no TOML, or names a setting that does not exist.
+            The file is missing, is no TOML, or names a setting that does not exist; a value is of another kind than it
+            should be.
         """
         from pomona.matching import default_config
 
@@ -64,11 +66,12 @@ class Settings:
         known = {_CALL_TABLE: call, **default_config()}
         _refuse_unknown(path, {_CALL_TABLE: from_file, **tables}, known)
         for name, value in from_file.items():
-            from_file[name] = _checked(path, name, value)
+            from_file[name] = _checked(f"{path}: {_CALL_TABLE}.{name}", name, value)
         _refuse_wrong_values(path, tables)
         given = {name: value for name, value in flags.items() if value is not None}
-        if "threads" in given:
-            require_threads(given["threads"], "--threads")
+        for name in ("threads", "noise_m"):
+            if name in given:
+                _checked(f"--{name.removesuffix('_m')}", name, given[name])
         return cls(call={**call, **from_file, **given}, overrides=tables)
 
     def match(self, query: FruitCloud, map: FruitCloud) -> Match:
@@ -143,8 +146,8 @@ def _refuse_unknown(path: Path | None, found: Mapping[str, Any], known: Mapping[
             _refuse_unknown(path, value, expected, f"{table}{name}.")
 
 
-def _checked(path: Path | None, name: str, value: Any) -> Any:
-    """Return a value of the file's table for `pomona.match`; refuse one of another kind than its flag takes."""
+def _checked(place: str, name: str, value: Any) -> Any:
+    """Return a value for `pomona.match` that was found at `place`; refuse one of another kind than it takes."""
     is_number = _is_number(value)
     match name:
         case "method":
@@ -154,7 +157,7 @@ def _checked(path: Path | None, name: str, value: Any) -> Any:
         case "noise_m":
             expected, fits = "a positive number of metres", is_number and value > 0
         case "threads":
-            return require_threads(value, f"{path}: {_CALL_TABLE}.{name}")
+            return require_threads(value, place)
         case "per_frame":
             expected, fits = "true or false", isinstance(value, bool)
         case _:
@@ -163,7 +166,7 @@ def _checked(path: Path | None, name: str, value: Any) -> Any:
                 return [value, value]
             fits = isinstance(value, list) and len(value) == 2 and all(map(_is_direction, value))
     if not fits:
-        raise PomonaError(f"{path}: {_CALL_TABLE}.{name}: found {shown(value)}, expected {expected}")
+        raise PomonaError(f"{place}: found {shown(value)}, expected {expected}")
     return value
 
 
@@ -182,10 +185,11 @@ def _refuse_wrong_values(path: Path | None, tables: Mapping[str, Any]) -> None:
 
     if not tables:
         return
+    require_kinds(tables, f"{path}: ")
     try:
         Index([[0.0, 0.0, 0.0]], config=tables)
     except PomonaError as error:
-        raise PomonaError(f"{path}: {str(error).removeprefix('map: ')}") from None
+        raise PomonaError(f"{path}: {str(error).removeprefix('map: ').removeprefix('config.')}") from None
 
 
 def _merged(defaults: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 
 import typer
@@ -92,4 +93,6 @@ def direction(text: str) -> list[float]:
         x, y, z = (float(number) for number in text.split(","))
     except ValueError:
         raise PomonaError(f"--up: found {text!r}, expected three numbers X,Y,Z") from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise PomonaError(f"--up: found {text!r}, expected three finite numbers X,Y,Z")
     return [x, y, z]
