@@ -222,15 +222,31 @@ def test_maps_and_sessions_that_come_at_once_are_all_there(orchard: Path, tmp_pa
 
 
 def test_a_writer_that_waits_says_so(orchard: Path, visits: tuple[Path, Path]) -> None:
-    other = sqlite3.connect(orchard, isolation_level=None)
-    other.execute("BEGIN IMMEDIATE")
-    command = [*POMONA, "map", "add", orchard, visits[1]]
-    writer = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert writer.stderr is not None
-    line = writer.stderr.readline()
-    assert line == f"pomona: {orchard}: another program is writing to it, waiting up to 60 s\n"
+    """Whether others write, read or keep all out, before it begins or when it ends."""
+    assert "recognised" in waits_and_says_so(orchard, "BEGIN IMMEDIATE", "map", "add", orchard, visits[1])
+    # One who only reads holds up the end.
+    assert "takes away 380 observations" in waits_and_says_so(
+        orchard, "BEGIN; SELECT * FROM fruits", "map", "remove", orchard, "september", "--yes"
+    )
+
+
+def test_a_reader_that_waits_says_so(orchard: Path, visits: tuple[Path, Path]) -> None:
+    assert "1 session" in waits_and_says_so(orchard, "BEGIN EXCLUSIVE", "map", "info", orchard)
+    found = waits_and_says_so(orchard, "BEGIN EXCLUSIVE", "match", visits[1], orchard)
+    assert found.startswith("Found")
+
+
+def waits_and_says_so(path: Path, lock: str, *verb: object) -> str:
+    """Run a verb while another program holds a file; give what it says once it has let go."""
+    other = sqlite3.connect(path, isolation_level=None)
+    for statement in lock.split("; "):
+        other.execute(statement)
+    waiting = subprocess.Popen([*POMONA, *map(str, verb)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert waiting.stderr is not None
+    line = waiting.stderr.readline()
+    assert line == f"pomona: {path}: another program is using it, waiting up to 60 s\n"
     other.execute("ROLLBACK")
     other.close()
-    stdout, stderr = writer.communicate()
-    assert (writer.returncode, stderr) == (0, "")
-    assert "recognised" in stdout
+    stdout, stderr = waiting.communicate()
+    assert (waiting.returncode, stderr) == (0, "")
+    return stdout

@@ -2,6 +2,7 @@
 
 import sys
 import warnings
+from pathlib import Path
 from typing import NoReturn
 
 import typer
@@ -34,6 +35,7 @@ from pomona.cli import (
 from pomona.cli.terminal import require_written, say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.store.waiting import TIMEOUT_S, tell_waits
 
 app = Verbs(
     name="pomona",
@@ -87,6 +89,7 @@ app.add_typer(synth.app, name="synth")
 
 def main() -> None:
     """Run the command line; wrong input is one line on stderr and exit code 2, a bug is a trace."""
+    tell_waits(_say_waiting)
     try:
         code = _run()
     except PomonaError as error:
@@ -123,6 +126,11 @@ def _usage_line(error: Exception) -> str:
     if context is None or not message or "\n" in message:
         return message or "no verb given, see `pomona --help`"
     return f"{message.rstrip('.')}; see `{context.command_path} --help`"
+
+
+def _say_waiting(path: Path) -> None:
+    """Say why nothing happens."""
+    tell(f"pomona: {path}: another program is using it, waiting up to {TIMEOUT_S:g} s")
 
 
 def _warn(message: Warning | str, *_about: object, **_more: object) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.map_words import change_as_text, waiting
+from pomona.cli.map_words import change_as_text
 from pomona.cli.match_options import (
     Method,
     Scale,
@@ -86,9 +86,7 @@ def map_add(
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
     with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
-        answers = add_sessions(
-            orchard, visits, settings=settings, new_part=new_part, replacing=replace, waiting=waiting(orchard)
-        )
+        answers = add_sessions(orchard, visits, settings=settings, new_part=new_part, replacing=replace)
     told = list(zip(visits, answers, strict=True))
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]

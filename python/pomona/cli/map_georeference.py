@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pomona.cli.map_words import orchard_argument, waiting
+from pomona.cli.map_words import orchard_argument
 from pomona.cli.terminal import say, say_json
 
 if TYPE_CHECKING:
@@ -53,7 +53,6 @@ def map_georeference(
         up_in_map=None if up is None else _vector(up),
         within_m=within_m,
         free_scale=free_scale,
-        waiting=waiting(orchard),
     )
     if json:
         say_json(_anchor_as_json(found))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pomona.cli.map_words import change_as_text, orchard_argument, waiting
+from pomona.cli.map_words import change_as_text, orchard_argument
 from pomona.cli.match_options import (
     config_option,
     threads_option,
@@ -45,7 +45,7 @@ def map_merge(
 
     settings = Settings.load(config, {"threads": threads})
     with working(f"merging {other.name} into {orchard.name}"):
-        merged = merge_maps(orchard, other, output=output, settings=settings, waiting=waiting(orchard))
+        merged = merge_maps(orchard, other, output=output, settings=settings)
     if json:
         say_json(_merged_as_json(other, merged))
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.map_words import orchard_argument, waiting
+from pomona.cli.map_words import orchard_argument
 from pomona.cli.terminal import say, say_json, tell
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def map_remove(
     """
     from pomona.orchard import remove_session
 
-    removed = remove_session(orchard, session, waiting=waiting(orchard), dry=not yes)
+    removed = remove_session(orchard, session, dry=not yes)
     done = removed is not None and yes
     if json:
         say_json({**_removed_as_json(session, removed), "removed": done})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.map_words import orchard_argument, waiting
+from pomona.cli.map_words import orchard_argument
 from pomona.cli.terminal import say, say_json
 
 if TYPE_CHECKING:
@@ -50,7 +50,6 @@ def map_trees(
             segment_m=segment_m,
             renumber=renumber,
             forget=forget,
-            waiting=waiting(orchard),
         )
     if json:
         say_json([{**asdict(row), "log_odds": _finite(row.log_odds)} for row in rows])

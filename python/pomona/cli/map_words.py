@@ -1,4 +1,4 @@
-"""What the verbs of maps share: the map that they are given, waiting for other writers, and changes in words."""
+"""What the verbs of maps share: the map that they are given, and changes in words."""
 
 from __future__ import annotations
 
@@ -7,24 +7,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.terminal import tell
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from pomona.orchard import Change
 
 EVENTS = {"joined": "joined", "split": "split off as", "moved": "moved to"}
 
 orchard_argument = typer.Argument(metavar="ORCHARD", help="The map (.gpkg).")
-
-
-def waiting(orchard: Path) -> Callable[[], None]:
-    """Say on the standard error why nothing happens."""
-    from pomona.store.opening import TIMEOUT_S
-
-    return lambda: tell(f"pomona: {orchard}: another program is writing to it, waiting up to {TIMEOUT_S:g} s")
 
 
 def change_as_text(change: Change) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,17 +15,12 @@ from pomona.store.guard import guard, release, trust
 from pomona.store.migration import migrate, migrated_copy
 from pomona.store.rows import columns_of
 from pomona.store.schema import FORMAT_VERSION, Kind
+from pomona.store.waiting import TIMEOUT_S, Waiting, patiently, teller_of
 
 __all__ = ["TIMEOUT_S", "Waiting", "blank", "snapshot", "writing"]
 
-TIMEOUT_S = 60.0
-"""How long to wait for another program that writes: the longest match of a large map, a few times over."""
-
 SHORT_TIMEOUT_S = 0.2
-"""How long a writer waits in silence."""
-
-Waiting = Callable[[], None]
-"""Called once when a writer has to wait."""
+"""For a file of which nobody else knows."""
 
 
 @contextmanager
@@ -61,15 +55,17 @@ def writing(
 ) -> Iterator[tuple[sqlite3.Connection, bool]]:
     """Let nobody else write to a file of ours; all of the block is kept, or nothing when it raises.
 
-    Errors name `shown` where the file is not there for good. Gives the connection, and whether the file is empty and
+    Errors name `shown` where the file is not there for good. `waiting` is called where others have to be waited for, to
+    begin or to end; else whoever asked by `tell_waits` is told. Gives the connection, and whether the file is empty and
     waits for its tables, which only `create` allows.
     """
     if not create:
         _require_there(path)
+    waiting = waiting or teller_of(shown or path)
     with told(shown or path), _connection(path, create=create, timeout_s=timeout_s) as connection:
-        _begin_to_write(connection, timeout_s, waiting)
-        _migrate_older(connection, path, kind, timeout_s)
-        with _transaction(connection):
+        patiently(connection, "BEGIN IMMEDIATE", timeout_s, waiting)
+        _migrate_older(connection, path, kind, timeout_s, waiting)
+        with _transaction(connection, timeout_s, waiting):
             _load_schema(connection)
             if create and _is_blank(connection):
                 release(connection)
@@ -87,7 +83,7 @@ def blank(partial: Path, shown: Path) -> Iterator[sqlite3.Connection]:
         release(connection)
         connection.execute("PRAGMA journal_mode = MEMORY")
         connection.execute("BEGIN IMMEDIATE")
-        with _transaction(connection):
+        with _transaction(connection, SHORT_TIMEOUT_S, None):
             yield connection
 
 
@@ -108,7 +104,7 @@ def _begun(path: Path) -> Iterator[sqlite3.Connection]:
     """Begin to read; in a copy where a killed writer left the file, and it may not be put in order here."""
     with _connection(path, timeout_s=TIMEOUT_S) as connection:
         try:
-            _begin_to_read(connection)
+            _begin_to_read(connection, teller_of(path))
         except sqlite3.Error as error:
             if not recovery.is_needed(error):
                 raise
@@ -120,39 +116,22 @@ def _begun(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
 
 
-def _begin_to_read(connection: sqlite3.Connection) -> None:
+def _begin_to_read(connection: sqlite3.Connection, waiting: Waiting | None = None) -> None:
     connection.execute("BEGIN")
-    _load_schema(connection)
+    _load_schema(connection, waiting)
 
 
-def _load_schema(connection: sqlite3.Connection) -> None:
+def _load_schema(connection: sqlite3.Connection, waiting: Waiting | None = None) -> None:
     """Read the schema, with which a transaction begins to see the file; what SQLite cannot make of it is damage."""
     try:
-        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+        patiently(connection, "SELECT 1 FROM sqlite_master", TIMEOUT_S, waiting).fetchone()
     except sqlite3.OperationalError as error:
         if error.sqlite_errorname == "SQLITE_ERROR":
             raise WrongContentError(DAMAGED) from None
         raise
 
 
-def _begin_to_write(connection: sqlite3.Connection, timeout_s: float, waiting: Waiting | None) -> None:
-    """Wait for the other writers. In short steps: SQLite's own waiting cannot be interrupted, nor speak."""
-    end = time.monotonic() + timeout_s
-    connection.execute(f"PRAGMA busy_timeout = {int(1000 * min(timeout_s, SHORT_TIMEOUT_S))}")
-    while True:
-        try:
-            connection.execute("BEGIN IMMEDIATE")
-            break
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorname != "SQLITE_BUSY" or time.monotonic() > end:
-                raise
-        if waiting is not None:
-            waiting()
-            waiting = None
-    connection.execute(f"PRAGMA busy_timeout = {int(1000 * timeout_s)}")
-
-
-def _migrate_older(connection: sqlite3.Connection, path: Path, kind: Kind, timeout_s: float) -> None:
+def _migrate_older(connection: sqlite3.Connection, path: Path, kind: Kind, timeout_s: float, waiting: Waiting) -> None:
     """Bring an older file up to date, in a transaction of its own; the one that was begun is there afterwards again."""
     _load_schema(connection)
     if _is_blank(connection):
@@ -164,20 +143,21 @@ def _migrate_older(connection: sqlite3.Connection, path: Path, kind: Kind, timeo
     connection.execute("ROLLBACK")
     # Tables are laid out anew under those that refer to them; SQLite lets nobody say so later than here.
     connection.execute("PRAGMA foreign_keys = OFF")
-    _begin_to_write(connection, timeout_s, None)
-    with _transaction(connection):
+    patiently(connection, "BEGIN IMMEDIATE", timeout_s, waiting)
+    with _transaction(connection, timeout_s, waiting):
         if _about(connection)[1] != FORMAT_VERSION:
             release(connection)
             migrate(connection)
     guard(connection, path.stat().st_size)
-    _begin_to_write(connection, timeout_s, None)
+    patiently(connection, "BEGIN IMMEDIATE", timeout_s, waiting)
 
 
 @contextmanager
-def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
+def _transaction(connection: sqlite3.Connection, timeout_s: float, waiting: Waiting | None) -> Iterator[None]:
     try:
         yield
-        connection.execute("COMMIT")
+        # Who reads is waited for here.
+        patiently(connection, "COMMIT", timeout_s, waiting)
     except BaseException:
         # A full disk may have ended the transaction already.
         if connection.in_transaction:
