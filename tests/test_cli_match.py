@@ -311,11 +311,32 @@ def test_millimetres_warn_and_say_what_to_do(visits: Path, found: dict[str, obje
     done = run("match", visits / "query_mm.csv", visits / "map_mm.csv", "--json")
     warnings = done.stderr.splitlines()
     assert len(warnings) == 2
-    assert all(line.startswith("pomona: warning: ") and "unit" in line for line in warnings)
+    assert all(line.startswith("pomona: warning: ") and line.endswith("say so: --unit mm") for line in warnings)
     told = run("match", visits / "query_mm.csv", visits / "map_mm.csv", "--unit", "mm", "--json")
     assert told.returncode == 0
     assert told.stderr == ""
     assert len(json.loads(told.stdout)["matches"]) == len(found["matches"])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("clouds", "flags", "named", "mended"),
+    [
+        (("query_mm", "map"), (), "query_mm.csv", "if it is not in metres say so: --query-unit mm"),
+        (("query", "map_mm"), (), "map_mm.csv", "if it is not in metres say so: --unit mm --query-unit m"),
+        (("query_mm", "map"), ("--unit", "mm"), "map.csv", "not in millimetres say so: --unit m --query-unit mm"),
+        (("query", "map_mm"), ("--unit", "mm"), "query.csv", "if it is not in millimetres say so: --query-unit m"),
+    ],
+)
+def test_a_wrong_unit_is_told_with_the_flag_of_its_side(
+    run_here: Run, visits: Path, clouds: tuple[str, str], flags: tuple[str, ...], named: str, mended: str
+) -> None:
+    paths = [visits / f"{cloud}.csv" for cloud in clouds]
+    (line, *_) = run_here("match", *paths, *flags).stderr.splitlines()
+    assert named in line
+    assert line.endswith(mended)
+    # What it says helps.
+    told = run_here("match", *paths, *flags, *mended.split("say so: ")[1].split())
+    assert (told.returncode, told.stderr) == (0, "")
 
 
 def test_config_prints_effective_values(run_here: Run, tmp_path: Path) -> None:

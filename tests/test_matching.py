@@ -264,12 +264,40 @@ def test_wrong_settings_are_named(arguments: dict[str, object], message: str) ->
 
 
 @pytest.mark.parametrize("which", ["query", "map"])
-def test_arrays_that_cannot_be_in_metres_are_told_of_where_nothing_is_found(which: str) -> None:
+def test_clouds_that_cannot_be_in_metres_are_told_of(which: str) -> None:
     clouds = {"query": row(), "map": row()} | {which: 1000 * row()}
     with pytest.warns(pomona.PomonaWarning, match=rf"^{which}: neighbouring fruits are .* m apart .* scale='free'"):
         assert not pomona.match(**clouds)
     assert pomona.match(**clouds, scale="free")  # a warning would fail here
-    assert not pomona.match(**{name: FruitCloud(positions=cloud) for name, cloud in clouds.items()})
+    made = {name: FruitCloud(positions=cloud) for name, cloud in clouds.items()}
+    with pytest.warns(pomona.PomonaWarning, match=rf"^{which}: neighbouring fruits are "):
+        assert not pomona.match(**made)
+    assert not pomona.match(**made)  # told once
+
+
+def test_clouds_that_are_found_are_looked_at_too() -> None:
+    with pytest.warns(pomona.PomonaWarning, match="m apart") as told:
+        assert pomona.match(1000 * row(), 1000 * row())
+    assert [str(one.message).split(":")[0] for one in told] == ["query", "map"]
+    # A localiser or a loop over frames asks an index, which looks at arrays where it finds nothing.
+    assert pomona.Index(1000 * row()).match(1000 * row())
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_coordinates_in_steps_as_coarse_as_the_spacing_are_told_of(turned: bool, tmp_path: Path) -> None:
+    """Those of UTM in 32 bits, be the row along the northing or across."""
+    utm = row()[:, [1, 0, 2] if turned else [0, 1, 2]] + [512_345.0, 5_312_345.0, 420.0]
+    coarse = utm.astype(np.float32)
+    with pytest.warns(pomona.PomonaWarning, match="^query: y goes in steps of 0.5 m, where neighbouring fruits are"):
+        pomona.match(coarse, utm)
+    FruitCloud(coarse).write(tmp_path / "coarse.csv")
+    with pytest.warns(pomona.PomonaWarning, match="coarse.csv: y goes in steps of 0.5 m"):
+        FruitCloud.read(tmp_path / "coarse.csv")
+    # Heights of wires, and what is rounded to centimetres, are as they should be.
+    on_wires = np.column_stack([utm[:, :2], np.round(utm[:, 2])])
+    assert pomona.match(np.round(utm, 2), utm)
+    FruitCloud(on_wires).write(tmp_path / "wires.csv")
+    FruitCloud.read(tmp_path / "wires.csv")
 
 
 def test_no_cloud_is_named_as_none() -> None:
@@ -279,5 +307,6 @@ def test_no_cloud_is_named_as_none() -> None:
 
 def test_more_fruits_than_the_paper_can_hold_are_refused() -> None:
     lattice = np.stack(np.meshgrid(np.arange(1000.0), np.arange(2000.0), [0.0]), axis=-1).reshape(-1, 3)
+    lattice[:, :2] += 1e-4 * lattice[:, 1::-1]
     with pytest.raises(pomona.PomonaError, match="2000000 fruits of the map give up to 420000000 constellations"):
         pomona.match(row(), lattice, method="paper")

@@ -337,10 +337,19 @@ def match(
     Raises
     ------
     PomonaError
-        An array or a setting is wrong. That there is no match is no error: see `Match.status`. Where nothing is found
-        and an array cannot be in metres, a `PomonaWarning` says so.
+        An array or a setting is wrong. That there is no match is no error: see `Match.status`.
+
+    Warns
+    -----
+    PomonaWarning
+        Where a cloud cannot be in metres, or its numbers go in steps as coarse as fruits are apart.
     """
     start = time.perf_counter()
+    unit: Unit = "free" if scale == "free" else "m"
+    query, map = as_cloud(query, unit, name="query"), as_cloud(map, unit, name="map")
+    if unit == "m":
+        doubt_metres("query", query)
+        doubt_metres("map", map)
     index = Index(map, scale=scale, method=method, config=config, threads=threads)
     found = index.match(query, noise_m=noise_m, up=up, per_frame=per_frame)
     return replace(found, elapsed_s=time.perf_counter() - start)

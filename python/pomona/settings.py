@@ -75,9 +75,11 @@ class Settings:
         return cls(call={**call, **from_file, **given}, overrides=tables)
 
     def match(self, query: FruitCloud, map: FruitCloud) -> Match:
-        """Run `pomona.match` with these settings."""
+        """Run `pomona.match` with these settings, on clouds that were looked at where they come from."""
+        from pomona.cloud.files import vouch_for
         from pomona.matching import match
 
+        vouch_for(query, map)
         return match(query, map, **self.call, config=self.overrides)
 
     def ready(self, cloud: FruitCloud) -> FruitCloud | ReadyCloud:

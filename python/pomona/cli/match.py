@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -30,6 +30,19 @@ if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
     from pomona.settings import Settings
+
+
+class _ReadCloud(NamedTuple):
+    """One of the two clouds: its file, and the unit that it was read in."""
+
+    path: Path
+    unit: Unit
+    cloud: FruitCloud
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether the file may be in another unit: a session is in metres, and free is any."""
+        return self.path.suffix.lower() != ".gpkg" and self.unit is not Unit.free
 
 
 def match(
@@ -62,6 +75,7 @@ def match(
     """
     from pomona.cli.progress import working
     from pomona.cloud import FruitCloud
+    from pomona.cloud.files import read_cloud
     from pomona.file_names import require_suffix
     from pomona.pairs import write_pairs
     from pomona.settings import Settings
@@ -73,9 +87,13 @@ def match(
         from pomona.plot import require_picture_name
 
         require_picture_name(plot)
-    read_unit = unit or (Unit.free if settings.call["scale"] == Scale.free else Unit.m)
-    in_query = FruitCloud.read(query, unit=(query_unit or read_unit).value)
-    in_map = FruitCloud.read(map, unit=read_unit.value)
+    map_unit = unit or (Unit.free if settings.call["scale"] == Scale.free else Unit.m)
+    sides = [
+        _ReadCloud(path, one, read_cloud(path, one.value, FruitCloud, is_checked=False))
+        for path, one in ((query, query_unit or map_unit), (map, map_unit))
+    ]
+    _doubt_units(*sides, is_query_told=query_unit is not None)
+    in_query, in_map = (side.cloud for side in sides)
     with working(f"matching {amount(len(in_query), 'fruit')} with {len(in_map)}"):
         answer = settings.match(in_query, in_map)
     if output is not None:
@@ -88,6 +106,27 @@ def match(
     _doubt_hands(in_query, in_map, answer, settings)
     if answer.status != "Found":
         raise typer.Exit(1)
+
+
+def _doubt_units(query: _ReadCloud, map: _ReadCloud, *, is_query_told: bool) -> None:
+    """Warn of files whose places cannot be those of fruits, with the flags that mend those and no other."""
+    from pomona.cloud.files import check_places
+
+    of_query, of_map = _other_unit(query), _other_unit(map)
+    both = of_query == of_map and not is_query_told
+    keeps_query = "" if of_query or is_query_told else f" --query-unit {query.unit.value}"
+    flags = (f"--unit {of_query}" if both else f"--query-unit {of_query}", f"--unit {of_map}{keeps_query}")
+    for side, flag in zip((query, map), flags, strict=True):
+        if side.is_doubted:
+            check_places(side.path, side.cloud.positions, unit=side.unit.value, remedy=f"say so: {flag}")
+
+
+def _other_unit(side: _ReadCloud) -> str | None:
+    """Return the unit that a file is likelier in, None where its own is none to doubt."""
+    from pomona.cloud.files import doubt_of_places, likely_unit
+
+    doubt = doubt_of_places(side.cloud.positions) if side.is_doubted else None
+    return likely_unit(side.cloud.positions, side.unit.value) if doubt is not None and doubt.is_of_unit else None
 
 
 def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
+from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,31 @@ from pomona.errors import PomonaError, PomonaWarning
 if TYPE_CHECKING:
     from pomona.cloud.fruit_cloud import FruitCloud
 
-__all__ = ["PLAUSIBLE_DIAMETER_M", "check_places", "read_cloud", "write_cloud"]
+__all__ = [
+    "PLAUSIBLE_DIAMETER_M",
+    "check_places",
+    "doubt_of_places",
+    "likely_unit",
+    "look_at",
+    "read_cloud",
+    "vouch_for",
+    "write_cloud",
+]
 
 MIN_SPACING_M = 0.005
 """Centres of two fruits cannot be nearer than a fruit is wide, and the smallest berries are 5 mm wide."""
 
 MAX_SPACING_M = 5.0
 """A fruit has a neighbour on its tree, and trees are under 5 m; fruits 6 cm apart are 60 away in mm, 6 in cm."""
+
+USUAL_SPACING_M = 0.06
+"""The unit by which fruits are nearest to so far apart is the likeliest."""
+
+FEWEST_STEPS = 6
+"""Fruits that hang on wires have fewer heights."""
+
+COARSE = 0.5
+"""A coordinate in steps of more than this part of the spacing says little of which fruit is which."""
 
 FARTHEST_FRUIT_M = 10_000.0
 """From the middle of a visit: nobody films a longer row in one go, and one slip of a digit hides all else."""
@@ -34,12 +53,23 @@ PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
 MIN_FRUITS = 5
 """Fewer have no median to speak of."""
 
+NAMED: dict[Unit, str] = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
+
+_looked_at: WeakSet[FruitCloud] = WeakSet()
+"""Clouds whose places have been looked at: once is enough."""
+
+STEPS_SAMPLE = 20_000
+"""Fruits whose coordinates are asked for steps."""
+
 SPACING_SAMPLE = 1000
 """Fruits asked for their neighbour: the median of 1000 is known to 2 % of rank, whatever the size of the cloud."""
 
 
-def read_cloud(path: Path, unit: Unit, make: type[FruitCloud]) -> FruitCloud:
-    """Read `path` by its suffix; see `FruitCloud.read`, which says what to make of it."""
+def read_cloud(path: Path, unit: Unit, make: type[FruitCloud], *, is_checked: bool = True) -> FruitCloud:
+    """Read `path` by its suffix; see `FruitCloud.read`, which says what to make of it.
+
+    With `is_checked` places that cannot be those of fruits draw a warning.
+    """
     if unit not in get_args(Unit):
         raise PomonaError(f"unit: found {unit!r}, expected one of {', '.join(get_args(Unit))}")
     suffix = path.suffix.lower()
@@ -51,8 +81,9 @@ def read_cloud(path: Path, unit: Unit, make: type[FruitCloud]) -> FruitCloud:
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv, .ply or .gpkg")
     cloud = csv_file.read(path, make) if suffix == ".csv" else ply_file.read(path, make)
     cloud = _in_metres(cloud, METRES_PER_UNIT[unit])
-    if unit != "free":
-        check_places(path, cloud.positions)
+    if unit != "free" and is_checked:
+        check_places(path, cloud.positions, unit=unit)
+        vouch_for(cloud)
     return cloud
 
 
@@ -69,31 +100,90 @@ def write_cloud(path: Path, cloud: FruitCloud) -> None:
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv or .ply")
 
 
-def check_places(
-    name: str | Path,
-    positions: NDArray[np.float64],
-    *,
-    remedy: str = "say so: --unit mm, or FruitCloud.read(path, unit='mm')",
-) -> None:
-    """Warn when places, (N, 3) metres, cannot be those of fruits: by their neighbours, or one far from all others."""
+@dataclass(frozen=True)
+class PlacesDoubt:
+    """Why places cannot be those of fruits, and whether another unit would mend it."""
+
+    found: str
+    is_of_unit: bool
+
+
+def doubt_of_places(positions: NDArray[np.float64]) -> PlacesDoubt | None:
+    """Say why places, (N, 3) metres, cannot be those of fruits, None where they can.
+
+    By the distance of neighbours, by one far from all others, or by steps of the numbers that are as coarse as fruits
+    are apart, as those of UTM in 32 bits.
+    """
     if len(positions) < MIN_FRUITS:
-        return
+        return None
     spacing_m = _spacing_m(positions)
     reach_m = np.hypot.reduce(positions - np.median(positions, axis=0), axis=1)  # squares may overflow
     if not MIN_SPACING_M <= spacing_m <= MAX_SPACING_M:
-        warnings.warn(
-            f"{name}: neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to "
-            f"{MAX_SPACING_M:g} m; if it is not in metres {remedy}",
-            PomonaWarning,
-            stacklevel=4,
-        )
-    elif reach_m.max() > FARTHEST_FRUIT_M:
-        warnings.warn(
-            f"{name}: row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at "
-            f"most {FARTHEST_FRUIT_M:g} m",
-            PomonaWarning,
-            stacklevel=4,
-        )
+        found = f"neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to"
+        return PlacesDoubt(f"{found} {MAX_SPACING_M:g} m", is_of_unit=True)
+    if reach_m.max() > FARTHEST_FRUIT_M:
+        found = f"row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at"
+        return PlacesDoubt(f"{found} most {FARTHEST_FRUIT_M:g} m", is_of_unit=False)
+    for axis, values in zip("xyz", positions[:: -(-len(positions) // STEPS_SAMPLE)].T, strict=True):
+        if (step_m := _step_m(values)) > COARSE * spacing_m:
+            found = f"{axis} goes in steps of {step_m:.3g} m, where neighbouring fruits are {spacing_m:.3g} m apart"
+            found += " (median), expected finer ones: numbers as large as those of UTM lose their ends in 32 bits"
+            return PlacesDoubt(found, is_of_unit=False)
+    return None
+
+
+def check_places(name: str | Path, positions: NDArray[np.float64], *, unit: Unit = "m", remedy: str = "") -> None:
+    """Warn when places, (N, 3) metres, cannot be those of fruits, see `doubt_of_places`.
+
+    Parameters
+    ----------
+    name : str or Path
+    positions : (N, 3) float64
+    unit : {"m", "cm", "mm"}
+        That they were in.
+    remedy : str
+        What to do where it is another unit; else how to read a file in the likeliest one.
+    """
+    if (doubt := doubt_of_places(positions)) is None:
+        return
+    text = f"{name}: {doubt.found}"
+    if doubt.is_of_unit:
+        likely = likely_unit(positions, unit)
+        remedy = remedy or f"say so: --unit {likely}, or FruitCloud.read(path, unit='{likely}')"
+        text += f"; if it is not in {NAMED[unit]} {remedy}"
+    warnings.warn(text, PomonaWarning, stacklevel=4)
+
+
+def likely_unit(positions: NDArray[np.float64], unit: Unit) -> Unit:
+    """Return the other unit in which places, (N, 3) metres if read in `unit`, are likeliest those of fruits."""
+    spacing = max(_spacing_m(positions), np.finfo(float).tiny) / METRES_PER_UNIT[unit]
+
+    def off(other: Unit) -> float:
+        return abs(float(np.log(spacing * METRES_PER_UNIT[other] / USUAL_SPACING_M)))
+
+    return min((other for other in NAMED if other != unit), key=off)
+
+
+def look_at(name: str, cloud: FruitCloud, remedy: str) -> None:
+    """Check the places of a cloud, unless that was done before, as it is when a file is read."""
+    if cloud not in _looked_at:
+        vouch_for(cloud)
+        check_places(name, cloud.positions, remedy=remedy)
+
+
+def vouch_for(*clouds: FruitCloud) -> None:
+    """Let `look_at` pass clouds, for their places have been looked at or made here."""
+    _looked_at.update(clouds)
+
+
+def _step_m(values: NDArray[np.float64]) -> float:
+    """Return the smallest step between numbers of which many are the same, 0 where they are not."""
+    distinct = np.unique(values)
+    if not 2 <= len(distinct) <= len(values) / 2:
+        return 0.0
+    step_m = float(np.diff(distinct).min())
+    is_of_32_bits = np.spacing(np.float32(np.abs(distinct).max())) > 0.5 * step_m
+    return step_m if is_of_32_bits or len(distinct) >= FEWEST_STEPS else 0.0
 
 
 def _spacing_m(positions: NDArray[np.float64]) -> float:

@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from pomona.cloud.files import check_places
+from pomona.cloud.files import look_at
 from pomona.cloud.fruit_cloud import FruitCloud
 from pomona.cloud.units import Unit
 from pomona.errors import PomonaError
@@ -64,5 +64,5 @@ def is_array(cloud: Cloud) -> bool:
 
 
 def doubt_metres(name: str, cloud: FruitCloud) -> None:
-    """Warn where the places of a cloud cannot be metres."""
-    check_places(name, cloud.positions, remedy="multiply it, or give scale='free' where its unit is unknown")
+    """Warn where the places of a cloud cannot be metres, once for each."""
+    look_at(name, cloud, remedy="multiply it, or give scale='free' where its unit is unknown")
