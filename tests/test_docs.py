@@ -48,17 +48,16 @@ def run_shell(example: Example, folder: Path) -> None:
 
 @page_parameter
 def test_examples_run(page: Path, tmp_path: Path) -> None:
-    """The examples of a page run from top to bottom in one folder; the Python ones share their names."""
+    """The examples of a page run from top to bottom in one folder; each Python one stands alone, as readers copy it."""
     examples = [example for example in examples_of(page) if example.language in ("sh", "python")]
     if not examples:
         pytest.skip("no examples on this page")
-    names: dict[str, object] = {}
     with contextlib.chdir(tmp_path):
         for example in examples:
             if example.language == "sh":
                 run_shell(example, tmp_path)
             else:
-                exec(compile("\n" * (example.line - 1) + example.code, page, "exec"), names)
+                exec(compile("\n" * (example.line - 1) + example.code, page, "exec"), {})
 
 
 @page_parameter
