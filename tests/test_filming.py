@@ -90,6 +90,11 @@ def test_a_video_of_other_settings_is_refused(recording):
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "seed: found 0, expected 5: remove the folder or take another" in done.stderr
+    for flags, named in (
+        (("--system", "wall"), "design.system: found 'spindle', expected 'wall': remove"),
+        (("--shutter-ms", 3), "eyes[0].shutter_s: found 0.002, expected 0.003: remove"),
+    ):
+        assert named in pomona("synth", "video", "-o", recording, *SMALL, *flags).stderr
     assert content(recording) == before
 
 

@@ -45,8 +45,22 @@ def _require_same(note: Path, ours: str) -> None:
     found, expected = parsed_json(str(note), theirs, ABOUT), json.loads(ours)
     if not isinstance(found, dict):
         raise PomonaError(f"{note}: found {shown(found)}, expected what we keep: remove the folder or take another")
-    odd = next((name for name in sorted(found.keys() | expected) if found.get(name) != expected.get(name)), None)
+    odd = _first_difference(found, expected)
     if odd is not None:
-        there, wanted = shown(found.get(odd)), shown(expected.get(odd))
-        name = odd if odd in expected else shown(odd)  # theirs may be of any length
+        name, there, wanted = odd
         raise PomonaError(f"{note}: {name}: found {there}, expected {wanted}: remove the folder or take another")
+
+
+def _first_difference(found: Any, expected: Any, name: str = "") -> tuple[str, str, str] | None:
+    """Name the innermost value that differs, and show it in both; tables and lists of one length are looked into."""
+    if found == expected:
+        return None
+    if isinstance(found, dict) and isinstance(expected, dict):
+        # Names that only they have may be of any length.
+        names = {key: key if key in expected else shown(key) for key in sorted(found.keys() | expected)}
+        parts = [(found.get(key), expected.get(key), f"{name}.{told}" if name else told) for key, told in names.items()]
+    elif isinstance(found, list) and isinstance(expected, list) and len(found) == len(expected):
+        parts = [(one, other, f"{name}[{row}]") for row, (one, other) in enumerate(zip(found, expected, strict=True))]
+    else:
+        return name, shown(found), shown(expected)
+    return next(odd for part in parts if (odd := _first_difference(*part)) is not None)
