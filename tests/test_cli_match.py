@@ -374,6 +374,15 @@ def test_an_ambiguous_answer_names_all_its_transforms(run_here: Run, tmp_path: P
     assert done.stdout.count("translation") >= 2
 
 
+def test_frame_by_frame_is_of_the_paper_alone(run_here: Run, visits: Path, tmp_path: Path) -> None:
+    clouds = visits / "query.csv", visits / "map.csv"
+    line = "--per-frame: found it with the method verified, expected it with --method paper alone"
+    assert_refused(run_here("match", *clouds, "--per-frame"), line)
+    (tmp_path / "set.toml").write_text("[match]\nper_frame = true\n")
+    assert_refused(run_here("config", "--config", tmp_path / "set.toml"), "set.toml: match.per_frame: found it with")
+    assert run_here("config", "--config", tmp_path / "set.toml", "--method", "paper").returncode == 0
+
+
 def test_frame_by_frame_needs_to_know_who_saw_what(run_here: Run, visits: Path, tmp_path: Path) -> None:
     flags = ("--method", "paper", "--per-frame")
     assert_refused(run_here("match", visits / "query.csv", visits / "map.csv", *flags), "per_frame", "frame")

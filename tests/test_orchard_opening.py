@@ -250,3 +250,13 @@ def waits_and_says_so(path: Path, lock: str, *verb: object) -> str:
     stdout, stderr = waiting.communicate()
     assert (waiting.returncode, stderr) == (0, "")
     return stdout
+
+
+def test_a_path_that_no_database_has_is_told(orchard: Path, tmp_path: Path) -> None:
+    folder = tmp_path.joinpath(*["f" * 200] * 3)
+    folder.mkdir(parents=True)
+    deep = folder / "orchard.gpkg"
+    deep.write_bytes(orchard.read_bytes())
+    line = f"cannot be opened: its whole path has {len(str(deep))} bytes, expected at most 504 of a database"
+    with pytest.raises(PomonaError, match=line):
+        OrchardMap(deep)

@@ -204,6 +204,7 @@ def test_two_names_of_one_file_are_one_output(pomona: Pomona, here: Path) -> Non
     ("command", "reason"),
     [
         ("match query.csv map.csv -o missing/pairs.csv", "the folder missing is not there"),
+        ("match query.csv map.csv -o dangling.csv", "nowhere/x.csv, and the folder "),
         ("match query.csv map.csv -o R", "R: is a folder"),
         ("scan R -o fruits.csv --keep query.csv", "query.csv: is a file"),
         ("match query.csv map.csv --plot -", "-: found no suffix, expected a picture"),
@@ -211,6 +212,7 @@ def test_two_names_of_one_file_are_one_output(pomona: Pomona, here: Path) -> Non
     ],
 )
 def test_where_nothing_can_be_written_is_told_first(pomona: Pomona, here: Path, command: str, reason: str) -> None:
+    (here / "dangling.csv").symlink_to("nowhere/x.csv")
     refused(pomona, here, command, reason)
 
 

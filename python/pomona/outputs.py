@@ -145,7 +145,8 @@ def _require_place(output: Output) -> None:
     elif path.is_dir():
         raise PomonaError(f"{path}: is a folder, expected a file to write")
     elif not _real(path).parent.is_dir():
-        raise PomonaError(f"{path}: the folder {path.parent} is not there")
+        link = f"is a link to {_real(path)}, and " if path.is_symlink() else ""
+        raise PomonaError(f"{path}: {link}the folder {_real(path).parent if link else path.parent} is not there")
     elif not os.access(_real(path).parent, os.W_OK | os.X_OK):
         raise PomonaError(f"{path}: cannot be written: the folder {path.parent} is read-only")
 

@@ -56,7 +56,7 @@ class Settings:
         ------
         PomonaError
             The file is missing, is no TOML, or names a setting that does not exist; a value is of another kind than it
-            should be.
+            should be, or two contradict each other.
         """
         from pomona.matching import default_config
 
@@ -72,7 +72,13 @@ class Settings:
         for name in ("threads", "noise_m"):
             if name in given:
                 _checked(f"--{name.removesuffix('_m')}", name, given[name])
-        return cls(call={**call, **from_file, **given}, overrides=tables)
+        call = {**call, **from_file, **given}
+        if call["per_frame"] and call["method"] != "paper":
+            place = "--per-frame" if "per_frame" in given else f"{path}: {_CALL_TABLE}.per_frame"
+            raise PomonaError(
+                f"{place}: found it with the method {call['method']}, expected it with --method paper alone"
+            )
+        return cls(call=call, overrides=tables)
 
     def match(self, query: FruitCloud, map: FruitCloud) -> Match:
         """Run `pomona.match` with these settings, on clouds that were looked at where they come from."""

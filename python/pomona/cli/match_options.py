@@ -53,7 +53,9 @@ up_option = typer.Option(
 )
 config_option = typer.Option(None, help="Settings as TOML; `pomona config` prints them all.")
 per_frame_option = typer.Option(
-    None, "--per-frame/--whole", help="One transform for each frame of the query, pairs merged; or one for the cloud."
+    None,
+    "--per-frame/--whole",
+    help="With --method paper: one transform for each frame of the query, pairs merged; or one for the cloud.",
 )
 threads_option = typer.Option(
     None, help="How many threads to use, at most one a core; the answer is the same for any number."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +11,9 @@ from pathlib import Path
 from pomona.errors import PomonaError
 
 __all__ = ["DAMAGED", "WrongContentError", "content", "told"]
+
+MOST_PATH = 504
+"""Bytes of a path with which SQLite opens a file: 512 with the name of its journal."""
 
 DAMAGED = "is damaged; restore it from a copy"
 
@@ -51,6 +55,8 @@ def told(path: Path) -> Iterator[None]:
     except sqlite3.Error as error:
         name = getattr(error, "sqlite_errorname", "") or ""
         reason = next((text for code, text in REASONS.items() if name.startswith(code)), None)
+        if name.startswith("SQLITE_CANTOPEN") and (length := len(os.fsencode(path.resolve()))) > MOST_PATH:
+            reason = f"cannot be opened: its whole path has {length} bytes, expected at most {MOST_PATH} of a database"
         if reason is None:
             raise
         raise PomonaError(f"{path}: {reason.format(name=name, error=error)}") from None
