@@ -173,7 +173,7 @@ def test_the_suffix_says_the_format_and_must_not_contradict(pomona: Pomona, sess
         (
             "a.dxf",
             [],
-            "expected .csv, .ply, .geojson, .json, .shp, .parquet, .mcap, .tum, .kitti, or --to FORMAT",
+            "expected --to FORMAT, or one of .csv, .ply, .geojson, .json, .shp, .parquet, .mcap, .tum, .kitti",
         ),
         ("a.txt", ["--to", "shp"], "a Shapefile is five files, expected a name that ends in .shp"),
     ):

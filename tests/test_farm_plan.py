@@ -144,11 +144,11 @@ def test_steps_come_behind_those_they_need_and_name_what_they_read(tmp_path):
     touch(tmp_path, "rec/a/2024-08-09.mp4", "rec/a/2024-08-28.mp4", "rec/a/2024-08-28.csv", "rec/a/calibration.json")
     touch(tmp_path, "rec/b/2024-08-09.mp4", "my.onnx")
     scan = '[scan]\nmodel = "my.onnx"\nevery = 2\nodometry = true\ncrops = false\ndetections = "{beside}/{date}.csv"\n'
-    plan = read_plan(plan_of(tmp_path, SIMPLE + scan + '[growth]\n[export]\nto = ["csv", "ply"]\n'), FLAGS)
+    plan = read_plan(plan_of(tmp_path, SIMPLE + scan + '[growth]\n[export]\nto = ["csv", "mcap"]\n'), FLAGS)
     steps = {step.name: step for step in steps_of(plan)}
     assert list(steps) == [
-        "scan a/2024-08-09", "scan a/2024-08-28", "map a", "growth a", "export a csv", "export a ply",
-        "scan b/2024-08-09", "map b", "export b csv", "export b ply",
+        "scan a/2024-08-09", "scan a/2024-08-28", "map a", "growth a", "export a csv", "export a mcap",
+        "scan b/2024-08-09", "map b", "export b csv", "export b mcap",
     ]  # fmt: skip
     first, second = steps["scan a/2024-08-09"], steps["scan a/2024-08-28"]
     assert {path.name for path in first.inputs} == {"2024-08-09.mp4", "calibration.json", "my.onnx"}

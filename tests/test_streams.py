@@ -36,7 +36,7 @@ def test_what_the_standard_output_goes_to_is_not_cut(here: Path) -> None:
     assert (first, last, len(rows)) == ("before", "after", 386)
 
 
-@pytest.mark.parametrize("command", ["match query.csv map.csv -o", "scan R -o", "export map.csv --to csv -o"])
+@pytest.mark.parametrize("command", ["match query.csv map.csv -o", "scan R -o", "export map.csv -o"])
 def test_a_pipe_is_written_into(here: Path, command: str) -> None:
     done = run(here, f"mkfifo pipe; cat pipe & pomona {command} pipe >&2; code=$?; wait; exit $code")
     assert done.returncode == 0, done.stderr
@@ -54,6 +54,14 @@ def test_a_scan_to_a_stream_is_a_table_or_what_the_name_says(here: Path) -> None
     assert done.returncode == 0, done.stderr
     assert (here / "a.csv").read_bytes() == (here / "b.csv").read_bytes()
     assert len(load_session(here / "c.gpkg", date="2024-08-01").cloud) == 3
+
+
+def test_an_export_to_a_stream_is_a_table_unless_a_format_is_said(here: Path) -> None:
+    done = run(here, "pomona export map.csv -o - > a.csv; pomona export map.csv -o b.csv; pomona export map.csv -o c")
+    assert (here / "a.csv").read_bytes() == (here / "b.csv").read_bytes()
+    refusal = "pomona: c: found no suffix, expected --to FORMAT, or one of .csv, .ply, .geojson, .json, "
+    assert done.stderr.splitlines()[-1].startswith(refusal)
+    assert run(here, "pomona export map.csv --to ply -o - | head -1").stdout == "ply\n"
 
 
 def test_a_device_is_written_into(here: Path) -> None:

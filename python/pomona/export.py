@@ -17,6 +17,7 @@ from pomona.errors import PomonaError
 from pomona.geopackage import LOCAL_METRES
 from pomona.geoparquet import write_geoparquet
 from pomona.shapefile import WGS84_TEXT, write_shapefile
+from pomona.streams import is_stream
 
 if TYPE_CHECKING:
     from pomona.earth import Anchor
@@ -190,12 +191,13 @@ def format_of(path: Path, to: ExportFormat | None) -> ExportFormat:
     Raises
     ------
     PomonaError
-        When neither tells, or they contradict each other.
+        When neither tells, or they contradict each other. A stream without a suffix gets CSV.
     """
     named = SUFFIXES.get(path.suffix.lower())
     if to is not None and named not in (to, None):
         raise PomonaError(f"{path}: found suffix {path.suffix!r} and --to {to}, expected the same or one of them")
-    told = to or named
+    told = to or named or ("csv" if not path.suffix and is_stream(path) else None)
     if told is None:
-        raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected {', '.join(SUFFIXES)}, or --to FORMAT")
+        found = f"suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise PomonaError(f"{path}: found {found}, expected --to FORMAT, or one of {', '.join(SUFFIXES)}")
     return told

@@ -67,7 +67,10 @@ def export(
         metavar="SESSION_OR_MAP", help="A session or a map (.gpkg), or a cloud (.csv, .ply)."
     ),
     output: Annotated[Path, Writes(_like, also=_parts)] = typer.Option(
-        ..., "-o", "--output", help="The file to write; - is the standard output."
+        ...,
+        "-o",
+        "--output",
+        help="The file to write; - is the standard output, and gets CSV unless --to says otherwise.",
     ),
     to: Format | None = typer.Option(
         None,

@@ -28,7 +28,7 @@ PLACES = ("{row}", "{date}", "{beside}")
 NAMED = ("shipped",)
 """What a flag may name besides files: the detector that is inside."""
 
-FORMATS = ("csv", "geojson", "parquet", "parquet-by-date", "ply", "shp")
+FORMATS = ("csv", "geojson", "mcap", "parquet", "parquet-by-date", "ply", "shp")
 
 
 @dataclass(frozen=True)
