@@ -17,6 +17,7 @@ from benchmarks.page_draw import drawn_document
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from page_maker import chromium, opened, served
 from pomona import geopackage
+from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap
 from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.season_page import Wishes
@@ -177,6 +178,21 @@ def test_the_table_filters_sorts_and_is_saved(page: Any, row: GrownRow, tmp_path
     for line in lines:
         found = [float(line[axis]) for axis in "xyz"]
         assert found == pytest.approx(place_of[line["fruit_id"]].tolist(), abs=0.002)
+
+
+def test_what_is_saved_is_what_the_verbs_say(page: Any, row: GrownRow, tmp_path: Path) -> None:
+    """To the step in which it is told, tenths of a millimetre: nothing is moved by where a column begins."""
+    growth = grow_season(row.path, harvest=date(2024, 9, 1))
+    row_of = {str(fruit): number for number, fruit in enumerate(growth.fruits.ids.tolist())}
+    page.get_by_role("tab", name="Fruits").click()
+    lines = saved(page, tmp_path)
+    assert len(lines) == N
+    for line in lines:
+        sizes_mm = growth.foretold.sizes_mm[row_of[line["fruit_id"]]]
+        assert float(line["forecast_mm"]) == round(float(sizes_mm[-1]), 1)
+        assert float(line["diameter_mm"]) == round(float(sizes_mm[-2]), 1)
+        assert 0.0 <= float(line["state_probability"]) <= 1.0
+        assert all(len(line[axis].partition(".")[2]) <= 3 for axis in "xyz")
 
 
 def saved(page: Any, folder: Path, name: str = "orchard-fruits.csv") -> list[dict[str, str]]:

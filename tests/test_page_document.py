@@ -20,7 +20,7 @@ def unpacked(column: dict) -> np.ndarray:
     planes = np.frombuffer(zlib.decompress(base64.b64decode(column["bytes"])), np.uint8).reshape(4, column["n"])
     folded = planes.T.copy().view("<u4").ravel().astype(np.int64)
     codes = np.cumsum(np.where(folded % 2, -(folded + 1) // 2, folded // 2))
-    return np.where(codes == 0, np.nan, column["low"] + (codes - 1) * column["step"])
+    return np.where(codes == 0, np.nan, (column["low"] + codes - 1) * column["step"])
 
 
 def texts(column: str) -> list[str]:
@@ -34,13 +34,21 @@ def row(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     "values",
-    [[], [np.nan], [3.0], [1.0, np.nan, -2.5, 4.0], [1e12, -1e12, 0.0], np.arange(70_000) / 10.0],
+    [[], [np.nan], [3.0], [1.0, np.nan, -2.5, 4.0], [1e12, -1e12, 0.0], [1e300], np.arange(70_000) / 10.0],
 )
 def test_columns_come_back_to_the_nearest_step(values: list[float]) -> None:
     column = packed(values, 0.1)
     found = unpacked(column)
     np.testing.assert_array_equal(np.isnan(found), np.isnan(values))
     np.testing.assert_allclose(found, values, atol=0.51 * column["step"])
+
+
+def test_columns_are_told_in_multiples_of_their_step() -> None:
+    """Whatever the least of them is: no probability is above 1, and all sizes are tenths."""
+    shares = unpacked(packed([0.0004, 0.5, 0.8996, 0.9996, 1.0], 0.001))
+    assert shares.tolist() == [0.0, 0.5, 0.9, 1.0, 1.0]
+    sizes = np.random.default_rng(0).normal(70.0, 8.0, 200)
+    np.testing.assert_array_equal(np.round(unpacked(packed(sizes, 0.1)), 9), np.round(sizes, 1))
 
 
 def test_all_fruits_are_told_where_the_map_has_them(row: Path) -> None:

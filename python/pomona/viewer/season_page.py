@@ -28,7 +28,7 @@ __all__ = ["Wishes", "season_document"]
 
 CropsTold = Callable[[Path, FruitsTold], dict[str, Any] | None]
 
-FORMAT = 1
+FORMAT = 2
 """Of the document; the page says so when it is another."""
 
 

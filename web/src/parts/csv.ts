@@ -28,15 +28,16 @@ export function csvOf(page: Page): string {
 }
 
 function cell(value: number | string): string {
+  // Steps of tenths and thousandths, without what binary fractions add to them.
   if (typeof value === "number") return Number.isNaN(value) ? "" : String(Math.round(1e4 * value) / 1e4);
   // A spreadsheet would run what begins like a formula, and names come from strangers.
   const text = /^[=+\-@\t\r]/.test(value) ? `'${value}` : value;
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** Where it was last seen, in the map's own frame. */
+/** Where it was last seen, in the map's own frame, to the millimetre: places are told in those. */
 function placeInMap({ sights, mapFromPage }: Season, fruit: number): number[] {
   const row = sights.starts[fruit + 1] - 1;
   const place = [sights.x[row], sights.y[row], sights.z[row], 1];
-  return mapFromPage.slice(0, 3).map((axis) => axis.reduce((sum, value, i) => sum + value * place[i], 0));
+  return mapFromPage.slice(0, 3).map((axis) => Math.round(1e3 * axis.reduce((sum, value, i) => sum + value * place[i], 0)) / 1e3);
 }

@@ -1,6 +1,7 @@
 /** Columns as `pomona/viewer/packed_columns.py` packs them. */
 export interface Packed {
   readonly n: number;
+  /** In whole steps. */
   readonly low: number;
   readonly step: number;
   readonly bytes: string;
@@ -14,7 +15,7 @@ export async function unpacked(column: Packed): Promise<Float64Array> {
   for (let i = 0; i < n; i++) {
     const folded = (planes[i] | (planes[n + i] << 8) | (planes[2 * n + i] << 16) | (planes[3 * n + i] << 24)) >>> 0;
     code += folded % 2 ? -(folded + 1) / 2 : folded / 2;
-    values[i] = code === 0 ? NaN : low + (code - 1) * step;
+    values[i] = code === 0 ? NaN : (low + code - 1) * step;
   }
   return values;
 }

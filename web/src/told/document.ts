@@ -1,7 +1,7 @@
 /** The document as it comes: `pomona/viewer/season_page.py` writes it. */
 import type { Packed } from "./columns";
 
-export const FORMAT = 1;
+export const FORMAT = 2;
 
 export interface Told {
   readonly format: number;
