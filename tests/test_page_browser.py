@@ -11,14 +11,15 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from benchmarks.page_draw import drawn_document
 
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from page_maker import chromium, opened, served
-from pomona import geopackage
+from pomona import FruitCloud, geopackage
 from pomona.growth.season_growth import grow_season
-from pomona.orchard import OrchardMap
+from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.season_page import Wishes
 from pomona.viewer.season_report import write_report
@@ -242,6 +243,28 @@ def test_two_dates_and_calipers_are_told(page: Any) -> None:
     page.get_by_role("tab", name="Calipers").click()
     assert page.locator("#panel-calipers circle").count() == 4 * N
     assert page.locator("#panel-calipers tbody tr").first.inner_text().split()[1] == str(4 * N)
+
+
+def test_two_dates_begin_with_visits_to_the_same_row(browser: Any, tmp_path: Path) -> None:
+    """Two rows, both recorded on two days: the two last visits of the map are to different rows."""
+    rng = np.random.default_rng(3)
+    rows = {
+        name: rng.uniform((0, 6 * k, 0), (8, 6 * k + 0.5, 2), (60 + k, 3)) for k, name in enumerate(("east", "west"))
+    }
+    path = tmp_path / "rows.gpkg"
+    for day in ("2024-08-01", "2024-09-01"):
+        for name, places in rows.items():
+            cloud = FruitCloud(places + rng.normal(0, 0.003, places.shape))
+            assert add_session(path, Session(f"{name} {day[5:7]}", day, "drawn", cloud), new_part=True).is_added
+    write_report(path, tmp_path / "report.html", Wishes())
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        page.get_by_role("tab", name="Two dates").click()
+        wait_for(
+            page.locator("#panel-dates [role=status]"), "61 fruits on both dates; 0 fruits on 1 Aug 2024, west 08 only"
+        )
+        options = page.get_by_label("Date above").locator("option").all_inner_texts()
+        assert options == [f"1 Aug 2024, {row} 08" for row in rows] + [f"1 Sept 2024, {row} 09" for row in rows]
+        assert [page.get_by_label(f"Date {one}").input_value() for one in ("above", "below")] == ["1", "3"]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

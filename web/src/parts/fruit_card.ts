@@ -91,7 +91,7 @@ function sightsTable({ season, history }: Page, fruit: number): HTMLElement {
   for (let row = sights.starts[fruit]; row < sights.starts[fruit + 1]; row++) rowOf.set(sights.visit[row], row);
   const lines = visits.map((visit, v) => {
     const row = rowOf.get(v);
-    const date = element("th", { scope: "row" }, day(visit.time));
+    const date = element("th", { scope: "row", title: visit.title }, day(visit.time));
     if (row === undefined) {
       const why = v < history.first[fruit] ? "not seen yet" : "not seen";
       return element("tr", { class: "soft" }, date, element("td", {}, ""), element("td", {}, "–"), element("td", {}, why));

@@ -12,9 +12,13 @@ import { Stage } from "../scene/stage";
 import type { Ink, Stroke } from "../scene/strokes";
 import { Signal, watchAll } from "../signal";
 import { inkRgb, repaint } from "../theme";
-import { fruits, fullDay, number } from "../words";
+import type { Season } from "../told/season";
+import { fruits, number } from "../words";
 
 const GAP_M = 0.5;
+/** Of the fruits of a visit: where less were seen before, that was another row. */
+const FEW = 0.1;
+const DAY_MS = 86_400_000;
 const BOTH: Rgb = [0, 158, 115];
 const FIRST_ONLY: Rgb = [230, 159, 0];
 const SECOND_ONLY: Rgb = [86, 180, 233];
@@ -31,8 +35,8 @@ interface Dates {
 export function twoDates(page: Page): HTMLElement {
   const { history, season } = page;
   if (history.times.length < 2) return element("p", { class: "notice" }, "Two dates need a second visit.");
-  const last = history.times.length - 1;
-  const dates: Dates = { first: new Signal(last - 1), second: new Signal(last) };
+  const [first, second] = latestPair(page);
+  const dates: Dates = { first: new Signal(first), second: new Signal(second) };
   const said = element("p", { class: "soft below", role: "status" });
   const head = element("div", { class: "row-tools" }, pick(page, "above", dates.first), pick(page, "below", dates.second), key());
   const holder = element("div", { class: "row-view tall" });
@@ -67,8 +71,37 @@ export function twoDates(page: Page): HTMLElement {
   return root;
 }
 
+/** The two latest visits that saw the same fruits, of different days where there are such: visits to other rows share few or none. */
+function latestPair({ season, history }: Page): [number, number] {
+  const days = history.times.map((time) => Math.floor(time / DAY_MS));
+  const last = days.length - 1;
+  const isEarlier = (a: number, b: number): boolean => days[a] < days[b];
+  const isBefore = (a: number, b: number): boolean => a < b;
+  for (const [share, isWanted] of [[FEW, isEarlier], [0, isEarlier], [0, isBefore]] as const) {
+    for (let b = last; b > 0; b--) {
+      const shared = sharedWith(season, b);
+      const enough = shared.map((n, a) => (isWanted(a, b) && n > share * shared[b] ? n : 0));
+      const latest = days[enough.findLastIndex((n) => n > 0)];
+      // Of several on that day the one that saw most of them.
+      const ofThatDay = enough.map((n, a) => (days[a] === latest ? n : 0));
+      if (latest !== undefined) return [ofThatDay.indexOf(Math.max(...ofThatDay)), b];
+    }
+  }
+  return [last - 1, last];
+}
+
+/** How many of the fruits of a visit each visit saw. */
+function sharedWith({ sights, visits, n }: Season, visit: number): number[] {
+  const counts = visits.map(() => 0);
+  for (let fruit = 0; fruit < n; fruit++) {
+    const seen = sights.visit.subarray(sights.starts[fruit], sights.starts[fruit + 1]);
+    if (seen.includes(visit)) for (const v of seen) counts[v]++;
+  }
+  return counts;
+}
+
 function pick({ season }: Page, where: string, chosen: Signal<number>): HTMLElement {
-  const options = season.visits.map((visit, v) => element("option", { value: v }, fullDay(visit.time)));
+  const options = season.visits.map((visit, v) => element("option", { value: v }, visit.title));
   const select = element("select", { "aria-label": `Date ${where}`, change: () => chosen.set(Number(select.value)) }, ...options);
   chosen.watch((v) => (select.value = String(v)));
   return element("span", { class: "date" }, element("span", { class: "label", "aria-hidden": "true" }, where), select);
@@ -154,8 +187,8 @@ function sureOf(page: Page, fruit: number, visit: number): number {
   return Number.isNaN(sure) ? 1 : sure;
 }
 
-function summary({ history }: Page, { first, second }: Dates, counts: Counts): string {
-  const [a, b] = [fullDay(history.times[first.value]), fullDay(history.times[second.value])];
+function summary({ season }: Page, { first, second }: Dates, counts: Counts): string {
+  const [a, b] = [season.visits[first.value].title, season.visits[second.value].title];
   const grown = counts.measured > 0 ? `, where the mean of their measured diameters differs by ${number(counts.growthMm / counts.measured, 1)} mm` : "";
   return `${fruits(counts.both)} on both dates${grown}; ${fruits(counts.first)} on ${a} only, ${fruits(counts.second)} on ${b} only. Lines join the same fruit; red ones are less than 90 % sure.`;
 }

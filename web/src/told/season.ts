@@ -1,5 +1,5 @@
 /** The season in memory: columns of N fruits, K sights and Q days of curves. */
-import { timeOf } from "../words";
+import { fullDay, timeOf } from "../words";
 import { unpacked, unpackedTexts } from "./columns";
 import { cropsOf, type Crops } from "./crops";
 import { FORMAT, type Block, type Calipers, type SizeClass, type Told } from "./document";
@@ -10,6 +10,8 @@ export type State = (typeof STATES)[number];
 export interface Visit {
   readonly name: string;
   readonly time: number;
+  /** Its day; where several visits were on it, with the name. */
+  readonly title: string;
 }
 
 export interface Tree {
@@ -102,7 +104,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
   return {
     name: told.name,
     program: told.program,
-    visits: told.visits.map(({ name, date }) => ({ name, time: timeOf(date) })),
+    visits: visitsOf(told),
     trees: told.trees.map(({ name, row, middle }) => ({ name, row, label: name ? `Tree ${name}` : "No tree", middle })),
     mapFromPage: told.map_from_page,
     n: ids.length,
@@ -118,6 +120,12 @@ async function unpackedSeason(told: Told): Promise<Season> {
     calipers: told.calipers,
     crops: await cropsOf(told.crops, ids),
   };
+}
+
+function visitsOf({ visits }: Told): Visit[] {
+  const days = visits.map(({ date }) => fullDay(timeOf(date)));
+  const isAlone = (i: number): boolean => days.indexOf(days[i]) === days.lastIndexOf(days[i]);
+  return visits.map(({ name, date }, i) => ({ name, time: timeOf(date), title: isAlone(i) ? days[i] : `${days[i]}, ${name}` }));
 }
 
 async function sightsOf({ sights }: Told, n: number): Promise<Sights> {
