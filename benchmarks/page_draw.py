@@ -38,6 +38,7 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
         "program": "drawn",
         "name": f"{n} fruits",
         "visits": [{"name": str(day), "date": str(day), "n_fruits": n, "n_matched": n} for day in days],
+        "is_vertical_guessed": False,
         "map_from_page": np.eye(4).tolist(),
         "trees": [
             {"name": str(tree), "row": "", "middle": [TREE_M * tree, 0.0, 1.3]} for tree in range(trees.max() + 1)

@@ -117,6 +117,13 @@ def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, t
         assert f"{N - 5} of {N} fruits" in page.locator(".filter-bar").inner_text()
 
 
+def test_a_guessed_vertical_is_said(browser: Any, row: GrownRow, report: Path, tmp_path: Path) -> None:
+    write_report(row.path, tmp_path / "told.html", Wishes(up=np.array([0.0, 0.0, 1.0])))
+    for path, times in ((report, 1), (tmp_path / "told.html", 0)):
+        with opened(browser, path.as_uri()) as page:
+            assert page.locator("#panel-row").inner_text().count("Which way is up is guessed") == times
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_head_of_the_table_stands_over_its_columns(browser: Any, report: Path, width: int) -> None:
     with opened(browser, report.as_uri(), viewport={"width": width, "height": 700}) as page:

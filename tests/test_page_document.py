@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 
 from growth_maker import FRUITS_OF_TREE, grow_row
-from pomona.orchard import OrchardMap
+from pomona import FruitCloud
+from pomona.orchard import OrchardMap, Session, add_session
+from pomona.orchard.control_points import read_control_points
+from pomona.orchard.georeferencing import georeference
+from pomona.trajectory import Trajectory
 from pomona.viewer.packed_columns import packed
+from pomona.viewer.row_frame import guessed_vertical
 from pomona.viewer.season_page import Wishes, season_document
 
 
@@ -92,3 +97,50 @@ def test_a_map_of_one_visit_says_why_there_is_no_growth(tmp_path: Path) -> None:
 
 def test_the_same_map_is_told_the_same(row: Path) -> None:
     assert json.dumps(season_document(row, Wishes())) == json.dumps(season_document(row, Wishes()))
+
+
+def drive_along(path: Path, rows: list[np.ndarray]) -> Path:
+    """A map of rows in a camera's frame, y down, past which a camera drove."""
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    poses[:, 0, 3] = np.linspace(0, 6, 5)
+    way = Trajectory(np.arange(5), np.arange(5) * 0.5, poses)
+    add_session(path, Session("one", "2024-08-01", "drawn", FruitCloud(np.vstack(rows)), way))
+    return path
+
+
+def upwards(told: dict) -> np.ndarray:
+    """The page's z in the map."""
+    return np.array(told["map_from_page"])[:3, 2]
+
+
+def test_the_vertical_is_that_of_the_cameras_of_the_earth_or_given(tmp_path: Path) -> None:
+    places = np.random.default_rng(5).uniform((0, -1, 0), (6, 1, 5), (80, 3))
+    path = drive_along(tmp_path / "orchard.gpkg", [places])
+    told = season_document(path, Wishes())
+    np.testing.assert_allclose(upwards(told), [0, -1, 0], atol=1e-9)
+    assert not told["is_vertical_guessed"]
+    posts = np.array([[0.0, 0.2, 2.0], [6.0, 0.1, 2.0], [3.0, -0.8, 5.0]])
+    tilted = np.array([0.0, -1.0, 0.2]) / np.hypot(1.0, 0.2)
+    east, north = 500_000.0 + posts[:, 0], 5_277_000.0 + posts @ np.cross(tilted, [1, 0, 0])
+    lines = [
+        f"P{n},{','.join(map(str, row))}" for n, row in enumerate(np.column_stack([posts, east, north, posts @ tilted]))
+    ]
+    (tmp_path / "points.csv").write_text("name,x,y,z,easting,northing,height\n" + "\n".join(lines) + "\n")
+    georeference(path, read_control_points(tmp_path / "points.csv", 32632))
+    told = season_document(path, Wishes())
+    np.testing.assert_allclose(upwards(told), tilted, atol=0.01)
+    assert not told["is_vertical_guessed"]
+    told = season_document(path, Wishes(up=np.array([0.0, 0.0, 2.0])))
+    np.testing.assert_allclose(upwards(told), [0, 0, 1], atol=1e-9)
+    assert not told["is_vertical_guessed"]
+
+
+def test_without_cameras_the_vertical_is_guessed_row_by_row(row: Path) -> None:
+    told = season_document(row, Wishes())
+    assert told["is_vertical_guessed"]
+    assert upwards(told)[2] > 0.95
+    rng = np.random.default_rng(6)
+    rows = np.vstack([rng.uniform((0, 4.0 * k, 0), (12, 4.0 * k + 0.7, 2), (90, 3)) for k in range(5)])
+    cloud = FruitCloud(rows, extras={"row": tuple(str(k) for k in range(5) for _ in range(90))})
+    assert guessed_vertical(cloud)[2] > 0.95
+    assert guessed_vertical(FruitCloud(rows))[2] < 0.1, "an orchard of no rows is wider than high"

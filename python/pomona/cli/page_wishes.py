@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pomona.cli.terminal import tell
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -50,7 +52,10 @@ Target = Annotated[
 ]
 PackKg = Annotated[float, typer.Option(min=0.001, metavar="KG", help="Kilograms that a pack holds.")]
 Up = Annotated[
-    str | None, typer.Option(metavar="X,Y,Z", help="The vertical in the map; else its cameras or its shape tell it.")
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z", help="The vertical in the map; else its place on Earth, its cameras or a guess tell it."
+    ),
 ]
 
 
@@ -77,6 +82,14 @@ def page_wishes(
         pack_kg=pack_kg,
         up=None if up is None else _upwards(up),
     )
+
+
+def tell_guess(orchard: Path, wishes: Wishes) -> None:
+    """Say so where nobody has told the vertical."""
+    from pomona.viewer.row_frame import known_vertical
+
+    if wishes.up is None and known_vertical(orchard) is None:
+        tell(f"pomona: {orchard}: vertical guessed; give --up X,Y,Z")
 
 
 def _upwards(text: str) -> NDArray[np.float64]:

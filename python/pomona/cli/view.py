@@ -30,7 +30,7 @@ def view(
     Only this machine can look, and nothing is written; with --host all who have the address that is printed, with its
     token. When a visit is added the page shows it after a reload.
     """
-    from pomona.cli.page_wishes import page_wishes
+    from pomona.cli.page_wishes import page_wishes, tell_guess
     from pomona.cli.progress import working
     from pomona.viewer.page_server import listening, page_app, serve
     from pomona.viewer.token import token_for
@@ -41,6 +41,7 @@ def view(
         known = token_for(address, token)
         with working(f"telling {orchard}"):
             app = page_app(orchard, wishes, known)
+        tell_guess(orchard, wishes)
         place = f"http://{f'[{address}]' if ':' in address else address}:{number}/"
         say(place if known is None else f"{place}?token={known}")
         serve(app, taken)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.cloud import FruitCloud
+from pomona.orchard import OrchardMap
 from pomona.plot.projections import side_and_plan, view_from_above
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
 
-__all__ = ["page_from_map", "vertical_of"]
+__all__ = ["Vertical", "guessed_vertical", "known_vertical", "page_from_map"]
 
 Array = NDArray[np.float64]
 
@@ -19,18 +22,33 @@ ONE_UP = 0.9
 """Length of the mean of the cameras' own verticals from which they agree: they are within 25 degrees of each other."""
 
 
-def page_from_map(positions_in_map: Array, up: Array | None) -> Array:
-    """Give the rigid transform, (4, 4), that lays a map's fruits, (N, 3), along x, the lowest at z = 0.
+@dataclass(frozen=True, eq=False)
+class Vertical:
+    """Which way is up in a map.
 
-    Without a vertical the second extent of the row stands for it, upwards where z of the map is, or against y as
-    cameras have it.
+    Attributes
+    ----------
+    up : (3,) float64
+        In the map's frame, of length 1.
+    is_guess : bool
+        Whether nothing but the shape of the rows tells it.
     """
-    if up is None:
-        up = side_and_plan(positions_in_map)[0].axes[1]
-        if up[1] == up[np.argmax(np.abs(up))]:
-            up = -up
+
+    up: Array
+    is_guess: bool
+
+    @classmethod
+    def of(cls, path: Path, fruits: FruitCloud, up: Array | None = None) -> Vertical:
+        """Take what is given, else what the map knows, else what its fruits look like."""
+        known = known_vertical(path) if up is None else up
+        chosen = guessed_vertical(fruits) if known is None else known
+        return cls(np.asarray(chosen / np.linalg.norm(chosen)), known is None)
+
+
+def page_from_map(positions_in_map: Array, up: Array) -> Array:
+    """Give the rigid transform, (4, 4), that lays a map's fruits, (N, 3), along x, the lowest at z = 0."""
     along, across = view_from_above(positions_in_map, up).axes
-    rotation = np.stack([along, across, up / np.linalg.norm(up)])
+    rotation = np.stack([along, across, up])
     turned = positions_in_map @ rotation.T
     origin = np.zeros(3)
     if len(turned):
@@ -40,7 +58,27 @@ def page_from_map(positions_in_map: Array, up: Array | None) -> Array:
     return transform
 
 
-def vertical_of(path: Path) -> Array | None:
+def guessed_vertical(fruits: FruitCloud) -> Array:
+    """Take the second extent of the rows for the vertical: they are longer than high, and higher than deep.
+
+    Fruits do not tell up from down: it is upwards where z of the map is, or against y as cameras have it.
+    """
+    positions = fruits.positions.copy()
+    rows = np.array(fruits.extras.get("row", ("",) * len(fruits)))
+    for row in set(rows.tolist()):
+        positions[rows == row] -= positions[rows == row].mean(axis=0)
+    up = side_and_plan(positions)[0].axes[1]
+    return np.asarray(-up if up[1] == up[np.argmax(np.abs(up))] else up)
+
+
+def known_vertical(path: Path) -> Array | None:
+    """Tell the vertical by the place of a map on Earth, else by its cameras; None where nobody knows it."""
+    anchor = OrchardMap(path).anchor()
+    up = np.zeros(3) if anchor is None else anchor.enu_from_map[2, :3]
+    return np.asarray(up) if up.any() else _vertical_of_cameras(path)
+
+
+def _vertical_of_cameras(path: Path) -> Array | None:
     """Tell the vertical by the cameras of a map, whose y points down; None where there are none or they differ."""
     with snapshot(path) as (connection, _):
         cells = columns_of(connection, "poses", ("qx", "qy", "qz", "qw"))

@@ -18,6 +18,7 @@ from pomona.growth.measured import measured_fruits, require_one_season
 from pomona.growth.season_growth import grow_season
 from pomona.growth.size_classes import FIVE_MM
 from pomona.orchard import OrchardMap
+from pomona.viewer.row_frame import Vertical
 from pomona.viewer.told_calipers import calipers_told
 from pomona.viewer.told_crops import crops_inside
 from pomona.viewer.told_fruits import FruitsTold, trees_told
@@ -49,7 +50,7 @@ class Wishes:
     pack_kg : float
         Kilograms that a pack holds.
     up : (3,) float64 or None
-        The vertical in the map.
+        The vertical in the map; without, what the map knows of it, else a guess by its shape.
     """
 
     harvest: date | None = None
@@ -85,12 +86,14 @@ def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside)
     if not len(cloud):
         raise PomonaError(f"{path}: found no fruits, expected a map with some")
     trees = bearing_trees(cloud)
-    fruits = FruitsTold.of(cloud, trees.numbers, path, wishes.up)
+    vertical = Vertical.of(path, cloud, wishes.up)
+    fruits = FruitsTold.of(cloud, trees.numbers, vertical.up)
     return {
         "format": FORMAT,
         "program": f"pomona {__version__}",
         "name": path.name,
         "visits": [{"name": v.name, "date": v.date, "n_fruits": v.n_fruits, "n_matched": v.n_matched} for v in visits],
+        "is_vertical_guessed": vertical.is_guess,
         "map_from_page": np.linalg.inv(fruits.page_from_map).tolist(),
         "trees": trees_told(fruits, trees),
         "fruits": fruits.as_columns(),

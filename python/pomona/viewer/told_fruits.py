@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.orchard import Observations
 from pomona.viewer.packed_columns import packed, packed_texts
-from pomona.viewer.row_frame import page_from_map, vertical_of
+from pomona.viewer.row_frame import page_from_map
 
 __all__ = ["STATES", "FruitsTold", "trees_told"]
 
@@ -43,12 +42,11 @@ class FruitsTold:
     page_from_map: NDArray[np.float64]
 
     @classmethod
-    def of(cls, cloud: FruitCloud, trees: NDArray[np.int64], path: Path, up: NDArray[np.float64] | None) -> FruitsTold:
-        """Put the fruits of a map in order; `up` is its vertical where it is known."""
+    def of(cls, cloud: FruitCloud, trees: NDArray[np.int64], up: NDArray[np.float64]) -> FruitsTold:
+        """Put the fruits of a map in order; `up` is its vertical, of length 1."""
         ids = np.array(list(map(int, cloud.ids or ())), dtype=np.int64)
         order = np.lexsort((ids, trees))
-        frame = page_from_map(cloud.positions, vertical_of(path) if up is None else up)
-        return cls(cloud.select(order), ids[order], trees[order], frame)
+        return cls(cloud.select(order), ids[order], trees[order], page_from_map(cloud.positions, up))
 
     def rows_of(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """Rows of the page for ids of the map."""

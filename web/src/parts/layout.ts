@@ -18,6 +18,8 @@ import { timeSlider } from "./time_slider";
 import { treeTable } from "./tree_table";
 import { twoDates } from "./two_dates";
 
+const GUESS = "Which way is up is guessed from the shape of the row; --up X,Y,Z tells it.";
+
 type Name = "row" | "fruits" | "dates" | "sizes" | "thinning" | "calipers";
 
 export function layOut(root: HTMLElement, page: Page): void {
@@ -61,7 +63,8 @@ function beside(page: Page, large: HTMLElement, otherwise: HTMLElement): HTMLEle
 function rowCard(page: Page): HTMLElement {
   const row = rowView(page);
   const below = element("div", { class: "row-foot" }, legend(page), filtered(page), timeSlider(page));
-  return element("section", { class: "card row-card", "aria-label": "The row" }, rowTools(page, row.orbit), row.root, below);
+  const guess = page.season.isVerticalGuessed ? element("p", { class: "soft below" }, GUESS) : null;
+  return element("section", { class: "card row-card", "aria-label": "The row" }, rowTools(page, row.orbit), row.root, guess, below);
 }
 
 function fruitsCard(page: Page): HTMLElement {

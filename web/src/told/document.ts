@@ -8,6 +8,7 @@ export interface Told {
   readonly program: string;
   readonly name: string;
   readonly visits: readonly { name: string; date: string; n_fruits: number; n_matched: number }[];
+  readonly is_vertical_guessed: boolean;
   readonly map_from_page: readonly (readonly number[])[];
   readonly trees: readonly { name: string; row: string; middle: readonly [number, number, number] }[];
   readonly fruits: {

@@ -68,6 +68,8 @@ export interface Season {
   readonly program: string;
   readonly visits: readonly Visit[];
   readonly trees: readonly Tree[];
+  /** Whether nothing but the shape of the row told which way is up. */
+  readonly isVerticalGuessed: boolean;
   readonly mapFromPage: readonly (readonly number[])[];
   readonly n: number;
   readonly ids: readonly string[];
@@ -106,6 +108,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     program: told.program,
     visits: visitsOf(told),
     trees: told.trees.map(({ name, row, middle }) => ({ name, row, label: name ? `Tree ${name}` : "No tree", middle })),
+    isVerticalGuessed: told.is_vertical_guessed,
     mapFromPage: told.map_from_page,
     n: ids.length,
     ids,
