@@ -75,6 +75,7 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
         },
         "thinning": None,
         "no_growth": None,
+        "sizes": None,
         "calipers": None,
         "crops": _pictures(n, rng) if with_pictures else None,
     }

@@ -18,6 +18,7 @@ from benchmarks.page_draw import drawn_document
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from page_maker import chromium, opened, served
 from pomona import FruitCloud, geopackage
+from pomona.growth.bearing_trees import bearing_trees
 from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.built_page import built_page, report_of
@@ -115,6 +116,24 @@ def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, t
         page.get_by_role("tab", name="Fruits").click()
         page.get_by_label("State").select_option("hanging")
         assert f"{N - 5} of {N} fruits" in page.locator(".filter-bar").inner_text()
+
+
+def test_one_visit_shows_its_sizes(browser: Any, tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (80,), n_trees=2).path
+    fruits = OrchardMap(path).fruits()
+    sizes_mm, trees = 1000.0 * fruits.diameters_m, np.array(bearing_trees(fruits).of_fruits())
+    write_report(path, tmp_path / "report.html", Wishes())
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        shown = [line.split()[-2:] for line in page.locator(".trees tbody tr").all_inner_texts()]
+        assert shown == [[f"{sizes_mm[trees == name].mean():.1f}", "\N{EN DASH}"] for name in ("1", "2")]
+        counts = page.locator(".sizes td:last-child").all_inner_texts()
+        assert sum(map(int, counts)) == len(sizes_mm)
+        assert int(counts[-1]) == (sizes_mm >= 60.0).sum()
+        page.get_by_role("tab", name="Sizes").click()
+        table = page.locator("#panel-sizes table")
+        assert "14 Jul 2024" in table.inner_text()
+        assert table.locator("tbody tr").all_inner_texts()[-1].split()[:5] == ["60", "to", "65", "mm", counts[-1]]
+        assert "(" not in table.inner_text(), "one visit has no intervals"
 
 
 def test_a_guessed_vertical_is_said(browser: Any, row: GrownRow, report: Path, tmp_path: Path) -> None:

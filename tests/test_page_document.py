@@ -95,6 +95,29 @@ def test_a_map_of_one_visit_says_why_there_is_no_growth(tmp_path: Path) -> None:
     assert "one day" in told["no_growth"]
 
 
+def test_a_map_of_one_visit_tells_the_sizes_that_it_has(tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (80,)).path
+    told = season_document(path, Wishes(limits_mm=np.array([45.0, 50.0, 55.0]), pack_kg=2.0))["sizes"]
+    sizes_mm = 1000.0 * OrchardMap(path).fruits().diameters_m
+    counts = np.bincount(np.searchsorted([45.0, 50.0, 55.0], sizes_mm, side="right"), minlength=4)
+    assert {(one["from_mm"], one["below_mm"]): one["n_fruits"] for one in told} == {
+        limits: count
+        for limits, count in zip([(None, 45), (45, 50), (50, 55), (55, None)], counts, strict=True)
+        if count
+    }
+    assert {one["date"] for one in told} == {"2024-07-14"}
+    kg = 900.0 * np.pi / 6.0 * (sizes_mm / 1000.0) ** 3
+    assert sum(one["packs"] for one in told) == pytest.approx(kg.sum() / 2.0, abs=0.01)
+    assert {one["n_fruits_low"] for one in told} == {None}
+
+
+def test_a_map_without_diameters_has_no_sizes(tmp_path: Path) -> None:
+    places = np.random.default_rng(7).uniform((0, 0, 0), (6, 1, 2), (40, 3))
+    add_session(tmp_path / "orchard.gpkg", Session("one", "2024-06-01", "drawn", FruitCloud(places)))
+    told = season_document(tmp_path / "orchard.gpkg", Wishes())
+    assert (told["growth"], told["sizes"]) == (None, None)
+
+
 def test_the_same_map_is_told_the_same(row: Path) -> None:
     assert json.dumps(season_document(row, Wishes())) == json.dumps(season_document(row, Wishes()))
 

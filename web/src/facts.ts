@@ -65,7 +65,8 @@ export function actionOf(season: Season, fruit: number, target: number | null): 
   return target !== null && place > target ? "thin" : "keep";
 }
 
-function lastMeasured({ sights }: Season, fruit: number): number {
+/** The last diameter that a visit measured. */
+export function lastMeasured({ sights }: Season, fruit: number): number {
   for (let row = sights.starts[fruit + 1] - 1; row >= sights.starts[fruit]; row--) {
     if (!Number.isNaN(sights.diameterMm[row])) return sights.diameterMm[row];
   }

@@ -24,7 +24,7 @@ export function pageOf(season: Season): Page {
     history,
     selected: new Signal<number | null>(null),
     time: new Signal(history.times[history.times.length - 1]),
-    colour: new Signal<ColourBy>(season.growth ? "growth" : "state"),
+    colour: new Signal<ColourBy>(season.growth ? "growth" : season.classes.length > 0 ? "size" : "state"),
     filter: new Signal(ANY),
     target: new Signal(season.thinning?.target ?? null),
   };

@@ -1,5 +1,5 @@
 /** Counts of what hangs, of all and by tree. */
-import { actionOf, hangs } from "./facts";
+import { actionOf, hangs, lastMeasured } from "./facts";
 import type { Page } from "./page";
 import type { Block } from "./told/document";
 import { STATES, type Season } from "./told/season";
@@ -14,11 +14,9 @@ export function hangingRows(season: Season): number[] {
 
 /** Diameters of what hangs, by the curves where there are some, else as the last visits measured them. */
 export function sizesNow(season: Season): number[] {
-  const { growth, sights } = season;
-  const of = (fruit: number): number => {
-    if (growth) return growth.medianMm[fruit * growth.times.length + growth.nVisits - 1];
-    return sights.diameterMm.subarray(sights.starts[fruit], sights.starts[fruit + 1]).findLast((mm) => mm > 0) ?? NaN;
-  };
+  const { growth } = season;
+  const of = (fruit: number): number =>
+    growth ? growth.medianMm[fruit * growth.times.length + growth.nVisits - 1] : lastMeasured(season, fruit);
   return hangingRows(season)
     .map(of)
     .filter((mm) => !Number.isNaN(mm));
@@ -42,16 +40,30 @@ export interface TreeSummary {
   readonly drops: number;
   readonly thin: number;
   readonly clustersToThin: number;
-  /** What is known of its mean; null where no fruit of it was measured. */
+  /** What is known of its growth; null where no fruit of it has any. */
   readonly block: Block | null;
+  /** Diameters as they were measured last, of what hangs: their number and sum. */
+  readonly measured: number;
+  readonly measuredMm: number;
+}
+
+/** Mean size now of some trees: by the curves of their block, as measured where the map has no growth. */
+export function meanMm({ growth }: Season, block: Block | null | undefined, trees: readonly TreeSummary[]): number {
+  if (growth) return block?.mean_mm[growth.nVisits - 1] ?? NaN;
+  const sum = (of: (tree: TreeSummary) => number): number => trees.reduce((total, tree) => total + of(tree), 0);
+  return sum((tree) => tree.measuredMm) / sum((tree) => tree.measured);
 }
 
 export function treeSummaries({ season, target }: Page): TreeSummary[] {
-  const counts = season.trees.map(() => ({ fruits: 0, gone: 0, drops: 0, thin: 0, clusters: new Set<number>() }));
+  const counts = season.trees.map(() => ({ fruits: 0, gone: 0, drops: 0, thin: 0, measured: 0, measuredMm: 0, clusters: new Set<number>() }));
   for (let fruit = 0; fruit < season.n; fruit++) {
     const count = counts[season.tree[fruit]];
     if (season.state[fruit] === GONE) count.gone++;
-    if (hangs(season, fruit)) count.fruits++;
+    if (hangs(season, fruit)) {
+      count.fruits++;
+      const mm = lastMeasured(season, fruit);
+      if (!Number.isNaN(mm)) [count.measured, count.measuredMm] = [count.measured + 1, count.measuredMm + mm];
+    }
     const action = actionOf(season, fruit, target.value);
     if (action === "drops") count.drops++;
     if (action === "thin") {

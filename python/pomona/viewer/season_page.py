@@ -23,6 +23,7 @@ from pomona.viewer.told_calipers import calipers_told
 from pomona.viewer.told_crops import crops_inside
 from pomona.viewer.told_fruits import FruitsTold, trees_told
 from pomona.viewer.told_growth import growth_told
+from pomona.viewer.told_sizes import sizes_told
 from pomona.viewer.told_thinning import thinning_told
 
 __all__ = ["Wishes", "season_document"]
@@ -108,18 +109,23 @@ def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
     """Tell growth and what follows from it; of a map that cannot have any, why."""
     try:
         measured = measured_fruits(path)
+    except PomonaError as reason:
+        return _no_growth(str(reason), None)
+    sizes = sizes_told(measured, wishes.limits_mm, wishes.pack_kg)
+    try:
         require_one_season(measured)
     except PomonaError as reason:
-        return _no_growth(str(reason))
+        return _no_growth(str(reason), sizes)
     if len(set(measured.days)) < 2:
-        return _no_growth(f"sizes of one day only, {measured.days[0]}: add another visit")
+        return _no_growth(f"sizes of one day only, {measured.days[0]}: add another visit", sizes)
     growth = grow_season(path, harvest=wishes.harvest, temperature=wishes.temperature, limits_mm=wishes.limits_mm)
     return {
         "growth": growth_told(growth, fruits, wishes.pack_kg),
         "thinning": thinning_told(growth, fruits, wishes.target),
         "no_growth": None,
+        "sizes": None,
     }
 
 
-def _no_growth(reason: str) -> Mapping[str, Any]:
-    return {"growth": None, "thinning": None, "no_growth": reason}
+def _no_growth(reason: str, sizes: list[dict[str, Any]] | None) -> Mapping[str, Any]:
+    return {"growth": None, "thinning": None, "no_growth": reason, "sizes": sizes}

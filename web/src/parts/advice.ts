@@ -36,9 +36,9 @@ function thin({ season, target }: Page, trees: readonly TreeSummary[]): string[]
   return areFruitlets(season) ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
 }
 
-function harvest({ growth }: Season): string[] {
+function harvest({ growth, classes }: Season): string[] {
   if (!growth?.harvest) return [];
-  const then = growth.classes.filter((one) => Date.parse(one.date) >= (growth.harvest ?? 0));
+  const then = classes.filter((one) => Date.parse(one.date) >= (growth.harvest ?? 0));
   const sum = (of: (one: SizeClass) => number): number => then.reduce((total, one) => total + of(one), 0);
   const best = then.reduce((most, one) => (one.n_fruits > most.n_fruits ? one : most), then[0]);
   const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${day(growth.harvest).replace(" ", "\u00a0")}`];

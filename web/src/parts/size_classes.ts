@@ -16,22 +16,22 @@ export function sizeClasses(page: Page, isLong: boolean): HTMLElement {
   if (days.length === 0) {
     return element("section", { class: "card" }, title, element("p", { class: "soft" }, page.season.noGrowth ?? ""));
   }
-  const hint = isLong ? "Minimum belongs to a class, maximum to the next. Numbers in brackets are 90 % intervals." : "Click a fruit for its own curve.";
+  const brackets = page.season.growth ? "Numbers in brackets are 90 % intervals." : "As measured.";
+  const hint = isLong ? `Minimum belongs to a class, maximum to the next. ${brackets}` : "Click a fruit for its own curve.";
   return element(
     "section",
     { class: "card sizes" },
     title,
     isLong ? null : key(days),
     isLong ? element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Sizes" }, longTable(days)) : bars(days),
-    element("p", { class: "soft" }, hint),
+    isLong || page.season.growth ? element("p", { class: "soft" }, hint) : null,
   );
 }
 
 function daysOf({ season }: Page): Day[] {
-  const classes = season.growth?.classes ?? [];
-  return [...new Set(classes.map((one) => one.date))].map((date) => ({
+  return [...new Set(season.classes.map((one) => one.date))].map((date) => ({
     date,
-    classes: classes.filter((one) => one.date === date),
+    classes: season.classes.filter((one) => one.date === date),
   }));
 }
 
@@ -73,7 +73,8 @@ function longTable(days: readonly Day[]): HTMLElement {
 }
 
 function amounts(one: SizeClass): HTMLElement[] {
-  const range = (low: number, high: number, digits: number): string => ` (${number(low, digits)} to ${number(high, digits)})`;
+  const range = (low: number | null, high: number | null, digits: number): string =>
+    low === null || high === null ? "" : ` (${number(low, digits)} to ${number(high, digits)})`;
   return [
     element("td", {}, whole(one.n_fruits) + range(one.n_fruits_low, one.n_fruits_high, 0)),
     element("td", {}, number(one.kg, 1)),

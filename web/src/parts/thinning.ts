@@ -56,7 +56,7 @@ function lineOf({ label, fruits, drops, thin, clustersToThin }: TreeSummary): HT
 function totalOf(trees: readonly TreeSummary[]): HTMLElement {
   const sum = (of: (tree: TreeSummary) => number): number => trees.reduce((total, tree) => total + of(tree), 0);
   const all = { fruits: sum((tree) => tree.fruits), drops: sum((tree) => tree.drops), thin: sum((tree) => tree.thin) };
-  const line = lineOf({ tree: -1, label: "All", gone: 0, block: null, ...all, clustersToThin: sum((tree) => tree.clustersToThin) });
+  const line = lineOf({ tree: -1, label: "All", gone: 0, block: null, measured: 0, measuredMm: NaN, ...all, clustersToThin: sum((tree) => tree.clustersToThin) });
   line.className = "total";
   return line;
 }

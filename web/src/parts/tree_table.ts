@@ -1,7 +1,7 @@
 /** The same four answers tree by tree; a click looks at one tree. */
 import { element, replaceAll } from "../elements";
 import type { Page } from "../page";
-import { treeSummaries, type TreeSummary } from "../summary";
+import { meanMm, treeSummaries, type TreeSummary } from "../summary";
 import { day, number, whole } from "../words";
 
 export function treeTable(page: Page): HTMLElement {
@@ -33,14 +33,13 @@ export function treeTable(page: Page): HTMLElement {
 /** Above the trees of a row what they come to together; a click looks at the row. */
 function rowLine({ season, filter }: Page, row: string, trees: readonly TreeSummary[], isPlanned: boolean): HTMLElement {
   const { growth } = season;
-  const now = growth ? growth.nVisits - 1 : 0;
   const own = trees.filter(({ tree }) => season.trees[tree].row === row);
   const sum = (of: (tree: TreeSummary) => number): string => whole(own.reduce((total, tree) => total + of(tree), 0));
   const block = growth?.blocks.find((one) => one.kind === "row" && one.name === row);
   const isChosen = filter.value.row === row && row !== "";
   const pick = (): void => filter.set({ ...filter.value, row: isChosen ? "" : row, tree: null });
   const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, row || "no row");
-  const cells = [sum(({ fruits }) => fruits), number(block?.mean_mm[now] ?? NaN, 1), number(block?.rate_mm_per_day[1] ?? NaN, 2)];
+  const cells = [sum(({ fruits }) => fruits), number(meanMm(season, block, own), 1), number(block?.rate_mm_per_day[1] ?? NaN, 2)];
   if (growth?.harvest) cells.push(number(block?.mean_mm[growth.times.length - 1] ?? NaN, 1));
   if (isPlanned) cells.push(sum(({ thin }) => thin));
   const about = element("th", { scope: "row" }, button);
@@ -49,7 +48,6 @@ function rowLine({ season, filter }: Page, row: string, trees: readonly TreeSumm
 
 function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPlanned: boolean): HTMLElement {
   const { growth } = season;
-  const now = growth ? growth.nVisits - 1 : 0;
   const isChosen = filter.value.tree === tree.tree;
   const pick = (): void => filter.set({ ...filter.value, tree: isChosen ? null : tree.tree });
   const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, tree.label);
@@ -57,7 +55,7 @@ function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPla
   bar.style.width = `${(36 * tree.fruits) / Math.max(1, most)}px`;
   const cells = [
     element("td", {}, bar, whole(tree.fruits)),
-    element("td", {}, number(tree.block?.mean_mm[now] ?? NaN, 1)),
+    element("td", {}, number(meanMm(season, tree.block, [tree]), 1)),
     element("td", {}, number(tree.block?.rate_mm_per_day[1] ?? NaN, 2)),
   ];
   if (growth?.harvest) cells.push(element("td", {}, number(tree.block?.mean_mm[growth.times.length - 1] ?? NaN, 1)));

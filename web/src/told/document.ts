@@ -22,6 +22,8 @@ export interface Told {
   readonly growth: ToldGrowth | null;
   readonly thinning: ToldThinning | null;
   readonly no_growth: string | null;
+  /** Size classes as they were measured, where there is no growth but there are diameters. */
+  readonly sizes: readonly SizeClass[] | null;
   readonly calipers: Calipers | null;
   readonly crops: ToldCrops | null;
 }
@@ -46,18 +48,18 @@ export interface Block {
   readonly rate_mm_per_day: readonly [number, number, number];
 }
 
-/** A line of `classes.csv`. */
+/** A line of `classes.csv`; without growth no intervals are known. */
 export interface SizeClass {
   readonly date: string;
   readonly from_mm: number | null;
   readonly below_mm: number | null;
   readonly n_fruits: number;
-  readonly n_fruits_low: number;
-  readonly n_fruits_high: number;
+  readonly n_fruits_low: number | null;
+  readonly n_fruits_high: number | null;
   readonly kg: number;
   readonly packs: number;
-  readonly packs_low: number;
-  readonly packs_high: number;
+  readonly packs_low: number | null;
+  readonly packs_high: number | null;
 }
 
 export interface ToldGrowth {

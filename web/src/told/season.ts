@@ -45,7 +45,6 @@ export interface Growth {
   readonly rateSigma: Float64Array;
   readonly odd: Float64Array;
   readonly blocks: readonly Block[];
-  readonly classes: readonly SizeClass[];
   readonly packKg: number;
   readonly curve: string;
   readonly noiseMm: number;
@@ -80,6 +79,8 @@ export interface Season {
   readonly sights: Sights;
   readonly growth: Growth | null;
   readonly noGrowth: string | null;
+  /** On the last day that has diameters, and at the harvest. */
+  readonly classes: readonly SizeClass[];
   readonly thinning: Thinning | null;
   readonly calipers: Calipers | null;
   readonly crops: Crops | null;
@@ -119,6 +120,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     sights: await sightsOf(told, ids.length),
     growth: await growthOf(told),
     noGrowth: told.no_growth,
+    classes: told.growth?.classes ?? told.sizes ?? [],
     thinning: await thinningOf(told),
     calipers: told.calipers,
     crops: await cropsOf(told.crops, ids),
@@ -160,7 +162,6 @@ async function growthOf({ growth }: Told): Promise<Growth | null> {
     rateSigma: await unpacked(growth.rate_sigma_mm_per_day),
     odd: await unpacked(growth.odd),
     blocks: growth.blocks,
-    classes: growth.classes,
     packKg: growth.pack_kg,
     curve: growth.curve,
     noiseMm: growth.noise_mm,
