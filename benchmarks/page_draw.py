@@ -57,6 +57,7 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
             "diameter_mm": packed(sizes_mm[fruit, visit] + rng.normal(0, 2, len(fruit)), 0.1),
             "probability": packed(rng.uniform(0.9, 1.0, len(fruit)), 0.001),
         },
+        "harvest": "2024-10-01",
         "growth": {
             "days": [*map(str, days), "2024-10-01"],
             "n_visits": VISITS,

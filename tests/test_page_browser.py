@@ -22,7 +22,7 @@ from pomona.growth.bearing_trees import bearing_trees
 from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.built_page import built_page, report_of
-from pomona.viewer.season_page import Wishes
+from pomona.viewer.season_page import Wishes, season_document
 from pomona.viewer.season_report import write_report
 from test_calipers import long_table
 
@@ -97,7 +97,7 @@ def test_the_first_look_answers_four_questions(page: Any, row: GrownRow) -> None
     assert f"{hanging} fruits hang" in " ".join(many.split())
     assert re.search(r"\d\d\.\d mm on average", " ".join(big.split()))
     assert re.search(r"0\.\d\d mm a day", " ".join(fast.split()))
-    assert re.search(r"Thin \d+ fruits", to_do)
+    assert re.search(r"Plan \d+ packs for 1\N{NO-BREAK SPACE}Sept", to_do)
     assert len(page.locator(".trees tbody tr").all()) == 3
 
 
@@ -116,6 +116,66 @@ def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, t
         page.get_by_role("tab", name="Fruits").click()
         page.get_by_label("State").select_option("hanging")
         assert f"{N - 5} of {N} fruits" in page.locator(".filter-bar").inner_text()
+
+
+def told_to_do(browser: Any, path: Path, document: dict[str, Any]) -> list[str]:
+    """The lines below the fourth question."""
+    path.write_text(report_of(built_page(), document), encoding="utf-8")
+    with opened(browser, path.as_uri()) as page:
+        lines: list[str] = page.locator(".answer").last.locator("p").all_inner_texts()
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("harvest", "said"),
+    [
+        (None, "Record the row again in a week or two"),
+        ("2024-10-20", "Record the row again in a week or two"),
+        ("2024-10-01", "Record the row once more before the harvest"),
+        ("2024-09-20", None),
+    ],
+)
+def test_the_next_visit_comes_before_the_harvest(browser: Any, tmp_path: Path, harvest: str | None, said: str) -> None:
+    document = drawn_document(200, with_pictures=False)
+    document["harvest"] = document["growth"]["harvest"] = harvest
+    document["growth"]["days"][-1] = harvest or "2024-09-17"
+    lines = told_to_do(browser, tmp_path / "report.html", document)
+    assert [line for line in lines if line.startswith("Record")] == ([said] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("days", "has_diameters", "harvest", "said"),
+    [
+        ((80,), True, None, "Record the row again in a week or two: two dates show growth"),
+        ((80,), True, date(2024, 7, 30), "Record the row once more before the harvest: two dates show growth"),
+        ((80,), True, date(2024, 7, 17), "Harvest on 17\N{NO-BREAK SPACE}Jul"),
+        (
+            (80, 95),
+            False,
+            None,
+            "Record the row again in a week or two, with diameters: those of two dates show growth",
+        ),
+    ],
+)
+def test_what_growth_needs_is_said_once(
+    browser: Any, tmp_path: Path, days: tuple[int, ...], has_diameters: bool, harvest: date | None, said: str
+) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", days, n_trees=1).path
+    if not has_diameters:
+        with contextlib.closing(geopackage.connect(path)) as connection, connection:
+            connection.execute("UPDATE observations SET diameter_m = NULL")
+    document = season_document(path, Wishes(harvest=harvest))
+    assert told_to_do(browser, tmp_path / "report.html", document) == [said]
+
+
+def test_what_is_too_large_is_not_to_be_thinned(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+    document = season_document(row.path, Wishes(harvest=date(2024, 9, 1), target=20))
+    assert not document["thinning"]["are_fruitlets"]
+    first, *others = told_to_do(browser, tmp_path / "late.html", document)
+    assert re.fullmatch(r"Plan \d+ packs for 1\N{NO-BREAK SPACE}Sept", first)
+    assert f"Too large to thin: {N - 60} fruits beyond 20 a tree" in others
+    document["thinning"]["are_fruitlets"] = True
+    assert told_to_do(browser, tmp_path / "early.html", document)[0] == f"Thin {N - 60} fruits"
 
 
 def test_one_visit_shows_its_sizes(browser: Any, tmp_path: Path) -> None:

@@ -4,8 +4,6 @@ import type { Page } from "./page";
 import type { Block } from "./told/document";
 import { STATES, type Season } from "./told/season";
 
-/** Fruits that are larger on average are thinned no more, and the rule of growth rates is one of fruitlets. */
-const THINNED_BELOW_MM = 45;
 const GONE = STATES.indexOf("gone");
 
 export function hangingRows(season: Season): number[] {
@@ -22,14 +20,9 @@ export function sizesNow(season: Season): number[] {
     .filter((mm) => !Number.isNaN(mm));
 }
 
-/** Whether fruits are still of the size at which one thins. */
-export function areFruitlets({ growth }: Season): boolean {
-  return growth !== null && growth.blocks[0].mean_mm[growth.nVisits - 1] < THINNED_BELOW_MM;
-}
-
 /** Whether thinning is worth a word: fruits are small enough, or somebody has named a target. */
 export function isTimeToThin({ season, target }: Page): boolean {
-  return season.thinning !== null && (target.value !== null || areFruitlets(season));
+  return season.thinning !== null && (target.value !== null || season.thinning.areFruitlets);
 }
 
 export interface TreeSummary {

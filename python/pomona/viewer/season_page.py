@@ -99,6 +99,7 @@ def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside)
         "trees": trees_told(fruits, trees),
         "fruits": fruits.as_columns(),
         "sights": fruits.sights(orchard.observations(), [visit.name for visit in visits]),
+        "harvest": None if wishes.harvest is None else wishes.harvest.isoformat(),
         **_grown(path, wishes, fruits),
         "calipers": calipers_told(path, wishes.calipers, fruits),
         "crops": crops(path, fruits),

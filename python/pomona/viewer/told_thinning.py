@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pomona.growth.season_growth import SeasonGrowth
-from pomona.growth.thinning_plan import plan_thinning, rates_are_known
+from pomona.growth.thinning_plan import are_fruitlets, plan_thinning, rates_are_known
 from pomona.viewer.packed_columns import packed
 from pomona.viewer.told_fruits import SHARE, FruitsTold
 from pomona.viewer.told_growth import THOUSANDTH_MM
@@ -39,4 +39,5 @@ def thinning_told(growth: SeasonGrowth, fruits: FruitsTold, target: int | None) 
         told[name] = packed(everywhere, step)
     before, last = sorted(set(growth.fruits.days))[-2:]
     days = {"from": before.isoformat(), "to": last.isoformat()}
-    return {"target": target, "fast_mm_per_day": plan.drop.fast_mm_per_day, **days, **told}
+    about = {"target": target, "are_fruitlets": are_fruitlets(growth)}
+    return {**about, "fast_mm_per_day": plan.drop.fast_mm_per_day, **days, **told}

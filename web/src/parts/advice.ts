@@ -1,12 +1,15 @@
 /** What a grower can do now, the most pressing first; one line each. */
 import type { Page } from "../page";
-import { areFruitlets, hangingRows, treeSummaries, type TreeSummary } from "../summary";
+import { hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
-import { day, fruits, percent, whole } from "../words";
+import { day, fruits, fullDay, percent, whole } from "../words";
 
 /** A tree that grows so much slower than all is worth a look. */
 const SLOW = 0.9;
+/** Days to the harvest below which another visit tells nothing that could still be decided, and below which it is the last. */
+const [LEAST_DAYS, FEW_DAYS] = [7, 21];
+const DAY_MS = 86_400_000;
 const MISSED = STATES.indexOf("missed");
 
 export function advice(page: Page): string[] {
@@ -15,33 +18,59 @@ export function advice(page: Page): string[] {
   return [
     ...thin(page, trees),
     ...harvest(season),
+    ...tooLate(page, trees),
     ...slowTrees(season, trees),
     ...hidden(season),
-    ...(season.growth ? [] : ["Record the row again in a week or two: two dates show growth"]),
-    "Record the row again in a week or two",
+    ...again(season),
   ];
 }
 
+const total = (trees: readonly TreeSummary[], of: (tree: TreeSummary) => number): number => trees.reduce((sum, tree) => sum + of(tree), 0);
+
 function thin({ season, target }: Page, trees: readonly TreeSummary[]): string[] {
-  if (!season.thinning) return [];
-  const sum = (of: (tree: TreeSummary) => number): number => trees.reduce((total, tree) => total + of(tree), 0);
-  const [toThin, drops] = [sum((tree) => tree.thin), sum((tree) => tree.drops)];
+  if (!season.thinning?.areFruitlets) return [];
+  const [toThin, drops] = [total(trees, (tree) => tree.thin), total(trees, (tree) => tree.drops)];
   const dropping = drops > 0 ? [`${fruits(drops)} will drop by themselves`] : [];
-  if (target.value !== null) {
-    const on = trees.filter((tree) => tree.thin > 0).length;
-    const kept = `to keep ${whole(target.value)} on each tree`;
-    if (toThin > 0) return [`Thin ${fruits(toThin)}`, `on ${on} of ${trees.length} trees, ${kept}`, ...dropping];
-    return ["Nothing to thin", kept, ...dropping];
-  }
-  return areFruitlets(season) ? ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping] : [];
+  if (target.value === null) return ["Choose how many fruits a tree keeps", "the thinning page tells which to take", ...dropping];
+  const on = trees.filter((tree) => tree.thin > 0).length;
+  const kept = `to keep ${whole(target.value)} on each tree`;
+  if (toThin > 0) return [`Thin ${fruits(toThin)}`, `on ${on} of ${trees.length} trees, ${kept}`, ...dropping];
+  return ["Nothing to thin", kept, ...dropping];
 }
+
+/** A target is told what it comes to, when the time to thin is over too. */
+function tooLate({ season, target }: Page, trees: readonly TreeSummary[]): string[] {
+  const beyond = total(trees, (tree) => tree.thin);
+  if (target.value === null || season.thinning === null || season.thinning.areFruitlets || beyond === 0) return [];
+  return [`Too large to thin: ${fruits(beyond)} beyond ${whole(target.value)} a tree`];
+}
+
+/** When the next visit is worth it, and what for. */
+function again(season: Season): string[] {
+  const last = season.visits[season.visits.length - 1].time;
+  const left = season.harvest === null || season.harvest <= last ? Infinity : (season.harvest - last) / DAY_MS;
+  if (left < LEAST_DAYS) return season.growth ? [] : [`Harvest on ${spaced(season.harvest!)}`];
+  const when = left < FEW_DAYS ? "once more before the harvest" : "again in a week or two";
+  return [`Record the row ${when}${season.growth ? "" : missing(season)}`];
+}
+
+/** What growth needs. */
+function missing({ sights, visits }: Season): string {
+  const days = new Set<string>();
+  sights.visit.forEach((visit, row) => !Number.isNaN(sights.diameterMm[row]) && days.add(fullDay(visits[visit].time)));
+  if (days.size === 0) return ", with diameters: those of two dates show growth";
+  return days.size === 1 ? ": two dates show growth" : "";
+}
+
+/** A day that is not broken over lines. */
+const spaced = (time: number): string => day(time).replace(" ", "\u00a0");
 
 function harvest({ growth, classes }: Season): string[] {
   if (!growth?.harvest) return [];
   const then = classes.filter((one) => Date.parse(one.date) >= (growth.harvest ?? 0));
   const sum = (of: (one: SizeClass) => number): number => then.reduce((total, one) => total + of(one), 0);
   const best = then.reduce((most, one) => (one.n_fruits > most.n_fruits ? one : most), then[0]);
-  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${day(growth.harvest).replace(" ", "\u00a0")}`];
+  const lines = [`Plan ${whole(Math.ceil(sum((one) => one.packs)))} packs for ${spaced(growth.harvest)}`];
   const share = best ? best.n_fruits / sum((one) => one.n_fruits) : 0;
   if (best) lines.push(`${percent(share)} of fruits will measure ${between(best)}`);
   return lines;
@@ -64,4 +93,3 @@ function hidden(season: Season): string[] {
   const n = hangingRows(season).filter((fruit) => season.state[fruit] === MISSED).length;
   return n === 0 ? [] : [`${fruits(n)} hid from the last visit`];
 }
-

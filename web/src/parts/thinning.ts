@@ -2,7 +2,7 @@
 import { element, replaceAll } from "../elements";
 import { ANY } from "../filter";
 import type { Page } from "../page";
-import { areFruitlets, treeSummaries, type TreeSummary } from "../summary";
+import { treeSummaries, type TreeSummary } from "../summary";
 import { fullDay, number, whole } from "../words";
 
 const LATE = "These fruits are past the size at which one thins, and the rule below is one of fruitlets.";
@@ -26,7 +26,7 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     const trees = treeSummaries(page);
     replaceAll(body, ...trees.map(lineOf), totalOf(trees));
   });
-  const late = areFruitlets(page.season) ? null : element("p", { class: "late" }, LATE);
+  const late = plan.areFruitlets ? null : element("p", { class: "late" }, LATE);
   const heads = ["Tree", "Fruits", "will drop", "stay", "to thin", "clusters to visit"];
   const head = element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name)));
   const table = element("table", { class: "plain" }, element("thead", {}, head), body);

@@ -19,6 +19,8 @@ export interface Told {
     readonly fruit_probability: Packed;
   };
   readonly sights: Readonly<Record<"fruit" | "visit" | "x" | "y" | "z" | "diameter_mm" | "probability", Packed>>;
+  /** As it was asked for, whether or not there is growth to foretell it. */
+  readonly harvest: string | null;
   readonly growth: ToldGrowth | null;
   readonly thinning: ToldThinning | null;
   readonly no_growth: string | null;
@@ -83,6 +85,7 @@ export interface ToldGrowth {
 
 export interface ToldThinning {
   readonly target: number | null;
+  readonly are_fruitlets: boolean;
   readonly fast_mm_per_day: number;
   readonly from: string;
   readonly to: string;

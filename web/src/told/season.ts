@@ -52,6 +52,8 @@ export interface Growth {
 
 export interface Thinning {
   readonly target: number | null;
+  /** Whether fruits are still of the size at which one thins, and for which the rule is. */
+  readonly areFruitlets: boolean;
   readonly fast: number;
   readonly from: number;
   readonly to: number;
@@ -77,6 +79,7 @@ export interface Season {
   readonly stateProbability: Float64Array;
   readonly fruitProbability: Float64Array;
   readonly sights: Sights;
+  readonly harvest: number | null;
   readonly growth: Growth | null;
   readonly noGrowth: string | null;
   /** On the last day that has diameters, and at the harvest. */
@@ -118,6 +121,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     stateProbability: await unpacked(told.fruits.state_probability),
     fruitProbability: await unpacked(told.fruits.fruit_probability),
     sights: await sightsOf(told, ids.length),
+    harvest: told.harvest === null ? null : timeOf(told.harvest),
     growth: await growthOf(told),
     noGrowth: told.no_growth,
     classes: told.growth?.classes ?? told.sizes ?? [],
@@ -172,6 +176,7 @@ async function thinningOf({ thinning }: Told): Promise<Thinning | null> {
   if (thinning === null) return null;
   return {
     target: thinning.target,
+    areFruitlets: thinning.are_fruitlets,
     fast: thinning.fast_mm_per_day,
     from: timeOf(thinning.from),
     to: timeOf(thinning.to),
