@@ -116,6 +116,20 @@ def test_a_map_without_diameters_has_no_sizes(tmp_path: Path) -> None:
     add_session(tmp_path / "orchard.gpkg", Session("one", "2024-06-01", "drawn", FruitCloud(places)))
     told = season_document(tmp_path / "orchard.gpkg", Wishes())
     assert (told["growth"], told["sizes"]) == (None, None)
+    assert told["no_growth"] == "orchard.gpkg: found no diameters, expected sessions that measured them"
+
+
+def test_the_page_does_not_tell_where_the_map_lies(tmp_path: Path) -> None:
+    """A report is mailed."""
+    path = tmp_path / "seasons.gpkg"
+    rng = np.random.default_rng(8)
+    places = rng.uniform((0, 0, 0), (6, 1, 2), (40, 3))
+    for day in ("2023-08-01", "2024-08-01"):
+        cloud = FruitCloud(places + rng.normal(0, 0.003, places.shape), diameters_m=np.full(40, 0.06))
+        add_session(path, Session(day, day, "drawn", cloud))
+    told = season_document(path, Wishes())
+    assert told["no_growth"].startswith("seasons.gpkg: found visits from 2023-08-01 to 2024-08-01")
+    assert str(tmp_path) not in json.dumps(told)
 
 
 def test_the_same_map_is_told_the_same(row: Path) -> None:

@@ -180,6 +180,14 @@ def test_pictures_are_served_and_a_new_visit_is_told(tmp_path: Path) -> None:
             assert ask(address, picture)[0] == 404
 
 
+def test_a_map_that_is_gone_is_told_by_its_name(tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (50,), n_trees=1).path
+    with served(path) as address:
+        path.unlink()
+        status, _, body = ask(address, "/season.json")
+        assert (status, b"orchard.gpkg" in body, str(tmp_path).encode() in body) == (503, True, False)
+
+
 def add_with_crop(path: Path) -> None:
     fruits = OrchardMap(path).fruits()
     grown_m = fruits.diameters_m + np.random.default_rng(1).normal(0.008, 0.001, len(fruits))

@@ -80,7 +80,8 @@ def page_app(path: Path, wishes: Wishes, token: str | None = None) -> FastAPI:
         try:
             return Response(season.text(), media_type="application/json")
         except (PomonaError, OSError) as error:
-            return Response(json.dumps({"error": str(error)}), 503, media_type="application/json")
+            said = str(error).replace(str(path), path.name)
+            return Response(json.dumps({"error": said}), 503, media_type="application/json")
 
     kinds = {"/": (page.html, "text/html"), "/page.js": (page.script, "text/javascript")}
     kinds["/page.css"] = (page.style, "text/css")

@@ -111,12 +111,12 @@ def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
     try:
         measured = measured_fruits(path)
     except PomonaError as reason:
-        return _no_growth(str(reason), None)
+        return _no_growth(_by_name(reason, path), None)
     sizes = sizes_told(measured, wishes.limits_mm, wishes.pack_kg)
     try:
         require_one_season(measured)
     except PomonaError as reason:
-        return _no_growth(str(reason), sizes)
+        return _no_growth(_by_name(reason, path), sizes)
     if len(set(measured.days)) < 2:
         return _no_growth(f"sizes of one day only, {measured.days[0]}: add another visit", sizes)
     growth = grow_season(path, harvest=wishes.harvest, temperature=wishes.temperature, limits_mm=wishes.limits_mm)
@@ -126,6 +126,11 @@ def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
         "no_growth": None,
         "sizes": None,
     }
+
+
+def _by_name(reason: PomonaError, path: Path) -> str:
+    """Say what is wrong with a map by the name of its file: where that lies is nobody's business who reads a report."""
+    return str(reason).replace(str(path), path.name)
 
 
 def _no_growth(reason: str, sizes: list[dict[str, Any]] | None) -> Mapping[str, Any]:
