@@ -22,6 +22,7 @@ from pomona.growth.bearing_trees import bearing_trees
 from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.built_page import built_page, report_of
+from pomona.viewer.packed_columns import packed
 from pomona.viewer.season_page import Wishes, season_document
 from pomona.viewer.season_report import write_report
 from test_calipers import long_table
@@ -173,7 +174,7 @@ def test_what_is_too_large_is_not_to_be_thinned(browser: Any, row: GrownRow, tmp
     assert not document["thinning"]["are_fruitlets"]
     first, *others = told_to_do(browser, tmp_path / "late.html", document)
     assert re.fullmatch(r"Plan \d+ packs for 1\N{NO-BREAK SPACE}Sept", first)
-    assert f"Too large to thin: {N - 60} fruits beyond 20 a tree" in others
+    assert f"Too large to thin: {N - 60} beyond 20 a tree" in others
     document["thinning"]["are_fruitlets"] = True
     assert told_to_do(browser, tmp_path / "early.html", document)[0] == f"Thin {N - 60} fruits"
 
@@ -414,6 +415,38 @@ def test_names_of_trees_are_texts_in_the_page_and_in_a_spreadsheet(browser: Any,
             trees = {line["tree"] for line in csv.DictReader(file)}
         assert trees == {HOSTILE, "'=1+1", '\'@"a,b"'}
         assert page.evaluate("window.owned") is None
+
+
+@pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
+def test_the_numbers_of_trees_stay_in_view(browser: Any, row: GrownRow, tmp_path: Path, width: int) -> None:
+    """With a harvest and a target, however long the names of trees are: they are cut, and whole in the title."""
+    document = season_document(row.path, Wishes(harvest=date(2024, 9, 30), target=20))
+    names = ["12", "the old Gravenstein behind the gate, second from the left", "w" * 400]
+    for number, name in enumerate(names):
+        document["trees"][number]["name"] = document["growth"]["blocks"][1 + number]["name"] = name
+    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
+    with opened(browser, (tmp_path / "report.html").as_uri(), viewport={"width": width, "height": 860}) as page:
+        assert page.locator(".trees thead th").all_inner_texts() == ["Tree", "Fruits", "mm", "a day", "30 Sept", "thin"]
+        spans = page.locator(".trees .scroll").evaluate("box => [box.scrollWidth, box.clientWidth]")
+        assert spans[0] <= spans[1]
+        buttons = page.locator(".trees tbody th button")
+        assert buttons.evaluate_all("all => all.map(one => one.title)") == [f"Tree {name}" for name in names]
+        cut = buttons.evaluate_all("all => all.map(one => one.scrollWidth > one.clientWidth)")
+        assert cut == [False, True, True]
+
+
+def test_the_fruits_of_no_tree_have_no_mean_of_all(browser: Any, tmp_path: Path) -> None:
+    """The block of all fruits has no name, as the one of those of no tree; of these none hangs any more."""
+    document = drawn_document(300, with_pictures=False)
+    document["trees"][2]["name"] = ""
+    document["fruits"]["state"] = packed(np.repeat([1, 1, 3], 100))
+    document["growth"]["blocks"] = document["growth"]["blocks"][:3]
+    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        lines = [line.split("\t") for line in page.locator(".trees tbody tr").all_inner_texts()]
+        means = [block["mean_mm"] for block in document["growth"]["blocks"][1:]]
+        assert [line[2] for line in lines[:2]] == [f"{mean[-2]:.1f}" for mean in means]
+        assert lines[2] == ["No tree", "0", *["\N{EN DASH}"] * 3]
 
 
 def test_fruits_and_trees_go_by_their_rows(browser: Any, tmp_path: Path) -> None:

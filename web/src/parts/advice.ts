@@ -42,7 +42,7 @@ function thin({ season, target }: Page, trees: readonly TreeSummary[]): string[]
 function tooLate({ season, target }: Page, trees: readonly TreeSummary[]): string[] {
   const beyond = total(trees, (tree) => tree.thin);
   if (target.value === null || season.thinning === null || season.thinning.areFruitlets || beyond === 0) return [];
-  return [`Too large to thin: ${fruits(beyond)} beyond ${whole(target.value)} a tree`];
+  return [`Too large to thin: ${whole(beyond)} beyond ${whole(target.value)} a tree`];
 }
 
 /** When the next visit is worth it, and what for. */

@@ -33,5 +33,5 @@ export function calipers(page: Page): HTMLElement {
 function lineOf(name: string, one: Agreement): HTMLElement {
   const limits = one.low_mm === null ? "–" : `${number(one.low_mm, 1)} to ${number(one.high_mm ?? NaN, 1)}`;
   const cells = [whole(one.n), number(one.bias_mm, 2), number(one.rmse_mm, 2), limits];
-  return element("tr", {}, element("th", { scope: "row" }, name), ...cells.map((cell) => element("td", {}, cell)));
+  return element("tr", {}, element("th", { scope: "row", title: name }, name), ...cells.map((cell) => element("td", {}, cell)));
 }

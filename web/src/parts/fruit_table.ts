@@ -128,11 +128,14 @@ function headOf({ title }: Column, falls: boolean | null, pick: () => void): HTM
   return element("span", { role: "columnheader", "aria-sort": said }, element("button", { type: "button", click: pick }, title + arrow));
 }
 
+/** Names may be cut; numbers never are. */
+const isLong = (text: string): boolean => text.length > 12;
+
 function lineOf(page: Page, columns: readonly Column[], fruit: number, at: number): HTMLElement {
   const facts = factsOf(page, fruit);
   const isChosen = page.selected.value === fruit;
   const pick = (): void => page.selected.set(isChosen ? null : fruit);
-  const cells = columns.map(({ say }) => element("span", { role: "cell" }, say(facts)));
+  const cells = columns.map(({ say }) => element("span", { role: "cell", title: isLong(say(facts)) ? say(facts) : null }, say(facts)));
   const line = element("div", { class: isChosen ? "line chosen" : "line", role: "row", "aria-rowindex": at + 2, click: pick }, ...cells);
   line.style.transform = `translateY(${at * ROW_PX}px)`;
   return line;

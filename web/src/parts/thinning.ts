@@ -50,7 +50,7 @@ function rule(fast: number, from: number, to: number): string {
 
 function lineOf({ label, fruits, drops, thin, clustersToThin }: TreeSummary): HTMLElement {
   const numbers = [fruits, drops, fruits - drops, thin, clustersToThin];
-  return element("tr", {}, element("th", { scope: "row" }, label), ...numbers.map((n) => element("td", {}, whole(n))));
+  return element("tr", {}, element("th", { scope: "row", title: label }, label), ...numbers.map((n) => element("td", {}, whole(n))));
 }
 
 function totalOf(trees: readonly TreeSummary[]): HTMLElement {

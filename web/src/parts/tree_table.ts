@@ -4,6 +4,8 @@ import type { Page } from "../page";
 import { meanMm, treeSummaries, type TreeSummary } from "../summary";
 import { day, number, whole } from "../words";
 
+const BAR_PX = 28;
+
 export function treeTable(page: Page): HTMLElement {
   const { season, filter, target } = page;
   const body = element("tbody");
@@ -38,7 +40,7 @@ function rowLine({ season, filter }: Page, row: string, trees: readonly TreeSumm
   const block = growth?.blocks.find((one) => one.kind === "row" && one.name === row);
   const isChosen = filter.value.row === row && row !== "";
   const pick = (): void => filter.set({ ...filter.value, row: isChosen ? "" : row, tree: null });
-  const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, row || "no row");
+  const button = element("button", { type: "button", title: row || null, "aria-pressed": String(isChosen), click: pick }, row || "no row");
   const cells = [sum(({ fruits }) => fruits), number(meanMm(season, block, own), 1), number(block?.rate_mm_per_day[1] ?? NaN, 2)];
   if (growth?.harvest) cells.push(number(block?.mean_mm[growth.times.length - 1] ?? NaN, 1));
   if (isPlanned) cells.push(sum(({ thin }) => thin));
@@ -50,9 +52,9 @@ function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPla
   const { growth } = season;
   const isChosen = filter.value.tree === tree.tree;
   const pick = (): void => filter.set({ ...filter.value, tree: isChosen ? null : tree.tree });
-  const button = element("button", { type: "button", "aria-pressed": String(isChosen), click: pick }, tree.label);
+  const button = element("button", { type: "button", title: tree.label, "aria-pressed": String(isChosen), click: pick }, tree.label);
   const bar = element("span", { class: "bar", "aria-hidden": "true" });
-  bar.style.width = `${(36 * tree.fruits) / Math.max(1, most)}px`;
+  bar.style.width = `${(BAR_PX * tree.fruits) / Math.max(1, most)}px`;
   const cells = [
     element("td", {}, bar, whole(tree.fruits)),
     element("td", {}, number(meanMm(season, tree.block, [tree]), 1)),
