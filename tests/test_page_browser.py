@@ -217,6 +217,22 @@ def test_the_head_of_the_table_stands_over_its_columns(browser: Any, report: Pat
         assert lefts_of(page, "cell") == lefts_of(page, "columnheader")
 
 
+def test_the_titles_of_columns_are_whole(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+    """September is the longest of months, and an arrow stands behind the title that sorts."""
+    write_report(row.path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 30), target=20))
+    right = "getBoundingClientRect().right"
+    left = f"all => all.map(one => one.{right} - one.querySelector('button').{right})"
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        page.get_by_role("tab", name="Fruits").click()
+        heads = page.get_by_role("columnheader")
+        titles = heads.all_inner_texts()
+        assert "mm, 30 Sept" in titles
+        for number, title in enumerate(titles):
+            heads.nth(number).get_by_role("button").click()
+            assert heads.nth(number).inner_text().split()[-1] in ("\N{UPWARDS ARROW}", "\N{DOWNWARDS ARROW}")
+            assert min(heads.evaluate_all(left)) >= 0, title
+
+
 def test_the_slider_goes_through_the_season(page: Any) -> None:
     last = page.locator("canvas").first.screenshot()
     assert "visit 4 of 4" in page.locator(".when").inner_text()

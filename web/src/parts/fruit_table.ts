@@ -12,7 +12,7 @@ const ROW_PX = 32;
 const SPARE_ROWS = 6;
 
 interface Column {
-  /** Of its widest cell, in ems. */
+  /** Of its widest cell, the title with its arrow among them, in ems. */
   readonly width: number;
   readonly title: string;
   readonly say: (facts: Facts) => string;
@@ -87,19 +87,19 @@ function columnsOf(page: Page): Column[] {
     { width: 5, title: "Tree", say: (one) => one.tree, order: (one) => one.tree },
     { width: 5, title: "State", say: (one) => one.state, order: (one) => one.state },
     { width: 4.6, title: "sure", say: (one) => percent(one.stateProbability), order: (one) => one.stateProbability },
-    { width: 4.4, title: "Visits", say: (one) => String(one.sights), order: (one) => one.sights },
-    { width: 5.4, title: "mm now", say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
+    { width: 5, title: "Visits", say: (one) => String(one.sights), order: (one) => one.sights },
+    { width: 6.6, title: "mm now", say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
   ];
   if (growth) {
     columns.push(
       { width: 7.6, title: "90 %", say: (one) => range(one.lowMm, one.highMm), order: (one) => one.lowMm },
-      { width: 6, title: "mm a day", say: (one) => number(one.rate, 2), order: (one) => one.rate },
+      { width: 7.2, title: "mm a day", say: (one) => number(one.rate, 2), order: (one) => one.rate },
     );
   }
   if (growth?.harvest) {
     const say = (one: Facts): string => number(one.forecastMm, 1);
     columns.push(
-      { width: 6.2, title: `mm, ${day(growth.harvest)}`, say, order: (one) => one.forecastMm },
+      { width: 8.4, title: `mm, ${day(growth.harvest)}`, say, order: (one) => one.forecastMm },
       { width: 7.6, title: "90 %", say: (one) => range(one.forecastLowMm, one.forecastHighMm), order: (one) => one.forecastLowMm },
     );
   }
