@@ -2,6 +2,7 @@
 
 import hashlib
 import http.client
+import ipaddress
 import json
 import socket
 import subprocess
@@ -17,9 +18,11 @@ import pytest
 
 from growth_maker import grow_row
 from page_maker import served
-from pomona import FruitCloud
+from pomona import FruitCloud, PomonaError
 from pomona.fruit_crop import FruitCrop
 from pomona.orchard import OrchardMap, Session, add_session
+from pomona.viewer.own_address import own_address
+from pomona.viewer.page_server import listening
 from test_crops import webp
 
 Pomona = Callable[..., tuple[int, str, str]]
@@ -132,6 +135,7 @@ def let_in(url: str) -> tuple[str, str]:
 def test_other_machines_need_the_token(orchard: Path) -> None:
     with served(orchard, "--host", "0.0.0.0") as url:
         assert urlsplit(url).query.startswith("token=")
+        assert urlsplit(url).hostname != "0.0.0.0", "another machine cannot open that"
         where, cookie = let_in(url)
         assert where == "/"
         for path in ("/", "/page.js", "/page.css", "/season.json"):
@@ -146,6 +150,29 @@ def test_other_machines_need_the_token(orchard: Path) -> None:
         # A name that somebody points to this machine does not help who knows the token.
         assert ask(url, "/season.json", Cookie=cookie, Host="orchard.example")[0] == 403
         assert ask(url, f"//evil.example/?{urlsplit(url).query}")[1]["location"] == "/evil.example/"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0", "::1", "::"])
+def test_what_listens_can_be_asked_where_it_says(host: str) -> None:
+    try:
+        taken = listening(host, 0)
+    except PomonaError as error:
+        pytest.skip(f"no such address here: {error}")
+    with taken:
+        address = own_address(taken)
+        assert host in ("0.0.0.0", "::") or address == host
+        assert not ipaddress.ip_address(address).is_unspecified
+        with socket.create_connection((address, taken.getsockname()[1]), timeout=20) as asked:
+            assert asked.getpeername()[0] == address
+
+
+def test_without_a_way_to_others_it_is_this_machine_s_own_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unreachable(*_: object) -> None:
+        raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(socket.socket, "connect", unreachable)
+    with listening("0.0.0.0", 0) as taken:
+        assert own_address(taken) == "127.0.0.1"
 
 
 def test_a_token_of_one_s_own(pomona: Pomona, orchard: Path) -> None:

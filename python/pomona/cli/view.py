@@ -32,16 +32,18 @@ def view(
     """
     from pomona.cli.page_wishes import page_wishes, tell_guess
     from pomona.cli.progress import working
+    from pomona.viewer.own_address import own_address
     from pomona.viewer.page_server import listening, page_app, serve
     from pomona.viewer.token import token_for
 
     wishes = page_wishes(harvest, temperature, calipers, classes, target, pack_kg, up)
     with listening(host, port) as taken:
-        address, number = taken.getsockname()[:2]
-        known = token_for(address, token)
+        listened, number = taken.getsockname()[:2]
+        known = token_for(listened, token)
         with working(f"telling {orchard}"):
             app = page_app(orchard, wishes, known)
         tell_guess(orchard, wishes)
+        address = own_address(taken)
         place = f"http://{f'[{address}]' if ':' in address else address}:{number}/"
         say(place if known is None else f"{place}?token={known}")
         serve(app, taken)
