@@ -3,7 +3,7 @@ import { schemeOf, type Scheme } from "../colours";
 import { passesOf } from "../filter";
 import { paintOnceAFrame } from "../frames";
 import type { Page } from "../page";
-import { LOOKS, type Moment } from "../scene/moment";
+import { LOOKS, MARKS, type Moment } from "../scene/moment";
 import type { Stage } from "../scene/stage";
 import { watchAll } from "../signal";
 import type { Span } from "../told/history";
@@ -59,7 +59,7 @@ function setOut(page: Page, { fruits }: Stage, { start, end }: Span): void {
 function fill(page: Page, { positions, diameters, colours }: Moment, scheme: Scheme, time: number): void {
   const { history, season } = page;
   const passes = passesOf(page);
-  const [place, size, colour] = [history.placeAt(time), history.sizeAt(time), scheme.at(time)];
+  const [place, size, colour, mark] = [history.placeAt(time), history.sizeAt(time), scheme.at(time), scheme.markAt(time)];
   const visit = history.visitAt(time);
   const isOfStates = page.colour.value === "state";
   for (let fruit = 0; fruit < season.n; fruit++) {
@@ -67,7 +67,7 @@ function fill(page: Page, { positions, diameters, colours }: Moment, scheme: Sch
     const isShown = history.isThere(fruit, time) || (isKnown && isOfStates);
     const look = !isShown ? "hidden" : !passes(fruit) ? "faded" : history.wasSeen(fruit, visit) ? "solid" : "ring";
     colours.set(colour(fruit), 4 * fruit);
-    colours[4 * fruit + 3] = LOOKS[look];
+    colours[4 * fruit + 3] = LOOKS[look] + MARKS[mark(fruit)];
     diameters[fruit] = size(fruit) / 1000;
     place(fruit, positions, 3 * fruit);
   }

@@ -1,10 +1,11 @@
 /** What the row is coloured by, from where it is looked at, and what the colours mean. */
-import { schemeOf, VIRIDIS, type ColourBy, type Ramp, type Swatches } from "../colours";
+import { schemeOf, UNKNOWN, VIRIDIS, type ColourBy, type Ramp, type Swatches } from "../colours";
 import { choice, element, replaceAll } from "../elements";
 import { ANY, isAny, passing } from "../filter";
 import type { Page } from "../page";
 import type { Orbit, View } from "../scene/orbit";
 import { fruits, whole } from "../words";
+import { fruitSwatch } from "./swatch";
 
 const VIEWS: readonly (readonly [View, string])[] = [
   ["side", "Side"],
@@ -14,11 +15,8 @@ const VIEWS: readonly (readonly [View, string])[] = [
 
 export function rowTools(page: Page, orbit: Orbit): HTMLElement {
   const colours = choice("Colour", colourNames(page), (by) => page.colour.set(by));
-  const views = choice("View", VIEWS, (view) => {
-    orbit.see(view);
-    views.show(view);
-  });
-  views.show("free");
+  const views = choice("View", VIEWS, (view) => orbit.see(view));
+  orbit.view.watch(views.show);
   page.colour.watch(colours.show);
   return element("div", { class: "row-tools" }, element("span", { class: "label" }, "Colour"), colours.root, views.root);
 }
@@ -39,13 +37,14 @@ export function legend(page: Page): HTMLElement {
   page.colour.watch(() => {
     const { legend } = schemeOf(page);
     const title = element("span", { class: "label" }, legend.title);
-    replaceAll(root, title, legend.kind === "ramp" ? ramp(legend) : swatches(legend), legend.kind === "ramp" ? unseen() : null);
+    replaceAll(root, title, legend.kind === "ramp" ? ramp(legend) : swatches(legend), ...(legend.kind === "ramp" ? besides(legend) : []));
   });
   return root;
 }
 
-function unseen(): HTMLElement {
-  return element("span", { class: "swatch soft" }, element("span", { class: "dot ring", "aria-hidden": "true" }), "not seen then");
+function besides({ hasUnknown }: Ramp): HTMLElement[] {
+  const unseen = fruitSwatch("not seen then", "currentcolor", true);
+  return hasUnknown ? [fruitSwatch("not known", UNKNOWN, false, "dot"), unseen] : [unseen];
 }
 
 /** Says that not all fruits are looked at, and ends it. */
@@ -65,10 +64,6 @@ function ramp({ low, high }: Ramp): HTMLElement {
 }
 
 function swatches({ swatches }: Swatches): HTMLElement {
-  const items = swatches.map(({ name, rgb, isRing }) => {
-    const dot = element("span", { class: isRing ? "dot ring" : "dot", "aria-hidden": "true" });
-    dot.style.color = `rgb(${rgb.join(",")})`;
-    return element("span", { class: "swatch" }, dot, name);
-  });
+  const items = swatches.map(({ name, rgb, isRing, mark }) => fruitSwatch(name, rgb, isRing, mark));
   return element("span", { class: "swatches" }, ...items);
 }

@@ -7,13 +7,14 @@ import { extentOf } from "../scene/extent";
 import { steer } from "../scene/gestures";
 import { Orbit } from "../scene/orbit";
 import { fruitAt } from "../scene/picking";
-import { LOOKS } from "../scene/moment";
+import { LOOKS, MARKS } from "../scene/moment";
 import { Stage } from "../scene/stage";
-import type { Ink, Stroke } from "../scene/strokes";
+import { dashed, type Ink, type Stroke } from "../scene/strokes";
 import { Signal, watchAll } from "../signal";
 import { inkRgb, repaint } from "../theme";
 import type { Season } from "../told/season";
 import { fruits, number } from "../words";
+import { fruitSwatch, lineSwatch } from "./swatch";
 
 const GAP_M = 0.5;
 /** Of the fruits of a visit: where less were seen before, that was another row. */
@@ -23,6 +24,8 @@ const BOTH: Rgb = [0, 158, 115];
 const FIRST_ONLY: Rgb = [230, 159, 0];
 const SECOND_ONLY: Rgb = [86, 180, 233];
 const UNSURE: Rgb = [213, 94, 0];
+/** Triangles on what only one of the dates has point to where it hangs in the picture. */
+const [ABOVE, BELOW] = ["up", "down"] as const;
 const FAINT = 0.35;
 /** Probability below which a line stands out. */
 const SURE = 0.9;
@@ -108,16 +111,12 @@ function pick({ season }: Page, where: string, chosen: Signal<number>): HTMLElem
 }
 
 function key(): HTMLElement {
-  const kinds: [string, Rgb][] = [
-    ["on both dates", BOTH],
-    ["above only", FIRST_ONLY],
-    ["below only", SECOND_ONLY],
+  const items = [
+    fruitSwatch("on both dates", BOTH, false),
+    fruitSwatch("above only", FIRST_ONLY, false, ABOVE),
+    fruitSwatch("below only", SECOND_ONLY, false, BELOW),
+    lineSwatch("less than 90\u00a0% sure", UNSURE),
   ];
-  const items = kinds.map(([name, rgb]) => {
-    const dot = element("span", { class: "dot", "aria-hidden": "true" });
-    dot.style.color = `rgb(${rgb.join(",")})`;
-    return element("span", { class: "swatch" }, dot, name);
-  });
   return element("span", { class: "swatches" }, ...items);
 }
 
@@ -148,8 +147,9 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
     positions[3 * fruit + 2] += half;
     positions[3 * other + 2] -= half;
     const rgb = inA && inB ? BOTH : inA ? FIRST_ONLY : SECOND_ONLY;
-    colours.set([...rgb, inA ? look : LOOKS.hidden], 4 * fruit);
-    colours.set([...rgb, inB ? look : LOOKS.hidden], 4 * other);
+    const mark = MARKS[inA && inB ? "none" : inA ? ABOVE : BELOW];
+    colours.set([...rgb, inA ? look + mark : LOOKS.hidden], 4 * fruit);
+    colours.set([...rgb, inB ? look + mark : LOOKS.hidden], 4 * other);
     diameters[fruit] = sizeA(fruit) / 1000;
     diameters[other] = sizeB(fruit) / 1000;
     if (inA && inB) counts.both++;
@@ -159,7 +159,8 @@ function compare(page: Page, stage: Stage, dates: Dates, half: number): Counts {
     const isChosen = selected.value === fruit;
     const isSure = sureOf(page, fruit, Math.max(a, b)) >= SURE;
     const ink: Ink = isChosen ? [...inkRgb("accent"), 1] : isSure ? [...inkRgb("soft"), FAINT] : [...UNSURE, 0.9];
-    strokes.push({ from: at(positions, fruit), to: at(positions, other), ink });
+    const stroke = { from: at(positions, fruit), to: at(positions, other), ink };
+    strokes.push(...(isSure ? [stroke] : dashed(stroke)));
     const grown = measured(page, fruit, b) - measured(page, fruit, a);
     if (Number.isNaN(grown)) continue;
     counts.growthMm += grown;
@@ -190,5 +191,5 @@ function sureOf(page: Page, fruit: number, visit: number): number {
 function summary({ season }: Page, { first, second }: Dates, counts: Counts): string {
   const [a, b] = [season.visits[first.value].title, season.visits[second.value].title];
   const grown = counts.measured > 0 ? `, where the mean of their measured diameters differs by ${number(counts.growthMm / counts.measured, 1)} mm` : "";
-  return `${fruits(counts.both)} on both dates${grown}; ${fruits(counts.first)} on ${a} only, ${fruits(counts.second)} on ${b} only. Lines join the same fruit; red ones are less than 90 % sure.`;
+  return `${fruits(counts.both)} on both dates${grown}; ${fruits(counts.first)} on ${a} only, ${fruits(counts.second)} on ${b} only. Lines join the same fruit; red, dashed ones are less than 90 % sure.`;
 }

@@ -30,6 +30,9 @@ const ANGLES: Record<View, readonly [number, number]> = {
 export class Orbit {
   readonly looking = new Signal<Looking>({ target: [0, 0, 0], azimuth: 0, elevation: 0, distance: 1 });
 
+  /** From where it is looked at; whoever turns the camera looks aslant. */
+  readonly view: Signal<View>;
+
   private whole: View | null = null;
   private aspect = 2;
 
@@ -37,6 +40,7 @@ export class Orbit {
     private readonly extent: Extent,
     view: View,
   ) {
+    this.view = new Signal(view);
     this.see(view);
   }
 
@@ -57,6 +61,7 @@ export class Orbit {
     let looking: Looking = { target: middleOf(this.extent), azimuth, elevation, distance: 0 };
     for (let i = 0; i < CENTRINGS; i++) looking = this.fitted(looking);
     this.whole = view;
+    this.view.set(view);
     this.looking.set(looking);
   }
 
@@ -81,6 +86,7 @@ export class Orbit {
   turn(byAzimuth: number, byElevation: number): void {
     const { azimuth, elevation, ...rest } = this.looking.value;
     this.whole = null;
+    this.view.set("free");
     const raised = Math.min(STRAIGHT_DOWN, Math.max(-0.3, elevation + byElevation));
     this.looking.set({ ...rest, azimuth: azimuth + byAzimuth, elevation: raised });
   }

@@ -12,12 +12,16 @@ in vec4 colourFrom, colourTo;
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform float share, pixels, least;
 flat out vec3 tint;
-flat out float look, rim;
+flat out float look, rim, mark;
 void main() {
   gl_Position = projectionMatrix * modelViewMatrix * vec4(mix(placeFrom, placeTo, share), 1.0);
-  gl_PointSize = max(pixels * mix(diameterFrom, diameterTo, share) / gl_Position.w, least);
+  float code = floor(255.0 * colourFrom.a + 0.5);
+  mark = mod(code, 16.0);
+  look = (code - mark) / 255.0;
+  // A mark is no mark in two pixels.
+  float smallest = mark > 0.5 ? 2.8 * least : least;
+  gl_PointSize = max(pixels * mix(diameterFrom, diameterTo, share) / gl_Position.w, smallest);
   tint = mix(colourFrom.rgb, colourTo.rgb, share);
-  look = colourFrom.a;
   rim = 1.0 - 3.0 / gl_PointSize;
   if (look < 0.1) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }`;
@@ -26,18 +30,27 @@ void main() {
 const FRAGMENT = `#version 300 es
 precision mediump float;
 flat in vec3 tint;
-flat in float look, rim;
+flat in float look, rim, mark;
 uniform vec3 background;
 out vec4 shown;
+// Dot, cross, bar, and triangles that point up and down: y is down.
+bool isMarked(vec2 at, float r2) {
+  if (mark < 1.5) return r2 < 0.1;
+  if (mark < 2.5) return min(abs(at.x - at.y), abs(at.x + at.y)) < 0.22 && r2 < 0.5;
+  if (mark < 3.5) return abs(at.y) < 0.18 && abs(at.x) < 0.64;
+  float up = mark < 4.5 ? -at.y : at.y;
+  return up > -0.36 && abs(at.x) < 0.58 * (0.6 - up);
+}
 void main() {
   vec2 at = 2.0 * gl_PointCoord - 1.0;
   float r2 = dot(at, at);
-  if (r2 > 1.0 || (look > 0.5 && look < 0.8 && r2 < 0.4)) discard;
+  bool isInside = mark > 0.5 && isMarked(at, r2);
+  if (r2 > 1.0 || (look > 0.5 && look < 0.8 && r2 < 0.4 && !isInside)) discard;
   vec3 normal = vec3(at.x, -at.y, sqrt(1.0 - r2));
   float light = 0.62 + 0.42 * dot(normal, vec3(-0.38, 0.56, 0.73));
   float mirrored = max(dot(normal, vec3(-0.25, 0.42, 0.87)), 0.0);
   float power2 = mirrored * mirrored, power4 = power2 * power2, power8 = power4 * power4;
-  vec3 lit = look > 0.8 ? tint * light + 0.22 * power8 * power8 * power8 : tint;
+  vec3 lit = isInside && look > 0.8 ? vec3(0.08) : look > 0.8 ? tint * light + 0.22 * power8 * power8 * power8 : tint;
   // The rim fades where it has two pixels for it: most fruits hang before nothing.
   float solid = rim > 0.3 && look > 0.8 ? 1.0 - smoothstep(rim, 1.0, sqrt(r2)) * 0.7 : 1.0;
   shown = vec4(look < 0.5 ? mix(background, tint, 0.28) : mix(background, lit, solid), 1.0);

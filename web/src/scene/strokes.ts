@@ -30,6 +30,14 @@ export interface Stroke {
   readonly ink: Ink;
 }
 
+const DASHES = 21;
+
+/** The same line in pieces, half of its length drawn. */
+export function dashed({ from, to, ink }: Stroke): Stroke[] {
+  const at = (share: number): Point => [0, 1, 2].map((axis) => from[axis] + share * (to[axis] - from[axis])) as unknown as Point;
+  return Array.from({ length: DASHES }, (_, i) => ({ from: at(i / (DASHES - 0.5)), to: at((i + 0.5) / (DASHES - 0.5)), ink }));
+}
+
 export interface Strokes {
   readonly mesh: Mesh;
   readonly set: (strokes: readonly Stroke[]) => void;
