@@ -94,6 +94,17 @@ def test_states_are_told_without_colours(browser: Any, tmp_path: Path) -> None:
     assert len(set(pictures[0][1])) == len(STATES)
 
 
+def test_what_another_visit_of_the_day_saw_is_no_ring(browser: Any, tmp_path: Path) -> None:
+    """Each visit goes along a row of its own: what the last one did not see has not hid from that day."""
+    whole, parted = drawn((0, LAST)), drawn((0, LAST))
+    visit = np.where(np.arange(2 * N) % 4 == 1, LAST - 1, np.tile((0, LAST), N))
+    parted["sights"]["visit"] = packed(visit)
+    for document in (whole, parted):
+        document["visits"][LAST - 1]["date"] = document["visits"][LAST]["date"]
+    (one, _), (other, _) = (row_in(browser, tmp_path / "report.html", each, "State") for each in (whole, parted))
+    assert np.mean(one != other) < ALIKE
+
+
 def test_plans_are_told_without_colours(browser: Any, tmp_path: Path) -> None:
     keep, thin, drops, unknown = (1.0, 1.0), (9.0, 1.0), (np.nan, 1.0), (np.nan, np.nan)
     pictures = [

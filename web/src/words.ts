@@ -13,5 +13,8 @@ export const day = (time: number): string => DAY.format(time);
 export const fullDay = (time: number): string => FULL_DAY.format(time);
 export const fruits = (n: number): string => (n === 1 ? "1 fruit" : `${whole(n)} fruits`);
 
+/** Milliseconds of a day. */
+export const DAY_MS = 86_400_000;
+
 /** Milliseconds of a local day or moment of the orchard, as if it lay in Greenwich: days are counted, zones are not. */
 export const timeOf = (iso: string): number => Date.parse(iso.includes("T") ? `${iso}Z` : iso);

@@ -3,13 +3,12 @@ import type { Page } from "../page";
 import { hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
-import { day, fruits, fullDay, percent, whole } from "../words";
+import { DAY_MS, day, fruits, fullDay, percent, whole } from "../words";
 
 /** A tree that grows so much slower than all is worth a look. */
 const SLOW = 0.9;
 /** Days to the harvest below which another visit tells nothing that could still be decided, and below which it is the last. */
 const [LEAST_DAYS, FEW_DAYS] = [7, 21];
-const DAY_MS = 86_400_000;
 const MISSED = STATES.indexOf("missed");
 
 export function advice(page: Page): string[] {

@@ -65,7 +65,7 @@ function fill(page: Page, { positions, diameters, colours }: Moment, scheme: Sch
   for (let fruit = 0; fruit < season.n; fruit++) {
     const isKnown = history.first[fruit] <= visit;
     const isShown = history.isThere(fruit, time) || (isKnown && isOfStates);
-    const look = !isShown ? "hidden" : !passes(fruit) ? "faded" : history.wasSeen(fruit, visit) ? "solid" : "ring";
+    const look = !isShown ? "hidden" : !passes(fruit) ? "faded" : history.wasSeenThatDay(fruit, visit) ? "solid" : "ring";
     colours.set(colour(fruit), 4 * fruit);
     colours[4 * fruit + 3] = LOOKS[look] + MARKS[mark(fruit)];
     diameters[fruit] = size(fruit) / 1000;

@@ -1,10 +1,9 @@
 /** The season as a slider: a mark for each visit, a part that is foretold, and a button that plays it. */
 import { drawing, element } from "../elements";
 import type { Page } from "../page";
-import { fullDay } from "../words";
+import { DAY_MS, fullDay } from "../words";
 
 const SEASON_SECONDS = 9;
-const DAY_MS = 86_400_000;
 
 export function timeSlider({ history, time }: Page): HTMLElement {
   const [start, end] = [history.times[0], history.end];

@@ -13,13 +13,12 @@ import { dashed, type Ink, type Stroke } from "../scene/strokes";
 import { Signal, watchAll } from "../signal";
 import { inkRgb, repaint } from "../theme";
 import type { Season } from "../told/season";
-import { fruits, number } from "../words";
+import { DAY_MS, fruits, number } from "../words";
 import { fruitSwatch, lineSwatch } from "./swatch";
 
 const GAP_M = 0.5;
 /** Of the fruits of a visit: where less were seen before, that was another row. */
 const FEW = 0.1;
-const DAY_MS = 86_400_000;
 const BOTH: Rgb = [0, 158, 115];
 const FIRST_ONLY: Rgb = [230, 159, 0];
 const SECOND_ONLY: Rgb = [86, 180, 233];

@@ -1,6 +1,7 @@
 /** Every fruit on every visit: where it was, whether it was seen, how big it was, then and between visits. */
 import type { Season } from "./season";
 import { STATES, type State } from "./season";
+import { DAY_MS } from "../words";
 
 const GONE = STATES.indexOf("gone");
 const USUAL_MM = 60;
@@ -13,6 +14,8 @@ export interface History {
   readonly first: Int32Array;
   readonly last: Int32Array;
   readonly wasSeen: (fruit: number, visit: number) => boolean;
+  /** By that visit or another one of its day: each goes along a row of its own. */
+  readonly wasSeenThatDay: (fruit: number, visit: number) => boolean;
   /** The visit that was the last at a time. */
   readonly visitAt: (time: number) => number;
   /** Whether a fruit is known of by then, and not gone yet. */
@@ -51,14 +54,17 @@ export function historyOf(season: Season): History {
       sizes[fruit * nVisits + v] = size;
     }
   }
+  const dayOf = times.map((time) => Math.floor(time / DAY_MS));
+  const ofDay = dayOf.map((day) => [...dayOf.keys()].filter((v) => dayOf[v] === day));
+  const wasSeenThatDay = (fruit: number, v: number): boolean => ofDay[v].some((other) => seen[fruit * nVisits + other] === 1);
   const visitAt = (time: number): number => Math.max(0, times.findLastIndex((one) => one <= time));
   const growth = season.growth;
 
   const stateAt = (fruit: number, time: number): State => {
     const v = visitAt(time);
     if (season.state[fruit] === GONE && v > last[fruit]) return "gone";
-    if (!seen[fruit * nVisits + v]) return "missed";
-    return v > 0 && v === first[fruit] ? "new" : "seen";
+    if (!wasSeenThatDay(fruit, v)) return "missed";
+    return dayOf[v] > dayOf[0] && dayOf[first[fruit]] === dayOf[v] ? "new" : "seen";
   };
   const sizeAt = (time: number) => {
     const v = visitAt(time);
@@ -82,6 +88,7 @@ export function historyOf(season: Season): History {
     first,
     last,
     wasSeen: (fruit, v) => seen[fruit * nVisits + v] === 1,
+    wasSeenThatDay,
     visitAt,
     isThere: (fruit, time) => {
       const v = visitAt(time);
