@@ -23,6 +23,7 @@ NAMES = (
     "season",
     "season_map",
     "growth",
+    "thinning",
     "seasons",
     "mapscale",
     "million",

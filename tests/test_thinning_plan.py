@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from collections.abc import Callable
 from contextlib import closing
@@ -9,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from growth_maker import GrownRow, grow_row
 from pomona import geopackage
 from pomona.growth.clusters import clusters_of
-from pomona.growth.fruit_drop import drop_of
+from pomona.growth.fruit_drop import SURE_TO, MeasuredRates, drop_of
 from pomona.viewer.season_page import Wishes, season_document
 from test_page_document import unpacked
 
@@ -142,21 +144,109 @@ def test_of_apples_near_the_harvest_none_is_foretold_to_drop(pomona: Pomona, tmp
     assert [line["action"] for line in lines].count("thin") == 20
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
-def test_as_many_drop_as_are_slow(share: float) -> None:
-    rng = np.random.default_rng(4)
-    slow = rng.random(400) < share
-    rates = np.where(slow, 0.2, rng.normal(0.9, 0.1, 400)) + rng.normal(0.0, 0.1, 400)
-    found = drop_of(rates, 0.1)
-    assert found.fast_mm_per_day == pytest.approx(0.9 + 1.28 * 0.1, abs=0.06)
-    assert np.mean((found.probabilities > 0.5) == slow) > 0.97
-    assert found.share == pytest.approx(share, abs=0.03)
+def rates_of(mm_per_day: NDArray[np.float64], n_days: float = 7.0) -> MeasuredRates:
+    """As two visits tell them of fruitlets of 20 mm, when nothing is known of their noise."""
+    per_mm = np.full(len(mm_per_day), np.sqrt(2.0) / n_days)
+    return MeasuredRates(mm_per_day, per_mm, (2.0, 0.6), 0.57 / n_days, 10.0 / n_days)
+
+
+def drawn_rates(
+    share: float, noise_mm: float, n_days: float, seed: int, n: int = 120
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Rates of fruits that stay, 0.8 mm a day give or take a tenth, and of some that grow at 0 to 0.3."""
+    rng = np.random.default_rng(seed)
+    slow = np.arange(n) < share * n
+    true = np.where(slow, rng.uniform(0.0, 0.3, n), rng.normal(0.8, 0.08, n))
+    return true + rng.normal(0.0, noise_mm * np.sqrt(2.0) / n_days, n), slow
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.33, 0.6])
+@pytest.mark.parametrize(("noise_mm", "n_days"), [(0.1, 5.0), (0.5, 7.0), (1.0, 14.0)])
+def test_as_many_drop_as_are_slow(share: float, noise_mm: float, n_days: float) -> None:
+    rates, slow = drawn_rates(share, noise_mm, n_days, seed=4)
+    found = drop_of(rates_of(rates, n_days))
+    assert found.is_told
+    assert np.mean((found.probabilities > 0.5) == slow) > 0.96
+    assert found.share == pytest.approx(share, abs=0.04)
+    assert found.fast_mm_per_day == pytest.approx(0.8 + 1.28 * 0.08, abs=0.08)
+
+
+@pytest.mark.parametrize(("noise_mm", "n_days"), [(2.0, 3.0), (1.0, 1.0), (2.0, 0.014)])
+def test_visits_too_close_say_so_and_leave_the_prior(noise_mm: float, n_days: float) -> None:
+    """The fastest of noisy rates are the luckiest: against them all others are slow."""
+    rates, _ = drawn_rates(0.0, noise_mm, n_days, seed=5)
+    found = drop_of(rates_of(rates, n_days))
+    assert not found.is_told
+    assert found.sigma_mm_per_day == pytest.approx(noise_mm * np.sqrt(2.0) / n_days, rel=0.5)
+    # The prior's mean is .29.
+    assert 0.1 < found.probabilities.mean() < 0.35
+    assert 0.35 < found.wanted_mm_per_day / SURE_TO < 1.0
+
+
+def test_probabilities_of_dropping_are_those_that_come_true() -> None:
+    told = [
+        (drop_of(rates_of(rates, n_days)).probabilities, slow)
+        for n_days in (4.0, 6.0, 9.0)
+        for share in (0.1, 0.3, 0.5)
+        for seed in range(4)
+        for rates, slow in [drawn_rates(share, 1.0, n_days, seed)]
+    ]
+    said, slow = (np.concatenate(each) for each in zip(*told, strict=True))
+    for low in (0.05, 0.25, 0.5, 0.75):
+        some = (said > low) & (said < low + 0.2)
+        assert some.sum() > 60
+        assert slow[some].mean() == pytest.approx(said[some].mean(), abs=0.12)
+
+
+def test_a_diameter_of_another_fruit_says_nothing_of_the_others() -> None:
+    rates, slow = drawn_rates(0.3, 0.3, 7.0, seed=6)
+    rates[-3:] = [-2.0, 3.0, 5.0]
+    found = drop_of(rates_of(rates))
+    assert found.is_told
+    assert np.mean((found.probabilities > 0.5)[:-3] == slow[:-3]) > 0.98
+    np.testing.assert_allclose(found.probabilities[-3:], found.share, atol=0.05)
+
+
+def test_the_order_of_fruits_does_not_move_who_drops() -> None:
+    rates, _ = drawn_rates(0.3, 1.0, 6.0, seed=7)
+    order = np.random.default_rng(7).permutation(len(rates))
+    found, again = drop_of(rates_of(rates, 6.0)), drop_of(rates_of(rates[order], 6.0))
+    np.testing.assert_array_equal(again.probabilities, found.probabilities[order])
+    assert again.fast_mm_per_day == found.fast_mm_per_day
 
 
 def test_what_was_not_measured_has_no_probability() -> None:
-    found = drop_of(np.array([0.9, np.nan, 0.8, 0.95, 0.1]), 0.05)
-    assert np.isnan(found.probabilities).tolist() == [False, True, False, False, False]
-    assert found.probabilities[4] > 0.9
+    found = drop_of(rates_of(np.array([0.9, np.nan, 0.8, 0.95, 0.85, 0.82, 0.88, 0.1]), 60.0))
+    assert np.isnan(found.probabilities).tolist() == [False, True, *[False] * 6]
+    assert found.probabilities[-1] > 0.9
+
+
+def test_what_cannot_be_told_is_no_verdict(pomona: Pomona, tmp_path: Path) -> None:
+    """Nothing drops, and visits three days apart with 2 mm of noise said that everything will."""
+    path = grow_row(tmp_path / "o.gpkg", days=(35, 38), n_trees=2, noise_mm=2.0, scales=(1.0, 1.0)).path
+    code, printed, told = pomona("thinning", path, "--target", 20, "-o", tmp_path / "thin.csv")
+    assert (code, told) == (0, "")
+    assert "from 2024-05-30 to 2024-06-02, cannot tell which fruits will drop" in printed
+    assert re.search(r"wait until 2024-06-(0[5-9]|1[0-9]), or measure from nearer", printed)
+    assert [line.split()[1:5] for line in printed.splitlines()[3:]] == [["30", "-", "-", "10"]] * 2
+    with (tmp_path / "thin.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert [line["action"] for line in lines].count("drops") == 0
+    assert all(0.0 < float(line["drop_probability"]) < 0.9 for line in lines)
+    found = json.loads(pomona("thinning", path, "--json")[1])
+    assert not found["is_told"]
+    assert found["rate_sigma_mm_per_day"] > found["wanted_sigma_mm_per_day"]
+    assert [tree["n_dropping"] for tree in found["trees"]] == [None, None]
+
+
+def test_a_third_that_all_but_stand_still_is_found(pomona: Pomona, tmp_path: Path) -> None:
+    """Of 90 fruitlets a third at a quarter of the rate, by calipers: none of them was found."""
+    slow = range(0, 90, 3)
+    row = grow_row(tmp_path / "o.gpkg", (35, 42), noise_mm=0.1, scales=(1.0, 1.0), dropping=slow, slowed_from=35.0)
+    assert pomona("thinning", row.path, "-o", tmp_path / "thin.csv")[0] == 0
+    with (tmp_path / "thin.csv").open(newline="") as file:
+        said = {int(line["fruit_id"]) - 1 for line in csv.DictReader(file) if line["action"] == "drops"}
+    assert said == set(slow)
 
 
 def test_clusters_are_chains_of_neighbours() -> None:

@@ -31,13 +31,13 @@ def thinning(
 ) -> None:
     """Tell which fruits will drop by the growth-rate rule, and which to thin to come to a target load.
 
-    Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop. What a
-    tree keeps beyond the target is thinned out of the fullest clusters, the smallest fruits first. Trees are those of
-    the map, and where it has none those that `pomona map trees` would find; without any a target is refused.
+    Between the last two days of visits, fruits that grow at less than half the rate of the fastest will drop; where the
+    days are too close to tell, none is said to. What a tree keeps beyond the target is thinned out of the fullest
+    clusters, the smallest fruits first. Trees are those of the map, and where it has none those that `pomona map trees`
+    would find; without any a target is refused.
     """
-    from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM
     from pomona.growth.season_growth import grow_season
-    from pomona.growth.thinning_plan import are_fruitlets, plan_thinning
+    from pomona.growth.thinning_plan import plan_thinning
 
     grown = grow_season(orchard)
     plan = plan_thinning(grown, target)
@@ -45,18 +45,50 @@ def thinning(
         _write(output, grown, plan)
     trees = _trees(grown, plan)
     if json:
-        say_json({"fast_mm_per_day": plan.drop.fast_mm_per_day, "target": target, "trees": trees})
+        say_json({"target": target, **_rates(plan), "trees": trees})
         return
-    before, last = sorted(set(grown.fruits.days))[-2:]
-    say(f"{orchard}: from {before} to {last}, the fastest fruits grew {plan.drop.fast_mm_per_day:.2f} mm a day")
-    if not are_fruitlets(grown):
-        say(f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which will drop")
+    say(*_about(orchard, grown, plan))
     say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
     for tree in trees:
-        counts = f"{tree['n_fruits']:>7} {tree['n_dropping']:>9} {tree['n_staying']:>6} {tree['n_to_thin']:>8}"
+        drops, stay = ("-" if tree[name] is None else tree[name] for name in ("n_dropping", "n_staying"))
+        counts = f"{tree['n_fruits']:>7} {drops:>9} {stay:>6} {tree['n_to_thin']:>8}"
         say(f"  {(tree['tree'] or _of_none(trees))[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
     if target is not None and not trees[-1]["tree"]:
         say(f"  {amount(trees[-1]['n_fruits'], 'fruit')} of no tree: none of them is thinned")
+
+
+def _rates(plan: ThinningPlan) -> dict[str, Any]:
+    """Put in numbers what the rates say of all fruits, and how sure one is."""
+    return {
+        "fast_mm_per_day": plan.drop.fast_mm_per_day,
+        "rate_sigma_mm_per_day": plan.drop.sigma_mm_per_day,
+        "wanted_sigma_mm_per_day": plan.drop.wanted_mm_per_day,
+        "is_told": plan.drop.is_told,
+    }
+
+
+def _about(orchard: Path, grown: SeasonGrowth, plan: ThinningPlan) -> list[str]:
+    """Say between which days, and what they tell; where it is too little, until when to wait."""
+    from datetime import timedelta
+
+    from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM
+    from pomona.growth.thinning_plan import are_fruitlets
+
+    before, last = sorted(set(grown.fruits.days))[-2:]
+    between = f"{orchard}: from {before} to {last},"
+    fastest = f"{between} the fastest fruits grew {plan.drop.fast_mm_per_day:.2f} mm a day"
+    if not are_fruitlets(grown):
+        return [
+            fastest,
+            f"  no fruitlets, which are up to {LARGEST_FRUITLET_MM:g} mm: the rule does not tell which will drop",
+        ]
+    if plan.drop.is_told:
+        return [fastest]
+    return [
+        f"{between} cannot tell which fruits will drop: their rates are sure to {plan.drop.sigma_mm_per_day:.2f} mm a "
+        f"day, and must be to {plan.drop.wanted_mm_per_day:.2f}",
+        f"  wait until {before + timedelta(days=plan.days_to_wait)}, or measure from nearer",
+    ]
 
 
 def _of_none(trees: list[dict[str, Any]]) -> str:
@@ -67,7 +99,10 @@ def _of_none(trees: list[dict[str, Any]]) -> str:
 def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:
     import numpy as np
 
+    from pomona.growth.thinning_plan import are_fruitlets
+
     numbers, actions = grown.fruits.trees.numbers[plan.rows], np.array(plan.actions)
+    is_told = plan.drop.is_told or not are_fruitlets(grown)
     found = []
     for number, name in enumerate(grown.fruits.trees.names):
         of_tree = numbers == number
@@ -79,8 +114,8 @@ def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:
             {
                 "tree": name or None,
                 "n_fruits": n_fruits,
-                "n_dropping": n_dropping,
-                "n_staying": n_fruits - n_dropping,
+                "n_dropping": n_dropping if is_told else None,
+                "n_staying": n_fruits - n_dropping if is_told else None,
                 "n_to_thin": int(thin.sum()),
                 "n_clusters_to_thin": len(set(plan.clusters[thin].tolist())),
             }

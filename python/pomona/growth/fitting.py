@@ -13,18 +13,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import gammaincinv, gammaln, ndtri
 
 from pomona.growth.curve_families import CurveFamily
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.size_table import SizeTable
+from pomona.growth.student_points import student_density, student_points
 
 __all__ = ["N_NUMBERS", "FittedShape", "fit_shape", "likeliest_shape"]
 
 Numbers = NDArray[np.float64]
-
-_TAILS = 5.0
-"""Degrees of freedom of the t they come from: its tails reach beyond the posterior's."""
 
 _MOST_FRUITS = 1000
 """That a shape is fitted to; eight numbers need no more."""
@@ -128,8 +125,8 @@ class FittedShape:
         return tuple(self._posterior.shape(z) for z in drawn), weights
 
     def _round(self, even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
-        drawn, log_density = _student(even, middle, root)
-        log_weights = np.array([self._posterior(z) for z in drawn]) - log_density
+        drawn = student_points(even, middle, root)
+        log_weights = np.array([self._posterior(z) for z in drawn]) - student_density(drawn, middle, root)
         weights = np.exp(log_weights - log_weights.max())
         # One shape in a corner that few reach must not speak for all (truncated importance sampling, Ionides 2008).
         weights = np.minimum(weights, np.sqrt(len(weights)) * weights.mean())
@@ -171,14 +168,3 @@ def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
         both = posterior(mode + steps[i] + steps[j]) + posterior(mode - steps[i] - steps[j])
         curvature[i, j] = curvature[j, i] = 0.5 * (sum(ends[i]) + sum(ends[j]) - 2.0 * middle - both)
     return np.asarray(curvature / _STEP**2)
-
-
-def _student(even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
-    """Turn points in the unit cube into ones of a multivariate t, and give the logarithms of its density there."""
-    n = len(middle)
-    stretch = np.sqrt(0.5 * _TAILS / gammaincinv(0.5 * _TAILS, even[:, n]))
-    away = ndtri(even[:, :n]) * stretch[:, None]
-    constant = gammaln((_TAILS + n) / 2) - gammaln(_TAILS / 2) - n / 2 * np.log(_TAILS * np.pi)
-    constant -= np.linalg.slogdet(root)[1]
-    log_density = constant - (_TAILS + n) / 2 * np.log1p((away**2).sum(axis=1) / _TAILS)
-    return middle + away @ root.T, np.asarray(log_density)

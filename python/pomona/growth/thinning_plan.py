@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.growth.clusters import clusters_of
-from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM, FruitDrop, drop_of
+from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM, FruitDrop, MeasuredRates, drop_of
 from pomona.growth.season_clock import CALENDAR
 from pomona.growth.season_growth import SeasonGrowth
+from pomona.growth.trust import OFF_BY
 
 __all__ = ["ThinningPlan", "are_fruitlets", "plan_thinning", "rates_are_known"]
 
 KEEP, DROPS, THIN = "keep", "drops", "thin"
+
+_NOISE_SPREAD = 0.6
+"""Standard deviation of the logarithm of the noise, around the season's: that one swells with fruits that drop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +33,12 @@ class ThinningPlan:
     clusters, cluster_sizes : (M,) int64
         Cluster of each, and how many hang in it.
     sizes_mm, rates_mm_per_day : (M,) float64
-        At the last visit, and between the last two days; NaN for a fruit that one of them did not measure.
+        At the last visit, and between the last two days as measured; NaN for a fruit that one of them did not measure.
     drop : FruitDrop
-        Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known.
+        Of the M fruits. Where they are no fruitlets any more (`are_fruitlets`), no probability is known; where the two
+        days are too close (`FruitDrop.is_told`), none is foretold to drop.
+    n_days : float
+        Between the last two days.
     places : (M,) float64
         Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. 0
         for what hangs on no tree, which no target thins, and NaN for what drops.
@@ -45,8 +52,14 @@ class ThinningPlan:
     sizes_mm: NDArray[np.float64]
     rates_mm_per_day: NDArray[np.float64]
     drop: FruitDrop
+    n_days: float
     places: NDArray[np.float64]
     actions: tuple[str, ...]
+
+    @property
+    def days_to_wait(self) -> int:
+        """How many days must lie between two visits that are to tell who will drop, measured and grown as these."""
+        return int(np.ceil(self.n_days * self.drop.sigma_mm_per_day / self.drop.wanted_mm_per_day))
 
 
 def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> ThinningPlan:
@@ -70,15 +83,16 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
             "can be told, `pomona map trees` takes them with --trees FILE or parts rows with --segments METRES"
         )
     rows = np.flatnonzero(fruits.hanging)
-    rates, noise = _rates(growth)
     if not rates_are_known(growth):
         raise PomonaError(f"{fruits.path}: found no fruit that was measured on both of the last two days of visits")
-    drop = drop_of(rates[rows], noise)
+    rates, n_days = _rates(growth)
+    measured = rates.mm_per_day[rows]
+    drop = drop_of(replace(rates, mm_per_day=measured, per_mm=rates.per_mm[rows]))
     if not are_fruitlets(growth):
-        drop = FruitDrop(np.full(len(rows), np.nan), drop.fast_mm_per_day, 0.0)
+        drop = replace(drop, probabilities=np.full(len(rows), np.nan), share=0.0)
     clusters = clusters_of(fruits.cloud.positions[rows])
     sizes_mm = growth.foretold.sizes_mm[rows, len(fruits.days) - 1]
-    drops = np.nan_to_num(drop.probabilities) > 0.5
+    drops = (np.nan_to_num(drop.probabilities) > 0.5) & drop.is_told
     places = np.full(len(rows), np.nan)
     for tree, name in enumerate(fruits.trees.names):
         of_tree = np.flatnonzero((fruits.trees.numbers[rows] == tree) & ~drops)
@@ -89,7 +103,8 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
         places[given_first] = np.arange(len(of_tree), 0, -1)
     thin = np.zeros(len(rows), dtype=bool) if target_per_tree is None else places > target_per_tree
     actions = tuple(DROPS if gone else THIN if taken else KEEP for gone, taken in zip(drops, thin, strict=True))
-    return ThinningPlan(rows, clusters, np.bincount(clusters)[clusters], sizes_mm, rates[rows], drop, places, actions)
+    in_cluster = np.bincount(clusters)[clusters]
+    return ThinningPlan(rows, clusters, in_cluster, sizes_mm, measured, drop, n_days, places, actions)
 
 
 def are_fruitlets(growth: SeasonGrowth) -> bool:
@@ -100,29 +115,38 @@ def are_fruitlets(growth: SeasonGrowth) -> bool:
 
 def rates_are_known(growth: SeasonGrowth) -> bool:
     """Tell whether any hanging fruit was measured on both of the last two days, as `plan_thinning` needs."""
-    return not bool(np.isnan(_rates(growth)[0][growth.fruits.hanging]).all())
+    return not bool(np.isnan(_rates(growth)[0].mm_per_day[growth.fruits.hanging]).all())
 
 
-def _rates(growth: SeasonGrowth) -> tuple[NDArray[np.float64], float]:
-    """Growth between the last two days, the errors that visits share taken out, and its noise, mm a day."""
-    fruits = growth.fruits
+def _rates(growth: SeasonGrowth) -> tuple[MeasuredRates, float]:
+    """Growth between the last two days as it was measured, how it may be off, and the days between.
+
+    The scales that the season's fit gives the visits are not taken out of it: fruits that drop are none of the curve's,
+    and what they lack of it would be put down to the visit.
+    """
+    fruits, shape = growth.fruits, growth.curve.fitted.likeliest
     before, last = sorted(set(fruits.days))[-2:]
-    days = np.array(fruits.days)
-    corrected = fruits.diameters_mm / growth.foretold.scales
-    sizes = [_mean_of(corrected[:, np.flatnonzero(days == day)]) for day in (before, last)]
-    moments = [
-        CALENDAR.times([moment for moment in fruits.moments if moment.date() == day]).mean() for day in (before, last)
-    ]
+    columns = [np.flatnonzero(np.array(fruits.days) == day) for day in (before, last)]
+    sizes_mm, counts = zip(*(_mean_of(fruits.diameters_mm[:, of_day]) for of_day in columns), strict=True)
+    moments = [CALENDAR.times([fruits.moments[column] for column in of_day]).mean() for of_day in columns]
     n_days = float(moments[1] - moments[0])
-    return (sizes[1] - sizes[0]) / n_days, float(np.sqrt(2.0) * growth.curve.fitted.likeliest.noise_mm / n_days)
-
-
-def _mean_of(sizes_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean of each row, NaN where there is nothing."""
-    known = ~np.isnan(sizes_mm)
-    return np.asarray(
-        np.where(known, sizes_mm, 0.0).sum(axis=1) / np.where(known.any(axis=1), known.sum(axis=1), np.nan)
+    of_visits = np.sqrt(sum(1.0 / len(of_day) for of_day in columns))
+    size_mm = float(np.nanmedian(fruits.diameters_mm[:, np.concatenate(columns)]))
+    rates = MeasuredRates(
+        (sizes_mm[1] - sizes_mm[0]) / n_days,
+        np.sqrt(sum(1.0 / np.maximum(count, 1) for count in counts)) / n_days,
+        noise_mm=(shape.noise_mm, _NOISE_SPREAD),
+        shared_mm_per_day=shape.visit_spread * size_mm * of_visits / n_days,
+        off_mm_per_day=OFF_BY * size_mm / n_days,
     )
+    return rates, n_days
+
+
+def _mean_of(sizes_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Mean of each row, NaN where there is nothing, and of how many."""
+    known = ~np.isnan(sizes_mm)
+    counts = known.sum(axis=1)
+    return np.asarray(np.where(known, sizes_mm, 0.0).sum(axis=1) / np.where(counts, counts, np.nan)), counts
 
 
 def _order_of_thinning(

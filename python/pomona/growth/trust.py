@@ -23,14 +23,14 @@ from pomona.growth.fitting import likeliest_shape
 from pomona.growth.hierarchy import Hierarchy
 from pomona.growth.size_table import SizeTable
 
-__all__ = ["put_aside", "trust_in_sizes"]
+__all__ = ["OFF_BY", "put_aside", "trust_in_sizes"]
 
 Numbers = NDArray[np.float64]
 
 _OFF = 0.01
 """Share of sizes that are thought not to be their fruit's, before any is known."""
 
-_OFF_BY = 0.5
+OFF_BY = 0.5
 """B, the standard deviation of the logarithm of such a size: half to twice of what it should be."""
 
 _ROUNDS, _CLOSE = 30, 0.01
@@ -57,7 +57,7 @@ def trust_in_sizes(table: SizeTable) -> Numbers:
 
 def _judged(surprise: Numbers, sigmas: Numbers) -> Numbers:
     """Return the trust that surprises deserve, both (N, S) and NaN where there is no size."""
-    ratio = (_OFF_BY / sigmas) ** 2
+    ratio = (OFF_BY / sigmas) ** 2
     log_odds = np.log(_OFF / (1.0 - _OFF)) + 0.5 * (surprise**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
     log_odds = np.where(np.isnan(surprise), -np.inf, log_odds)
     # That none is off has the logarithm 0.
