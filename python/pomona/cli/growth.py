@@ -69,14 +69,16 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
         }
         for row, block in enumerate(grown.blocks)
     ]
-    shape = grown.curve.fitted.likeliest
+    shape, told, sessions = grown.curve.fitted.likeliest, grown.foretold, grown.fruits.sessions
+    intervals = np.column_stack([told.scale_lows, told.scale_highs])
     return {
         "curve": grown.curve.fitted.family.name,
         "time": grown.curve.clock.name,
         "held_out_log_likelihood": {curve.name: curve.held_out for curve in grown.curves},
         "weights": {curve.name: curve.weight for curve in grown.curves},
         "noise_mm": shape.noise_mm,
-        "visit_scales": dict(zip(grown.fruits.sessions, grown.foretold.scales.tolist(), strict=True)),
+        "visit_scales": dict(zip(sessions, told.scales.tolist(), strict=True)),
+        "visit_scale_intervals": dict(zip(sessions, intervals.tolist(), strict=True)),
         "harvest": None if grown.harvest is None else grown.harvest.isoformat(),
         "n_outliers": int(grown.odd.sum()),
         "blocks": blocks,
@@ -84,13 +86,14 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
 
 
 def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
+    from pomona.growth.foretelling import CAMERA_SPREAD
+
     found = _summary(grown)
-    scales = [abs(scale - 1.0) for scale in found["visit_scales"].values()]
     lines = [
         f"{output}: {amount(len(grown.fruits.ids), 'fruit')} on {amount(len(grown.fruits.days), 'visit')}, "
         f"{grown.fruits.days[0]} to {grown.fruits.days[-1]}",
-        f"  curve: {found['curve']} over {found['time']}; a size is sure to {found['noise_mm']:.1f} mm, "
-        f"a visit's sizes are off together by up to {100 * max(scales):.1f} %",
+        f"  curve: {found['curve']} over {found['time']}; a size is sure to {found['noise_mm']:.1f} mm",
+        f"  scales of visits: {_most_off(grown)}; what all share, some {100 * CAMERA_SPREAD:.0f} %, only calipers tell",
     ]
     if found["n_outliers"]:
         lines.append(f"  outliers: {amount(found['n_outliers'], 'fruit')}, see fruits.csv")
@@ -98,6 +101,16 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
     lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
     titles = [block.title for block in grown.blocks]
     return lines + [_line_of_block(*each) for each in zip(titles, found["blocks"], strict=True)]
+
+
+def _most_off(grown: SeasonGrowth) -> str:
+    """Say which visit is farthest from the others as far as can be told, and how far with 90 %."""
+    import numpy as np
+
+    told = grown.foretold
+    visit = int(np.abs(np.log(told.scales)).argmax())
+    most, low, high = (100 * (float(scale[visit]) - 1) for scale in (told.scales, told.scale_lows, told.scale_highs))
+    return f"{grown.fruits.days[visit]} is off most, {most:+.1f} % ({low:+.1f} to {high:+.1f})"
 
 
 def _line_of_block(title: str, block: dict[str, Any]) -> str:
