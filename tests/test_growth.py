@@ -455,6 +455,25 @@ def test_what_is_likelier_no_fruit_counts_in_no_block(grown: SeasonGrowth) -> No
     assert found.members.tolist() == [False] * 40 + [True] * 50
 
 
+@pytest.mark.parametrize(("factor", "percent"), [(2.0, 100.0), (0.82, -18.0), (1.0, None)])
+def test_a_visit_of_another_scale_is_named(
+    pomona: Pomona, tmp_path: Path, factor: float, percent: float | None
+) -> None:
+    row = grow_row(tmp_path / "o.gpkg", (50, 65, 80, 95), n_trees=2, scales=(1.0, 1.01, 0.99 * factor, 1.0))
+    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g", "--json")
+    assert code == 0
+    found = json.loads(printed)["odd_visits"]
+    if percent is None:
+        assert (told, found) == ("", {})
+        return
+    day = str(row.day(80))
+    assert list(found) == [day]
+    assert found[day]["probability"] > 0.5
+    assert 100 * (found[day]["scale"] - 1) == pytest.approx(percent, abs=12.0)
+    assert f"sizes of {day} are likely off together" in told
+    assert f"sizes of {day} are likely off together" in pomona("thinning", row.path)[2]
+
+
 def test_what_visits_share_has_an_interval(pomona: Pomona, row: GrownRow, grown: SeasonGrowth, tmp_path: Path) -> None:
     """Said as no bound: one visit and how far it may be off; what all share is not seen at all."""
     told = grown.foretold
@@ -480,6 +499,17 @@ def test_an_error_that_all_visits_share_is_in_the_intervals(grown: SeasonGrowth)
     assert means[:, -1].std() / means[:, -1].mean() < 0.2
     grew = np.log(means[:, now + 1] / means[:, now])
     assert grew.std() < CAMERA_SPREAD
+
+
+def test_a_last_visit_without_sizes_is_told(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    path = tmp_path / "o.gpkg"
+    path.write_bytes(row.path.read_bytes())
+    cloud = FruitCloud(OrchardMap(path).fruits().positions)
+    assert add_session(path, Session("later", str(row.day(99)), "drawn", cloud)).is_added
+    code, printed, told = pomona("growth", path, "-o", tmp_path / "g")
+    assert (code, told.count("\n")) == (0, 1)
+    assert f"no sizes on {row.day(99)}, growth is told of {row.day(95)}" in told
+    assert f"to {row.day(95)}" in printed
 
 
 def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:

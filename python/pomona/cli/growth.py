@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.odd_visits import called, warn_of_visits
 from pomona.cli.page_wishes import Classes, Harvest
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
@@ -41,6 +42,7 @@ def growth(
 
     limits_mm = FIVE_MM if classes is None else parsed_classes(classes)
     grown = grow_season(orchard, harvest=harvest_day(harvest), temperature=temperature, limits_mm=limits_mm)
+    warn_of_visits(orchard, grown)
     output.mkdir(parents=True, exist_ok=True)
     written = (*write_tables(output, grown, pack_kg=pack_kg), *write_pictures(output, grown))
     if json:
@@ -51,6 +53,8 @@ def growth(
 
 def _summary(grown: SeasonGrowth) -> dict[str, Any]:
     """Put what was found in numbers: the curve, and all blocks."""
+    from dataclasses import asdict
+
     import numpy as np
 
     drawn = grown.foretold.summaries["blocks"]
@@ -79,6 +83,7 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
         "noise_mm": shape.noise_mm,
         "visit_scales": dict(zip(sessions, told.scales.tolist(), strict=True)),
         "visit_scale_intervals": dict(zip(sessions, intervals.tolist(), strict=True)),
+        "odd_visits": {sessions[odd.visit]: asdict(odd) | {"visit": odd.visit + 1} for odd in grown.odd_visits},
         "harvest": None if grown.harvest is None else grown.harvest.isoformat(),
         "n_outliers": int(grown.odd.sum()),
         "blocks": blocks,
@@ -110,7 +115,7 @@ def _most_off(grown: SeasonGrowth) -> str:
     told = grown.foretold
     visit = int(np.abs(np.log(told.scales)).argmax())
     most, low, high = (100 * (float(scale[visit]) - 1) for scale in (told.scales, told.scale_lows, told.scale_highs))
-    return f"{grown.fruits.days[visit]} is off most, {most:+.1f} % ({low:+.1f} to {high:+.1f})"
+    return f"{called(grown.fruits, visit)} is off most, {most:+.1f} % ({low:+.1f} to {high:+.1f})"
 
 
 def _line_of_block(title: str, block: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.odd_visits import warn_of_visits
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import THINNING
@@ -40,6 +41,7 @@ def thinning(
     from pomona.growth.thinning_plan import plan_thinning
 
     grown = grow_season(orchard)
+    warn_of_visits(orchard, grown)
     plan = plan_thinning(grown, target)
     if output is not None:
         _write(output, grown, plan)

@@ -124,6 +124,25 @@ class FittedShape:
         drawn, weights = self._round(even, middle, root)
         return tuple(self._posterior.shape(z) for z in drawn), weights
 
+    def shared_by_visits(self) -> Numbers:
+        """Return what the sizes of each visit share at the mode, logarithms, (S,)."""
+        return Hierarchy(self._posterior.table, self.family, self.likeliest).expected().visits
+
+    def doubting(self, visit: int, variance: float) -> tuple[Hierarchy, float]:
+        """Fit the shape anew where the scale of one visit has a variance of its own.
+
+        Returns
+        -------
+        Hierarchy
+            At the mode.
+        float
+            By how much the logarithm of the posterior is higher there than without the doubt.
+        """
+        posterior = _Posterior(self._posterior.table.doubting(visit, variance), self.family)
+        mode = _climbed(posterior, self._mode)
+        gain = posterior(mode) - self._posterior(self._mode)
+        return Hierarchy(posterior.table, self.family, posterior.shape(mode)), gain
+
     def _round(self, even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
         drawn = student_points(even, middle, root)
         log_weights = np.array([self._posterior(z) for z in drawn]) - student_density(drawn, middle, root)

@@ -142,7 +142,8 @@ class Hierarchy:
         n = len(information)
         self._prior_mean = self._mean_from_onset()
         together = np.zeros((n + 1, n + 1))
-        self._shared = self.shape.visit_spread**2 * np.eye(n) + self.shape.stray_per_day**2 * self.table.straying
+        scales = np.diag(self.shape.visit_spread**2 + self.table.doubt)
+        self._shared = scales + self.shape.stray_per_day**2 * self.table.straying
         together[:n, :n] = precision + np.linalg.inv(self._shared)
         together[:n, n] = together[n, :n] = precision.sum(axis=0)
         together[n, n] = precision.sum() + _SIZE_AT_ONSET_SPREAD**-2

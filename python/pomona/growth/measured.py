@@ -48,6 +48,8 @@ class MeasuredFruits:
         NaN where a visit did not measure the fruit.
     labels : tuple of N tuples of S str or None
         The sessions' own names of the fruits.
+    days_without_sizes : tuple of date
+        Of visits that measured no fruit, ascending.
     """
 
     path: Path
@@ -58,6 +60,7 @@ class MeasuredFruits:
     moments: tuple[datetime, ...]
     diameters_mm: NDArray[np.float64]
     labels: tuple[tuple[str | None, ...], ...]
+    days_without_sizes: tuple[date, ...] = ()
 
     @property
     def days(self) -> tuple[date, ...]:
@@ -97,9 +100,11 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
     if not known.any():
         raise PomonaError(f"{path}: found no diameters, expected sessions that measured them")
     trees = bearing_trees(cloud)
-    fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    measured = known.any(axis=0)
+    fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(measured)
     # Visits of one moment by their names: the map has them in the order in which they were added.
     moments = [datetime.fromisoformat(visit.date) for visit in visits]
+    without = {moments[column].date() for column in np.flatnonzero(~measured).tolist()}
     columns = np.array(sorted(columns.tolist(), key=lambda column: (moments[column], names[column])))
     fruits = fruits[np.argsort(trees.numbers[fruits], kind="stable")]
     return MeasuredFruits(
@@ -111,6 +116,7 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         moments=tuple(moments[column] for column in columns),
         diameters_mm=diameters_mm[np.ix_(fruits, columns)],
         labels=tuple(tuple(labels[fruit, column] for column in columns) for fruit in fruits),
+        days_without_sizes=tuple(sorted(without)),
     )
 
 

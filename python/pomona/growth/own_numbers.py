@@ -16,6 +16,9 @@ __all__ = ["OwnNumbers"]
 
 Numbers = NDArray[np.float64]
 
+_LEAST_WEIGHT = 1e-300
+"""Of the measurements of a fruit: where it is less, there are none."""
+
 
 @dataclass(frozen=True, eq=False)
 class OwnNumbers:
@@ -42,10 +45,12 @@ class OwnNumbers:
     @classmethod
     def of(cls, weights: Numbers, slopes: Numbers, spreads: tuple[float, float]) -> OwnNumbers:
         """Take (N, S) weights, (S,) slopes g of the curve, and the standard deviations of sizes and of onsets."""
-        p11 = spreads[0] ** -2 + weights.sum(axis=1)
-        p12 = weights @ slopes
-        p22 = spreads[1] ** -2 + weights @ slopes**2
-        determinants = p11 * p22 - p12**2
+        of_size, of_onset = spreads[0] ** -2, spreads[1] ** -2
+        whole, p12 = weights.sum(axis=1), weights @ slopes
+        p11 = of_size + whole
+        # p11 p22 - p12^2 in parts that are none below 0: where the prior says next to nothing, rounding eats the rest.
+        apart = slopes - (p12 / np.maximum(whole, _LEAST_WEIGHT))[:, None]
+        determinants = of_onset * p11 + of_size * (weights @ slopes**2) + whole * (weights * apart**2).sum(axis=1)
         first = weights / np.sqrt(p11)[:, None]
         left = np.sqrt(determinants / p11)[:, None]
         second = weights * (slopes - (p12 / p11)[:, None]) / left

@@ -15,6 +15,7 @@ from pomona.growth.foretelling import Foretold, foretell
 from pomona.growth.fruit_order import reckoned_order
 from pomona.growth.harvest_day import harvest_after
 from pomona.growth.measured import MeasuredFruits, measured_fruits, require_one_season, require_two_days
+from pomona.growth.odd_visits import OddVisit, odd_visits
 from pomona.growth.oddities import odd_fruits
 from pomona.growth.season_clock import CALENDAR, DegreeDays, SeasonClock, read_temperatures
 from pomona.growth.size_classes import FIVE_MM, class_counts, class_masses, rising_limits
@@ -49,6 +50,8 @@ class SeasonGrowth:
         Fruits with a size that likelier does not belong to them, or that grow like no other.
     put_aside : (N, S) bool
         Those sizes.
+    odd_visits : sequence of OddVisit
+        Visits whose sizes are likely off together, none as a rule.
     """
 
     fruits: MeasuredFruits
@@ -60,6 +63,7 @@ class SeasonGrowth:
     harvest: date | None
     odd: NDArray[np.bool_]
     put_aside: NDArray[np.bool_]
+    odd_visits: Sequence[OddVisit]
 
     @property
     def curve(self) -> WeighedCurve:
@@ -140,7 +144,8 @@ def growth_of(
         },
     )
     days = tuple(moment.date() for moment in wanted)
-    return SeasonGrowth(fruits, curves, blocks, limits, foretold, days, day, odd[rows], aside[rows])
+    off = odd_visits(curves[0].fitted, len(moments))
+    return SeasonGrowth(fruits, curves, blocks, limits, foretold, days, day, odd[rows], aside[rows], off)
 
 
 def _clocks(fruits: MeasuredFruits, temperature: str | Path | None) -> tuple[SeasonClock, ...]:

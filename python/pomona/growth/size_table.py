@@ -31,6 +31,8 @@ class SizeTable:
         Usual diameter of a visit, by which an error in mm is one of the logarithm.
     trust : (N, S) float64
         Probability that a size is its fruit's own, see `trust_in_sizes`: the share by which it counts.
+    doubt : (S,) float64
+        Variance of the logarithm of each visit's scale, beside what all visits have: 0, but see `odd_visits`.
     """
 
     logs: NDArray[np.float64]
@@ -38,12 +40,14 @@ class SizeTable:
     times: NDArray[np.float64]
     typical_mm: NDArray[np.float64]
     trust: NDArray[np.float64]
+    doubt: NDArray[np.float64]
 
     @classmethod
     def of(cls, diameters_mm: NDArray[np.float64], trees: NDArray[np.int64], times: NDArray[np.float64]) -> SizeTable:
         """Take (N, S) diameters, NaN for none; every visit has at least one, and all are trusted."""
         trust = np.ones(diameters_mm.shape)
-        return cls(np.log(diameters_mm), trees, times, np.nanmedian(diameters_mm, axis=0), trust)
+        typical_mm = np.nanmedian(diameters_mm, axis=0)
+        return cls(np.log(diameters_mm), trees, times, typical_mm, trust, np.zeros(len(times)))
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
@@ -71,6 +75,10 @@ class SizeTable:
         """Let each size count by its share, (N, S)."""
         return replace(self, trust=trust)
 
+    def doubting(self, visit: int, variance: float) -> SizeTable:
+        """Give the scale of one visit a variance of its own."""
+        return replace(self, doubt=np.where(np.arange(len(self.times)) == visit, variance, 0.0))
+
     def first_visits(self, count: int) -> SizeTable:
         """Keep the first visits, with the fruits that they measured."""
         return self._kept(self.seen[:, :count].any(axis=1), count)
@@ -93,4 +101,4 @@ class SizeTable:
         fruits = np.asarray(fruits)
         trees = np.unique(self.trees[fruits], return_inverse=True)[1].astype(np.int64)
         kept = self.logs[fruits, :count], trees, self.times[:count], self.typical_mm[:count]
-        return SizeTable(*kept, self.trust[fruits, :count])
+        return SizeTable(*kept, self.trust[fruits, :count], self.doubt[:count])
