@@ -25,6 +25,8 @@ from pomona.growth.curve_families import FAMILIES, CurveFamily, FamilyName
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.fitting import fit_shape
 from pomona.growth.foretelling import CAMERA_SPREAD
+from pomona.growth.growth_pictures import draw_curves, draw_variability
+from pomona.growth.growth_pictures import draw_sizes as draw_size_classes
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.mixed_quantiles import mixed_quantile
 from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
@@ -521,6 +523,39 @@ def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:
     assert len(found.fruits.days) == 3
     assert found.foretold.scales[2] > found.foretold.scales[1] + 0.02
     assert found.fruits.n_days.max() == 2
+
+
+@pytest.mark.parametrize("n", [90, 30, 1])
+def test_all_fruits_are_in_the_picture(grown: SeasonGrowth, n: int) -> None:
+    """However short the row is: metres are as long in both directions, and begin at the first and the lowest."""
+    fruits = grown.fruits
+    hanging = tuple("seen" if row < n else "gone" for row in range(90))
+    cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": hanging})
+    figure = draw_variability(replace(grown, fruits=replace(fruits, cloud=cloud)))
+    figure.draw_without_rendering()
+    above, below, bar = figure.axes
+    places = np.asarray(above.collections[0].get_offsets())
+    assert len(places) == n
+    assert (np.abs(places.min(axis=0)) < 1e-9).all()
+    (left, right), (bottom, top) = above.get_xlim(), above.get_ylim()
+    assert ((places > [left, bottom]) & (places < [right, top])).all()
+    box = above.get_window_extent()
+    assert box.width / (right - left) == pytest.approx(box.height / (top - bottom), rel=1e-3)
+    assert below.get_xlim() == (left, right)
+    assert top - bottom > 0.9
+    # Fruits that grow alike have one colour, not a bar of millionths.
+    assert np.ptp(bar.get_ylim()) >= 0.02 - 1e-9
+
+
+def test_legends_lie_on_nothing_that_is_drawn(grown: SeasonGrowth) -> None:
+    curves = draw_curves(grown).axes[0].get_legend()
+    assert [text.get_text() for text in curves.get_texts()] == [
+        "curves of fruits", "mean of all, with 90 %", "sizes as measured"
+    ]  # fmt: skip
+    figure = draw_size_classes(grown)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
 
 
 def test_names_of_strangers_are_drawn_as_text(pomona: Pomona, tmp_path: Path) -> None:

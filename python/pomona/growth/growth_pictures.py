@@ -14,10 +14,11 @@ from pomona.amounts import amount
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.foretelling import NINETY
 from pomona.growth.growth_tables import used_classes
+from pomona.growth.measured import MeasuredFruits
 from pomona.growth.season_growth import SeasonGrowth
 from pomona.plot.files import save_picture
-from pomona.plot.projections import side_and_plan
 from pomona.plot.sheet import FAINT, INK
+from pomona.viewer.row_frame import page_from_map, vertical_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,6 +37,15 @@ _JITTER_S = 36_000.0
 
 _SPAN_BY = (0.02, 0.98)
 """Quantiles of the rates that the colours span: one odd fruit does not bleach the others."""
+
+_LEAST_SPAN = 0.02
+"""Of the colours, mm a day: fruits that grow alike are of one colour."""
+
+_MARGIN_M, _LEAST_SPAN_M = 0.15, 1.0
+"""Around the fruits, and of the picture: a single fruit hangs somewhere too."""
+
+_INCHES_PER_M, _HIGHEST_IN, _LOWEST_IN = 1.2, 3.6, 1.2
+"""Of a row, and how high it is drawn."""
 
 _MOST_TREE_NAMES = 40
 
@@ -57,6 +67,7 @@ def draw_curves(growth: SeasonGrowth) -> Figure:
     some = hanging[:: max(1, len(hanging) // _MOST_CURVES)]
     n_visits = len(growth.fruits.days)
     axes.plot(at, told.sizes_mm[some].T, color=FAINT, linewidth=0.5, alpha=0.6, zorder=1)
+    axes.plot([], [], color=FAINT, linewidth=1.0, label="curves of fruits")
     jitter = np.linspace(-_JITTER_S, _JITTER_S, len(some)).astype("timedelta64[s]")
     for column in range(n_visits):
         axes.plot(
@@ -99,39 +110,70 @@ def draw_sizes(growth: SeasonGrowth) -> Figure:
     names = [f"< {limits[0]}", *map("-".join, pairwise(limits)), f"{limits[-1]} +"]
     axes.set_xticks(np.arange(len(rows)), [names[row] for row in rows])
     axes.set(xlabel="size class, mm", ylabel="fruits")
-    axes.legend(frameon=False, labelcolor=INK)
+    _legend_above(axes)
     _say(figure, "Sizes now" + (" and at the harvest" if growth.harvest else ""), "bars: 90 % intervals of the counts")
     return figure
 
 
 def draw_variability(growth: SeasonGrowth) -> Figure:
     """Draw each fruit where it hangs, in the colour of its growth, and the mean size of each tree below."""
-    from matplotlib.figure import Figure
-
-    cloud, hanging = growth.fruits.cloud, growth.fruits.hanging
-    side = side_and_plan(cloud.positions)[0]
-    places, rates = side.project(cloud.positions)[hanging], growth.foretold.rates_mm_per_day[hanging]
-    length = float(np.ptp(places[:, 0])) if len(places) else 1.0
-    figure = Figure(figsize=(float(np.clip(1.2 * length, 8.0, 30.0)), 6.0), dpi=110, layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    fruits = growth.fruits
+    places, rates = _seen_from_the_side(fruits), growth.foretold.rates_mm_per_day[fruits.hanging]
+    figure, above, below, bar = _row_of_axes(places[fruits.hanging])
     low, high = np.quantile(rates, _SPAN_BY)
-    marks = above.scatter(*places.T, c=rates, cmap="viridis", vmin=low, vmax=high, s=16)
-    figure.colorbar(marks, ax=above, label="growth, mm a day", pad=0.01)
-    above.set(ylabel=f"{side.labels[1]}, m")
-    above.set_aspect("equal", adjustable="datalim")
-    _mean_of_trees(below, growth)
-    below.set(xlabel=f"{side.labels[0]}, m", ylabel="mean diameter, mm")
+    middle, half = (low + high) / 2, max(float(high - low), _LEAST_SPAN) / 2
+    x, y = places[fruits.hanging].T
+    marks = above.scatter(x, y, c=rates, cmap="viridis", vmin=middle - half, vmax=middle + half, s=16)
+    figure.colorbar(marks, cax=bar, label="growth, mm a day")
+    above.set(ylabel="above the lowest, m")
+    above.tick_params(labelbottom=False)
+    _mean_of_trees(below, growth, places[:, 0])
+    below.set(xlabel="along the row, m", ylabel="mean diameter, mm")
     for axes in (above, below):
         _quiet(axes)
-    _say(figure, "Where the fruits grow fast", f"{growth.days[len(growth.fruits.days) - 1]}, last visit")
+    _say(figure, "Where the fruits grow fast", f"{growth.days[len(fruits.days) - 1]}, last visit")
     return figure
 
 
-def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
+def _seen_from_the_side(fruits: MeasuredFruits) -> NDArray[np.float64]:
+    """Places along the row and above the lowest fruit that hangs, (N, 2), metres."""
+    vertical = vertical_of(fruits.path) if fruits.path.is_file() else None
+    page = page_from_map(fruits.cloud.positions[fruits.hanging], vertical)
+    return np.asarray((fruits.cloud.positions @ page[:3, :3].T + page[:3, 3])[:, ::2])
+
+
+def _row_of_axes(places: NDArray[np.float64]) -> tuple[Figure, Axes, Axes, Axes]:
+    """Axes for a row, as long in them as high, and below it along the same metres; and for a bar of colours."""
+    from matplotlib.figure import Figure
+
+    lows, highs = places.min(axis=0) - _MARGIN_M, places.max(axis=0) + _MARGIN_M
+    spans = np.maximum(highs - lows, _LEAST_SPAN_M)
+    left, right, bottom, top, gap, lower = 0.8, 1.2, 0.6, 0.85, 0.45, 1.9
+    width = float(np.clip(_INCHES_PER_M * spans[0], 6.0, 28.0))
+    inches_per_m = min(width / spans[0], _HIGHEST_IN / spans[1])
+    upper = max(inches_per_m * spans[1], _LOWEST_IN)
+    whole = left + width + right, bottom + lower + gap + upper + top
+    figure = Figure(figsize=whole, dpi=110)
+
+    def axes_at(x: float, y: float, size: tuple[float, float]) -> Axes:
+        return figure.add_axes((x / whole[0], y / whole[1], size[0] / whole[0], size[1] / whole[1]))
+
+    above = axes_at(left, bottom + lower + gap, (width, upper))
+    below = axes_at(left, bottom, (width, lower))
+    bar = axes_at(left + width + 0.15, bottom + lower + gap, (0.15, upper))
+    middle = (lows + highs) / 2
+    half_width, half_height = width / inches_per_m / 2, upper / inches_per_m / 2
+    for axes in (above, below):
+        axes.set_xlim(middle[0] - half_width, middle[0] + half_width)
+    above.set_ylim(middle[1] - half_height, middle[1] + half_height)
+    return figure, above, below, bar
+
+
+def _mean_of_trees(axes: Axes, growth: SeasonGrowth, along_m: NDArray[np.float64]) -> None:
     drawn = growth.foretold.summaries["blocks"]
     now = len(growth.fruits.days) - 1
     trees = [row for row, block in enumerate(growth.blocks) if block.kind == "tree" and block.name] or [0]
-    x = np.array([growth.fruits.trees.along_m[growth.blocks[row].members].mean() for row in trees])
+    x = np.array([along_m[growth.blocks[row].members].mean() for row in trees])
     for column, colour in ((now, BLUE), (now + 1, ORANGE))[: 2 if growth.harvest else 1]:
         of_day = drawn[:, trees, column]
         mean, (low, high) = of_day.mean(axis=0), np.quantile(of_day, NINETY, axis=0)
@@ -142,7 +184,12 @@ def _mean_of_trees(axes: Axes, growth: SeasonGrowth) -> None:
             text = drawn_name(growth.blocks[row].title)
             axes.text(place, 0.02, text, transform=axes.get_xaxis_transform(), ha="center", color=INK)
     axes.margins(y=0.25)
-    axes.legend(frameon=False, labelcolor=INK, ncols=2)
+    _legend_above(axes)
+
+
+def _legend_above(axes: Axes) -> None:
+    """Name the days beside the title, where nothing is drawn."""
+    axes.legend(frameon=False, labelcolor=INK, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)
 
 
 def _figure(width_in: float, height_in: float) -> tuple[Figure, Axes]:
