@@ -73,6 +73,17 @@ def test_units_are_in_the_name_of_the_column(
     assert abs(json.loads(printed)["agreement"]["2024-06-14"]["bias_mm"]) < 0.6
 
 
+def test_centimetres_that_are_called_millimetres_are_doubted(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    """Tenths of the fruits' diameters, which are those of fruitlets: not refused, and never taken without a word."""
+    with (tmp_path / "c.csv").open("w", newline="") as file:
+        lines = [[f"apple {fruit}", row.day(65), size_mm / 10] for fruit, size_mm in enumerate(row.sizes_mm(65) + 20.0)]
+        csv.writer(file).writerows([["label", "date", "diameter_mm"], *lines])
+    code, printed, told = pomona("validate", row.path, "--calipers", tmp_path / "c.csv")
+    assert (code, told.count("\n")) == (0, 1)
+    assert "times those by hand: is a unit wrong?" in told
+    assert "all" in printed
+
+
 def test_a_column_a_day_is_read_between_its_days(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
     """By hand on days 46, 54 and 67: between two of them a line, near one its own, further away none."""
     days = (46, 54, 67)

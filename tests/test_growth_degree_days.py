@@ -58,6 +58,7 @@ def test_growth_by_degree_days_is_found_by_what_it_foretells(tmp_path: Path) -> 
         ("date,mean_c\n2024-06-01,x\n", "line 2: mean_c: found 'x', expected a number"),
         ("date,mean_c\n2024-06-01,294\n", "line 2: mean_c: found 294, expected degrees Celsius"),
         ("date,mean_c\n2024-06-01,20\n2024-06-01,21\n", "line 3: found 2024-06-01 a second time"),
+        ("date,min_c,max_c\n2024-06-01,24,12\n", "line 2: found min_c 24 above max_c 12, expected it below"),
         ("date,mean_c\n01.06.2024,20\n", "date: found '01.06.2024', expected a day"),
         ("date,mean_c\n2024-06-01,20\n2024-06-03,20\n", "found no 2024-06-02"),
         ("date,mean_c\n2024-06-02,20\n2024-06-03,20\n", "expected all days from 2024-06-01 to 2024-06-03"),

@@ -141,7 +141,10 @@ def _rows(path: Path) -> Iterator[tuple[str, date, float]]:
         raise PomonaError(f"{path}: found the header {shown(','.join(header))}, expected {_EXPECTED}")
     for where, cells in lines:
         row = dict(zip(header, cells, strict=True))
-        yield where, _day(where, row["date"]), float(np.mean([_degrees_c(where, name, row[name]) for name in columns]))
+        degrees = [_degrees_c(where, name, row[name]) for name in columns]
+        if degrees != sorted(degrees):
+            raise PomonaError(f"{where}: found min_c {degrees[0]:g} above max_c {degrees[1]:g}, expected it below")
+        yield where, _day(where, row["date"]), float(np.mean(degrees))
 
 
 def _day(where: str, cell: str) -> date:
