@@ -113,7 +113,8 @@ def _most_off(grown: SeasonGrowth) -> str:
     import numpy as np
 
     told = grown.foretold
-    visit = int(np.abs(np.log(told.scales)).argmax())
+    odd = max(grown.odd_visits, key=lambda odd: odd.probability, default=None)
+    visit = odd.visit if odd else int(np.abs(np.log(told.scales)).argmax())
     most, low, high = (100 * (float(scale[visit]) - 1) for scale in (told.scales, told.scale_lows, told.scale_highs))
     return f"{called(grown.fruits, visit)} is off most, {most:+.1f} % ({low:+.1f} to {high:+.1f})"
 
