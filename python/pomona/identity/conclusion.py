@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from pomona import _core
 from pomona.identity.common_frame import frames_of_visits
+from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
-from pomona.identity.looks import Looks, looks_of, visibility_classes
+from pomona.identity.looks import Looks, looks_of
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
 
 __all__ = ["Conclusion", "conclude"]
@@ -79,7 +80,7 @@ def conclude(
     )
     before = _sights_before(labels)
     looks = looks_of(visits, sights, labels, positions, frames)
-    lives = lives_of(looks.seen, looks.in_view, visibility_classes(looks))
+    lives = lives_of(histories_of(looks))
     states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(
         sights=sights,

@@ -23,9 +23,16 @@ AROUND = 25
 MOST_VIEWS = 0.85
 """Quantile of their views that is all views."""
 
-SHARES_OF_VIEWS = np.array([0.02, 0.05, 0.10, 0.15, 0.22, 0.30, 0.42, 0.55, 0.70])
+MISSES = 5
+"""So many looks that all missed a fruit are told apart."""
+
+SHARES_OF_VIEWS = np.array([0.0035, 0.008, 0.015, 0.03, 0.05, 0.10, 0.15, 0.22, 0.30, 0.42, 0.55, 0.70])
 """Between the classes of fruits by how well the looks before saw them, as ranks in the visit. Fine where they are
 small: a fruit that one look of five saw and one that one of two saw are far from alike."""
+
+USUAL_VIEWS = 0.4
+"""Mean of the views of a fruit that every look saw where nobody counts frames; of one that some saw that times the
+square of their share, as those that leaves hide are seen worse, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +47,15 @@ class Looks:
         How well it saw it: rank in the visit, 0 to 1, by the views that a fruit there can have; 0 where it did not.
     towards : (K, V, 3) float64
         From the fruit to the camera; NaN where unknown.
+    is_counted : (V,) bool
+        Whether the visit counts the frames that saw each fruit.
     """
 
     seen: NDArray[np.bool_]
     in_view: NDArray[np.bool_]
     views: NDArray[np.float64]
     towards: NDArray[np.float64]
+    is_counted: NDArray[np.bool_]
 
 
 def looks_of(
@@ -74,7 +84,7 @@ def looks_of(
         in_view[:, number] |= looked_at(in_map, asked, around.spacings_m[:, number])
         towards[:, number] = towards_camera(in_map, asked, frames[number, :3, :3] / scale)
         views[labels[own], number] = _shares_of_views(visit.n_views, fruits[number])
-    return Looks(seen, in_view, views, towards)
+    return Looks(seen, in_view, views, towards, np.array([visit.n_views is not None for visit in visits], bool))
 
 
 def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], scale: float) -> SeenVisit:
@@ -112,25 +122,35 @@ def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[which])
 
 
-def visibility_classes(looks: Looks) -> NDArray[np.int64]:
+def visibility_classes(looks: Looks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return how well each fruit can be seen on each visit, by what the visits before that looked from its side saw.
 
     Returns
     -------
     (K, V) int64
-        0 where none has; else 1 and more, the place of the mean of `Looks.views` among `SHARES_OF_VIEWS`.
+        The number of looks that all missed it, to `MISSES`; else more than that by the place of the mean of
+        `Looks.views` among `SHARES_OF_VIEWS`.
+    (K, V) int64
+        The same where all have missed it.
     """
-    n_fruits, n_visits = looks.seen.shape
-    classes = np.zeros((n_fruits, n_visits), np.int64)
-    for visit in range(n_visits):
-        views, looks_before = np.zeros(n_fruits), np.zeros(n_fruits)
-        for before in range(visit):
-            cosines = np.einsum("ki,ki->k", looks.towards[:, before], looks.towards[:, visit])
-            # What is not known is NaN, and counts as the same side.
-            tells = looks.in_view[:, before] & ~(cosines < SAME_SIDE)
-            views += np.where(tells, looks.views[:, before], 0.0)
-            looks_before += tells
-        shares = views / np.maximum(looks_before, 1.0)
-        known = 1 + np.searchsorted(SHARES_OF_VIEWS, shares, side="right")
-        classes[:, visit] = np.where(looks_before > 0, known, 0)
-    return classes
+    classes, unseen = np.zeros(looks.seen.shape, np.int64), np.zeros(looks.seen.shape, np.int64)
+    for visit in range(looks.seen.shape[1]):
+        # What is not known is NaN, and counts as the same side.
+        cosines = np.einsum("kvi,ki->kv", looks.towards[:, :visit], looks.towards[:, visit])
+        tells = looks.in_view[:, :visit] & ~(cosines < SAME_SIDE)
+        n_looks = tells.sum(axis=1)
+        unseen[:, visit] = np.minimum(n_looks, MISSES)
+        views = _views_so_far(looks, tells) / np.maximum(n_looks, 1)
+        known = 1 + MISSES + np.searchsorted(SHARES_OF_VIEWS, views, side="right")
+        classes[:, visit] = np.where(views > 0.0, known, unseen[:, visit])
+    return classes, unseen
+
+
+def _views_so_far(looks: Looks, tells: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the sum of the views of each fruit, (K,), over the looks that tell of it."""
+    until = tells.shape[1]
+    is_counted = looks.is_counted[:until]
+    counted = np.where(tells & is_counted, looks.views[:, :until], 0.0).sum(axis=1)
+    uncounted = (tells & ~is_counted).sum(axis=1)
+    n_seen = (tells & ~is_counted & looks.seen[:, :until]).sum(axis=1)
+    return np.asarray(counted + USUAL_VIEWS * n_seen**2 / np.maximum(uncounted, 1))
