@@ -25,6 +25,7 @@ NAMES = (
     "growth",
     "thinning",
     "seasons",
+    "once_seen",
     "mapscale",
     "million",
     "clouds",

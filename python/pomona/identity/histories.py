@@ -92,7 +92,7 @@ class HistoryOdds:
     some visit sees a fruit there with $S$. Beside each that hangs a visit has $\rho = c_0 f / (1 - f)$ false points,
     which no other visit sees: $f$ is their share of what a first look sees. Of what was seen at a place,
 
-    $$L = \prod \frac{P + \rho\, [\text{one visit alone saw it}]}{S + \rho\, n}, \qquad n\ \text{looks}$$
+    $$L = \prod \frac{P + \rho\, [\mathrm{one\ visit\ alone\ saw\ it}]}{S + \rho\, n}, \qquad n\ \mathrm{looks}$$
 
     is the likelihood. How many fruits hang that nobody saw is not asked: places are given.
     """
