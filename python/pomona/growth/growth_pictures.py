@@ -18,7 +18,7 @@ from pomona.growth.measured import MeasuredFruits
 from pomona.growth.season_growth import SeasonGrowth
 from pomona.plot.files import save_picture
 from pomona.plot.sheet import FAINT, INK
-from pomona.viewer.row_frame import page_from_map, vertical_of
+from pomona.viewer.row_frame import guessed_vertical, known_vertical, page_from_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,8 +137,10 @@ def draw_variability(growth: SeasonGrowth) -> Figure:
 
 def _seen_from_the_side(fruits: MeasuredFruits) -> NDArray[np.float64]:
     """Places along the row and above the lowest fruit that hangs, (N, 2), metres."""
-    vertical = vertical_of(fruits.path) if fruits.path.is_file() else None
-    page = page_from_map(fruits.cloud.positions[fruits.hanging], vertical)
+    known = known_vertical(fruits.path) if fruits.path.is_file() else None
+    hanging = fruits.cloud.select(np.flatnonzero(fruits.hanging).tolist())
+    up = guessed_vertical(hanging) if known is None else known
+    page = page_from_map(hanging.positions, up / np.linalg.norm(up))
     return np.asarray((fruits.cloud.positions @ page[:3, :3].T + page[:3, 3])[:, ::2])
 
 
