@@ -38,9 +38,6 @@ MAX_SPACING_M = 5.0
 USUAL_SPACING_M = 0.06
 """The unit by which fruits are nearest to so far apart is the likeliest."""
 
-FEWEST_STEPS = 6
-"""Fruits that hang on wires have fewer heights."""
-
 COARSE = 0.5
 """A coordinate in steps of more than this part of the spacing says little of which fruit is which."""
 
@@ -57,9 +54,6 @@ NAMED: dict[Unit, str] = {"m": "metres", "cm": "centimetres", "mm": "millimetres
 
 _looked_at: WeakSet[FruitCloud] = WeakSet()
 """Clouds whose places have been looked at: once is enough."""
-
-STEPS_SAMPLE = 20_000
-"""Fruits whose coordinates are asked for steps."""
 
 SPACING_SAMPLE = 1000
 """Fruits asked for their neighbour: the median of 1000 is known to 2 % of rank, whatever the size of the cloud."""
@@ -111,8 +105,8 @@ class PlacesDoubt:
 def doubt_of_places(positions: NDArray[np.float64]) -> PlacesDoubt | None:
     """Say why places, (N, 3) metres, cannot be those of fruits, None where they can.
 
-    By the distance of neighbours, by one far from all others, or by steps of the numbers that are as coarse as fruits
-    are apart, as those of UTM in 32 bits.
+    By the distance of neighbours, by one far from all others, or by numbers that have 32 bits alone and so go in
+    steps as coarse as fruits are apart, as those of UTM do.
     """
     if len(positions) < MIN_FRUITS:
         return None
@@ -124,7 +118,7 @@ def doubt_of_places(positions: NDArray[np.float64]) -> PlacesDoubt | None:
     if reach_m.max() > FARTHEST_FRUIT_M:
         found = f"row {reach_m.argmax()}: found a fruit {reach_m.max():.3g} m from the middle of all, expected at"
         return PlacesDoubt(f"{found} most {FARTHEST_FRUIT_M:g} m", is_of_unit=False)
-    for axis, values in zip("xyz", positions[:: -(-len(positions) // STEPS_SAMPLE)].T, strict=True):
+    for axis, values in zip("xyz", positions.T, strict=True):
         if (step_m := _step_m(values)) > COARSE * spacing_m:
             found = f"{axis} goes in steps of {step_m:.3g} m, where neighbouring fruits are {spacing_m:.3g} m apart"
             found += " (median), expected finer ones: numbers as large as those of UTM lose their ends in 32 bits"
@@ -177,13 +171,10 @@ def vouch_for(*clouds: FruitCloud) -> None:
 
 
 def _step_m(values: NDArray[np.float64]) -> float:
-    """Return the smallest step between numbers of which many are the same, 0 where they are not."""
-    distinct = np.unique(values)
-    if not 2 <= len(distinct) <= len(values) / 2:
-        return 0.0
-    step_m = float(np.diff(distinct).min())
-    is_of_32_bits = np.spacing(np.float32(np.abs(distinct).max())) > 0.5 * step_m
-    return step_m if is_of_32_bits or len(distinct) >= FEWEST_STEPS else 0.0
+    """Return the step of 32 bits between the largest of numbers that all have no more, else 0."""
+    with np.errstate(over="ignore"):  # what is too large for 32 bits is none of them
+        short = values.astype(np.float32)
+    return float(np.spacing(np.abs(short).max())) if np.array_equal(short, values) else 0.0
 
 
 def _spacing_m(positions: NDArray[np.float64]) -> float:
