@@ -101,9 +101,10 @@ def test_fruits_of_no_tree_are_not_called_all(pomona: Pomona, row: GrownRow, tmp
 
 
 def test_trees_are_those_that_map_trees_finds(pomona: Pomona, tmp_path: Path) -> None:
-    """Also where much in the map is likelier no fruit: that hid the trees."""
-    assert pomona("demo", "-o", tmp_path / "row")[0] == 0
-    path = tmp_path / "row" / "orchard.gpkg"
+    visits, path = tmp_path / "season", tmp_path / "orchard.gpkg"
+    assert pomona("synth", "season", "easy", "--trees", 5, "--visits", 2, "--seed", 11, "-o", visits)[0] == 0
+    for day in ("2024-06-14", "2024-09-27"):
+        assert pomona("map", "add", path, visits / f"{day}.csv", "--date", day)[0] == 0
 
     def counts() -> list[tuple[int, int]]:
         code, printed, told = pomona("thinning", path, "--target", 80, "--json")

@@ -137,7 +137,7 @@ def drop_of(rates: MeasuredRates) -> FruitDrop:
     known = known[np.lexsort((rates.per_mm[known], rates.mm_per_day[known]))]
     measured, per_mm = rates.mm_per_day[known], rates.per_mm[known]
     step = -(-len(known) // _MOST_FRUITS)
-    posterior = _Posterior(rates, measured[step // 2 :: step], per_mm[step // 2 :: step])
+    posterior = _RatesPosterior(rates, measured[step // 2 :: step], per_mm[step // 2 :: step])
     numbers, weights = _weighed(posterior)
     drops = np.zeros(len(known))
     for number, weight in zip(numbers, weights, strict=True):
@@ -194,7 +194,7 @@ class _Groups:
         return np.asarray((drops + self.share * none) / (drops + stays + none))
 
 
-class _Posterior:
+class _RatesPosterior:
     """The logarithm of the posterior over five numbers, in standard deviations of the prior."""
 
     def __init__(self, rates: MeasuredRates, measured: Numbers, per_mm: Numbers) -> None:
@@ -219,7 +219,7 @@ class _Posterior:
         return [np.array([first, 0.0, odds, noise, 0.0]) for odds, noise in _STARTS]
 
 
-def _weighed(posterior: _Posterior) -> tuple[Numbers, Numbers]:
+def _weighed(posterior: _RatesPosterior) -> tuple[Numbers, Numbers]:
     """Spread numbers over the posterior around all its modes, and weigh them, (D, 5) and (D,)."""
     modes = [np.asarray(minimize(posterior.cost, start, method="BFGS", tol=1e-2).x) for start in posterior.starts()]
     roots = [_root(posterior, mode) for mode in modes]
@@ -236,7 +236,7 @@ def _weighed(posterior: _Posterior) -> tuple[Numbers, Numbers]:
     return numbers[counts], weights[counts] / weights[counts].sum()
 
 
-def _root(posterior: _Posterior, mode: Numbers) -> Numbers:
+def _root(posterior: _RatesPosterior, mode: Numbers) -> Numbers:
     """Return the root of the covariance at a mode, by the curvature there."""
     n, steps = len(mode), _STEP * np.eye(len(mode))
     middle = posterior.cost(mode)
