@@ -179,6 +179,16 @@ def test_what_is_too_large_is_not_to_be_thinned(browser: Any, row: GrownRow, tmp
     assert told_to_do(browser, tmp_path / "early.html", document)[0] == f"Thin {N - 60} fruits"
 
 
+def test_visits_too_close_to_tell_what_drops_say_so(browser: Any, tmp_path: Path) -> None:
+    path = grow_row(tmp_path / "orchard.gpkg", (30, 31), n_trees=1, noise_mm=2.0).path
+    write_report(path, tmp_path / "report.html", Wishes())
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        page.get_by_role("tab", name="Thinning").click()
+        said = page.locator("#panel-thinning").inner_text()
+    assert "Cannot tell which fruits will drop" in said
+    assert "mm a day" not in said
+
+
 def test_one_visit_shows_its_sizes(browser: Any, tmp_path: Path) -> None:
     path = grow_row(tmp_path / "orchard.gpkg", (80,), n_trees=2).path
     fruits = OrchardMap(path).fruits()

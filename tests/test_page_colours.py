@@ -50,7 +50,7 @@ def planned(place: float, cluster_size: float) -> dict[str, Any]:
     columns = ("cluster", "cluster_size", "rate_mm_per_day", "drop_probability", "place")
     values = {name: packed(np.full(N, cluster_size)) for name in columns} | {"place": packed(np.full(N, place))}
     days = {"from": "2024-06-01", "to": "2024-06-13"}
-    thinning = {"target": 5, "are_fruitlets": True, "fast_mm_per_day": 0.5, **days, **values}
+    thinning = {"target": 5, "are_fruitlets": True, "is_told": True, "fast_mm_per_day": 0.5, **days, **values}
     return {**drawn((0, LAST)), "thinning": thinning}
 
 

@@ -39,5 +39,5 @@ def thinning_told(growth: SeasonGrowth, fruits: FruitsTold, target: int | None) 
         told[name] = packed(everywhere, step)
     before, last = sorted(set(growth.fruits.days))[-2:]
     days = {"from": before.isoformat(), "to": last.isoformat()}
-    about = {"target": target, "are_fruitlets": are_fruitlets(growth)}
+    about = {"target": target, "are_fruitlets": are_fruitlets(growth), "is_told": plan.drop.is_told}
     return {**about, "fast_mm_per_day": plan.drop.fast_mm_per_day, **days, **told}

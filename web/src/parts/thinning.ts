@@ -6,6 +6,7 @@ import { treeSummaries, type TreeSummary } from "../summary";
 import { fullDay, number, whole } from "../words";
 
 const LATE = "These fruits are past the size at which one thins, and the rule below is one of fruitlets.";
+const UNTOLD = "Cannot tell which fruits will drop: rates are too unsure between these two visits. Wait, or measure from nearer.";
 
 export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTMLElement {
   const plan = page.season.thinning;
@@ -26,7 +27,8 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     const trees = treeSummaries(page);
     replaceAll(body, ...trees.map(lineOf), totalOf(trees));
   });
-  const late = plan.areFruitlets ? null : element("p", { class: "late" }, LATE);
+  const doubt = plan.areFruitlets ? (plan.isTold ? null : UNTOLD) : LATE;
+  const late = doubt === null ? null : element("p", { class: "late" }, doubt);
   const heads = ["Tree", "Fruits", "will drop", "stay", "to thin", "clusters to visit"];
   const head = element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name)));
   const table = element("table", { class: "plain" }, element("thead", {}, head), body);
@@ -37,15 +39,15 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     late,
     element("p", { class: "target" }, element("label", { for: "target" }, "Each tree shall keep "), input, slider, show, list),
     element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Thinning by tree" }, table),
-    element("p", { class: "soft" }, rule(plan.fast, plan.from, plan.to)),
+    element("p", { class: "soft" }, plan.isTold ? rule(plan.fast, plan.from, plan.to) : `With a target ${ORDER}`),
   );
 }
 
+const ORDER = "a tree gives those of its fullest clusters first, the smallest of each.";
+
 function rule(fast: number, from: number, to: number): string {
-  return (
-    `From ${fullDay(from)} to ${fullDay(to)} the fastest fruits grew ${number(fast, 2)} mm a day; what grows less than half as fast will drop. ` +
-    "Of the others a tree gives those of its fullest clusters first, the smallest of each."
-  );
+  const fastest = `From ${fullDay(from)} to ${fullDay(to)} the fastest fruits grew ${number(fast, 2)} mm a day`;
+  return `${fastest}; what grows less than half as fast will drop. Of the others ${ORDER}`;
 }
 
 function lineOf({ label, fruits, drops, thin, clustersToThin }: TreeSummary): HTMLElement {

@@ -86,6 +86,7 @@ export interface ToldGrowth {
 export interface ToldThinning {
   readonly target: number | null;
   readonly are_fruitlets: boolean;
+  readonly is_told: boolean;
   readonly fast_mm_per_day: number;
   readonly from: string;
   readonly to: string;

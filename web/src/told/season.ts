@@ -54,6 +54,8 @@ export interface Thinning {
   readonly target: number | null;
   /** Whether fruits are still of the size at which one thins, and for which the rule is. */
   readonly areFruitlets: boolean;
+  /** Whether the two visits tell which fruits will drop. */
+  readonly isTold: boolean;
   readonly fast: number;
   readonly from: number;
   readonly to: number;
@@ -177,6 +179,7 @@ async function thinningOf({ thinning }: Told): Promise<Thinning | null> {
   return {
     target: thinning.target,
     areFruitlets: thinning.are_fruitlets,
+    isTold: thinning.is_told,
     fast: thinning.fast_mm_per_day,
     from: timeOf(thinning.from),
     to: timeOf(thinning.to),
