@@ -20,6 +20,9 @@ const PATTERN_SHARE: f64 = 0.3;
 /// The same of rows laid along rows, whose evidence is what few fruits in common say: 2 true ones have it, and 14 of 31 wrong ones.
 const PATTERN_SHARE_LAID: f64 = 0.4;
 
+/// Spacings that a pose is moved at the most: in a long row a pattern shows within a few trees.
+const FARTHEST: f64 = 16.0;
+
 impl Finding<'_> {
     /// Whether a settled finding, moved along the row or up, keeps much of its evidence. What is clear is not doubted.
     pub(super) fn fits_moved(&self, log: &Log) -> bool {
@@ -66,8 +69,8 @@ fn shifts(laid: &Patchwork) -> Vec<Vector3<f64>> {
         let way = eigen.eigenvectors.column(axis).into_owned();
         let places = off.iter().map(|off| off.dot(&way));
         let (first, last) = places.fold((0.0f64, 0.0f64), |(first, last), x| (first.min(x), last.max(x)));
-        let least = BEYOND_A_CLUSTER * laid.map.spacing;
-        let steps = ((0.5 * (last - first) - least) / step).max(0.0) as usize;
+        let [least, farthest] = [BEYOND_A_CLUSTER, FARTHEST].map(|spacings| spacings * laid.map.spacing);
+        let steps = (((0.5 * (last - first)).min(farthest) - least) / step).max(0.0) as usize;
         (0..steps).flat_map(move |i| [1.0, -1.0].map(|sign| way * (sign * (least + i as f64 * step))))
     };
     (0..3).filter(|&axis| axis != thin).flat_map(along).collect()
