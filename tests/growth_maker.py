@@ -1,5 +1,6 @@
-"""Maps of rows whose fruits grow along a curve that is known."""
+"""Maps of rows whose fruits grow along a curve that is known, and what is written of them."""
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
@@ -62,3 +63,9 @@ def grow_row(
         assert added.is_added
         assert added.n_matched in (0, n)
     return GrownRow(path, curves, tuple(days))
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The lines of a table, by the names of its columns."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

@@ -1,12 +1,11 @@
-"""`pomona match` and `pomona config` as a user meets them: exit code, stdout and stderr of a process of its own."""
+"""`pomona match` as a user meets it: exit code, stdout and stderr of a process of its own."""
 
 import csv
 import json
 import re
 import subprocess
 import sys
-import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,58 +13,17 @@ import numpy as np
 import pytest
 import typer.main
 
-from pomona.cli import app, main
+from command_line import POMONA, Run, assert_refused, run, write_visits
+from pomona.cli import app
 from pomona.cloud import FruitCloud, Views
 from pomona.mirrored import mirror_image
 from pomona.orchard import write_session
 from pomona.synth.clouds import scene_pair
 
-POMONA = Path(sys.executable).with_name("pomona")
-
-Run = Callable[..., subprocess.CompletedProcess[str]]
-
-
-def run(*arguments: object, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    return subprocess.run([POMONA, *map(str, arguments)], input=stdin, capture_output=True, text=True)
-
-
-@pytest.fixture
-def run_here(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """The same without a process of its own, which is faster."""
-
-    def run_main(*arguments: object) -> subprocess.CompletedProcess[str]:
-        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        assert isinstance(ended.value.code, int)
-        return subprocess.CompletedProcess(arguments, ended.value.code, printed.out, printed.err)
-
-    return run_main
-
-
-def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:
-    """Wrong input: exit code 2, nothing on stdout, one line on stderr that names what is wrong."""
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    assert done.stderr.startswith("pomona: ")
-    assert done.stderr.count("\n") == 1
-    for words in named:
-        assert words in done.stderr
-
 
 @pytest.fixture(scope="module")
 def visits(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two visits to one row: query.csv and map.csv; twice.csv is the query in millimetres."""
-    folder = tmp_path_factory.mktemp("visits")
-    pair = scene_pair("base", seed=7)
-    pair.query.write(folder / "query.csv")
-    pair.map.write(folder / "map.csv")
-    scene_pair("noov", seed=7).query.write(folder / "elsewhere.csv")
-    millimetres = FruitCloud(pair.query.positions * 1000.0, ids=pair.query.ids)
-    millimetres.write(folder / "query_mm.csv")
-    FruitCloud(pair.map.positions * 1000.0, ids=pair.map.ids).write(folder / "map_mm.csv")
-    return folder
+    return write_visits(tmp_path_factory.mktemp("visits"))
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +164,8 @@ def test_explain_with_json_leaves_stdout_to_the_program(visits: Path) -> None:
 
 
 HEADER = "x,y,z\n"
+
+
 WRONG_CLOUDS = {
     "empty": ("", ["cloud.csv"]),
     "no header": ("1,2,3\n4,5,6\n", ["cloud.csv", "line 1"]),
@@ -256,39 +216,6 @@ def test_refuses_wrong_flags(run_here: Run, visits: Path, flags: list[str], name
     assert_refused(run_here("match", visits / "query.csv", visits / "map.csv", *flags), *named)
 
 
-@pytest.mark.parametrize("verb", ["match", "config"])
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("nonsense = 1\n", ["settings.toml", "nonsense"]),
-        ("[match]\nnonsense = 1\n", ["settings.toml", "match.nonsense", "method"]),
-        ("[paper]\nnonsense = 1\n", ["settings.toml", "paper.nonsense"]),
-        ("paper = 1\n", ["settings.toml", "paper", "table"]),
-        ("[match\n", ["settings.toml", "TOML"]),
-        ('[match]\nmethod = "magic"\n', ["settings.toml", "match.method", "magic", "paper"]),
-        ("[match]\nscale = 3\n", ["settings.toml", "match.scale", "3"]),
-        ("[match]\nnoise_m = true\n", ["settings.toml", "match.noise_m"]),
-        ("[match]\nthreads = -1\n", ["settings.toml", "match.threads", "-1"]),
-        ("[match]\nup = [0, 1]\n", ["settings.toml", "match.up", "[0, 1]"]),
-        (
-            '[paper]\nmin_inliers = "x"\n',
-            ["settings.toml: paper.min_inliers: found 'x', expected a whole number from 0"],
-        ),
-        ("[paper]\nransac.seed = -3\n", ["settings.toml: paper.ransac.seed: found -3, expected a whole number from 0"]),
-        ("[localization]\nwindow_frames = 1.5\n", ["localization.window_frames: found 1.5, expected a whole number"]),
-        ("[verified]\nmin_probability = true\n", ["verified.min_probability: found True, expected a number"]),
-        ("[localization]\nown_m = nan\n", ["settings.toml: localization.own_m: found nan, expected a finite number"]),
-        ("[constellation]\nk = 9\n", ["settings.toml", "constellation.k", "9", "4 to 7"]),
-    ],
-)
-def test_refuses_wrong_settings(
-    run_here: Run, visits: Path, tmp_path: Path, verb: str, text: str, named: list[str]
-) -> None:
-    (tmp_path / "settings.toml").write_text(text)
-    clouds = [visits / "query.csv", visits / "map.csv"] if verb == "match" else []
-    assert_refused(run_here(verb, *clouds, "--config", tmp_path / "settings.toml"), *named)
-
-
 @pytest.mark.parametrize("method", ["paper", "verified"])
 @pytest.mark.parametrize(
     ("scene", "scale"),
@@ -337,30 +264,6 @@ def test_a_wrong_unit_is_told_with_the_flag_of_its_side(
     # What it says helps.
     told = run_here("match", *paths, *flags, *mended.split("say so: ")[1].split())
     assert (told.returncode, told.stderr) == (0, "")
-
-
-def test_config_prints_effective_values(run_here: Run, tmp_path: Path) -> None:
-    defaults = tomllib.loads(run_here("config").stdout)
-    assert defaults["match"]["method"] == "verified"
-    path = tmp_path / "settings.toml"
-    path.write_text('[match]\nmethod = "paper"\nnoise_m = 0.03\nup = [0, 1, 0]\n')
-    from_file = tomllib.loads(run_here("config", "--config", path).stdout)
-    up = [[0, 1, 0], [0, 1, 0]]
-    assert from_file["match"] == {**defaults["match"], "method": "paper", "noise_m": 0.03, "up": up}
-    flags_win = tomllib.loads(run_here("config", "--config", path, "--method", "verified", "--up", "0,0,1").stdout)
-    assert flags_win["match"]["method"] == "verified"
-    assert flags_win["match"]["noise_m"] == 0.03
-    assert flags_win["match"]["up"] == [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
-
-
-def test_config_reads_back_what_it_prints(
-    run_here: Run, visits: Path, tmp_path: Path, found: dict[str, object]
-) -> None:
-    path = tmp_path / "settings.toml"
-    path.write_text(run_here("config").stdout)
-    assert run_here("config", "--config", path).stdout == path.read_text()
-    answer = json.loads(run_here("match", visits / "query.csv", visits / "map.csv", "--config", path, "--json").stdout)
-    assert {**answer, "elapsed_s": 0} == {**found, "elapsed_s": 0}
 
 
 def test_an_ambiguous_answer_names_all_its_transforms(run_here: Run, tmp_path: Path) -> None:
@@ -418,28 +321,6 @@ def test_draws_the_view_that_was_asked_for(visits: Path, run_here: Run, tmp_path
         )
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "row.svg").read_bytes() != (tmp_path / "lines.svg").read_bytes()
-
-
-def test_config_says_what_each_setting_means(run_here: Run) -> None:
-    lines = run_here("config").stdout.splitlines()
-    for number, line in enumerate(lines):
-        if re.match(r"\w+ = |# \w+ is not set$|\[", line):
-            assert lines[number - 1].startswith("# "), line
-            assert not lines[number - 1].endswith("is not set"), line
-    assert max(map(len, lines)) <= 120
-    # From the comments of the core, and from the docstring of `pomona.match`.
-    assert "# Standard deviation of one edge of a box, pixels.\nedge_sigma_px = 1.0" in "\n".join(lines)
-    assert '# "verified", or "paper" for the published method.\nmethod = "verified"' in "\n".join(lines)
-
-
-@pytest.mark.parametrize("name", ["-", "/dev/fd/0"])
-def test_config_comes_from_what_is_open_already(name: str) -> None:
-    done = run("config", "--config", name, stdin="[match]\nnoise_m = 0.03\n")
-    assert done.returncode == 0, done.stderr
-    assert tomllib.loads(done.stdout)["match"]["noise_m"] == 0.03
-    done = run("config", "--config", name, stdin="[match]\nnoise = 0.03\n")
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"pomona: {name}: unknown setting match.noise, expected one of ")
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

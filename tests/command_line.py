@@ -1,0 +1,40 @@
+"""The command line as a user meets it, and two visits for it to match."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from pomona.cloud import FruitCloud
+from pomona.synth.clouds import scene_pair
+
+POMONA = Path(sys.executable).with_name("pomona")
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def run(*arguments: object, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    """In a process of its own."""
+    return subprocess.run([POMONA, *map(str, arguments)], input=stdin, capture_output=True, text=True)
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:
+    """Wrong input: exit code 2, nothing on stdout, one line on stderr that names what is wrong."""
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("pomona: ")
+    assert done.stderr.count("\n") == 1
+    for words in named:
+        assert words in done.stderr
+
+
+def write_visits(folder: Path) -> Path:
+    """Two visits to one row, query.csv and map.csv, in millimetres too; elsewhere.csv has nothing in common."""
+    pair = scene_pair("base", seed=7)
+    pair.query.write(folder / "query.csv")
+    pair.map.write(folder / "map.csv")
+    scene_pair("noov", seed=7).query.write(folder / "elsewhere.csv")
+    millimetres = FruitCloud(pair.query.positions * 1000.0, ids=pair.query.ids)
+    millimetres.write(folder / "query_mm.csv")
+    FruitCloud(pair.map.positions * 1000.0, ids=pair.map.ids).write(folder / "map_mm.csv")
+    return folder
