@@ -16,14 +16,19 @@ from typer.testing import CliRunner
 
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.cli import app
+from pomona.demo import run_demo
 from pomona.growth.bearing_trees import as_counted, bearing_trees
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.map_trees import find_trees
 from pomona.synth.living import RowDesign, grow
+from pomona.synth.planting import RowShape
+from pomona.synth.planting import grow_row as synth_row
 from pomona.trajectory import Trajectory
 from pomona.tree_rows import planting_of, row_lines
 from pomona.tree_rows.numbering_of_trees import UNNUMBERED, numbers_along
+from pomona.tree_rows.told_rows import told_rows
+from pomona.tree_rows.tree_spacing import crowding
 
 POMONA = Path(sys.executable).with_name("pomona")
 SHIPPED = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09" / "fruits.csv"
@@ -102,6 +107,64 @@ def test_of_walls_no_tree_is_told(system: str) -> None:
     planting = planting_of(places[line.members], line.along_m, line.beside_m)
     assert planting.crowns is None
     assert planting.log_odds < 0
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4])
+def test_the_better_a_row_is_known_the_more_it_tells(seed: int) -> None:
+    """Fruits that touch were counted as one: where most hang, in the crowns, all touched once they were known."""
+    row = synth_row(np.random.default_rng(seed), 5, RowShape(fruits_per_tree=(240, 300)))
+    way = np.column_stack([np.linspace(0, 6, 9), np.ones((9, 2))])
+    chances = np.random.default_rng(seed).random(len(row))
+    told = []
+    for share in (0.3, 0.6, 1.0):
+        places = row.positions[chances < share]
+        (line,) = row_lines(places, [way])
+        planting = planting_of(places, line.along_m, line.beside_m)
+        assert planting.crowns is not None
+        trunks = np.sort(line.places(planting.crowns.places_m)[:, 0])
+        np.testing.assert_allclose(trunks, 1.2 * np.arange(5), atol=0.4)
+        told.append(planting.log_odds)
+    assert told[2] > 1.15 * told[0]
+
+
+def test_fruits_of_a_cluster_are_no_independent_evidence() -> None:
+    rng = np.random.default_rng(2)
+    spurs = rng.uniform(0.0, [20.0, 1.0, 2.5], (300, 3))
+    assert crowding(spurs) == pytest.approx(1.0, abs=0.15)
+    fruits = (spurs[:, None] + rng.normal(0.0, 0.02, (300, 4, 3))).reshape(-1, 3)
+    assert crowding(fruits) == pytest.approx(4.0, abs=0.6)
+    # So four that hang together say no more than one.
+    along_m, beside_m = fruits[:, 0], fruits[:, [2, 1]]
+    one = planting_of(spurs, spurs[:, 0], spurs[:, [2, 1]])
+    four = planting_of(fruits, along_m, beside_m)
+    assert one.crowns is None
+    assert four.crowns is None
+
+
+def test_one_row_runs_where_it_is_longest() -> None:
+    """The way in which its fruits cover least is off by more, and turned the trees of a row that nobody drove along."""
+    off_degrees = []
+    for seed in range(100, 106):
+        places = synth_row(np.random.default_rng(seed), 5, RowShape()).positions
+        ((line, _),) = told_rows(places)
+        (end_on,) = row_lines(places)
+        off_degrees.append([np.degrees(np.arccos(abs(one.direction[0]))) for one in (line, end_on)])
+    longest, end_on_degrees = np.median(off_degrees, axis=0)
+    assert longest < 4.0
+    assert end_on_degrees > 1.5 * longest
+
+
+def test_the_map_of_two_drawn_visits_has_the_trees_that_were_drawn(tmp_path: Path) -> None:
+    """Of a third of its fruits one visit alone has seen, and they count: the map says that most are fruits."""
+    demo = run_demo(tmp_path)
+    fruits = OrchardMap(demo.orchard).fruits()
+    seen_once = np.array(fruits.extras["n_sessions"]) == "1"
+    assert seen_once.mean() > 0.4
+    assert min(float(chance) for chance in fruits.extras["fruit_probability"]) > 0.5
+    (row,) = find_trees(demo.orchard)
+    assert (row.kind, len(row.trees), row.n_fruits) == ("trees", 5, len(fruits))
+    assert row.spacing_m == pytest.approx(1.2, abs=0.1)
+    assert bearing_trees(fruits).names == ("1", "2", "3", "4", "5")
 
 
 def test_the_shipped_row_has_five_trees() -> None:

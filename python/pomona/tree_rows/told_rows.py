@@ -14,6 +14,9 @@ __all__ = ["told_rows"]
 
 ToldRows = list[tuple[RowLine, Planting]]
 
+SAME_WAY = 0.966
+"""Cosine of the angle, 15 degrees, within which two directions are two measurements of one row's."""
+
 
 def told_rows(
     positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]] = (), spacing_m: float | None = None
@@ -21,7 +24,9 @@ def told_rows(
     """Return the rows of fruits, in order across them, and how each is planted.
 
     Without ways of cameras a short row can be taken for trees one above the other. Then the longest extent of all
-    fruits is asked too, and the direction is taken in which more speaks for trees.
+    fruits is asked too. Of one row that is the better measurement where both are much alike: of drawn rows of five
+    trees it is off by 3 degrees, the other by 7. Where they are not, or there are several rows, the direction is taken
+    in which more speaks for trees.
 
     Parameters
     ----------
@@ -30,11 +35,16 @@ def told_rows(
     spacing_m : float, optional
         As in `row_lines` and `planting_of`.
     """
-    told = _told(positions, row_lines(positions, ways), spacing_m)
+    lines = row_lines(positions, ways)
     if len(positions) < 2 or any(len(way) > 1 for way in ways):
-        return told
+        return _told(positions, lines, spacing_m)
     longest = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][0]
-    other = _told(positions, row_lines(positions, direction=longest), spacing_m)
+    others = row_lines(positions, direction=longest)
+    other = _told(positions, others, spacing_m)
+    # More evidence in one of two such directions would be chance, of which a wrong number of trees is made.
+    if len(lines) == len(others) == 1 and abs(lines[0].direction @ longest) > SAME_WAY:
+        return other
+    told = _told(positions, lines, spacing_m)
     return other if _evidence(other) > _evidence(told) else told
 
 
