@@ -26,6 +26,7 @@ NAMES = (
     "thinning",
     "seasons",
     "once_seen",
+    "trees",
     "mapscale",
     "million",
     "clouds",
