@@ -9,7 +9,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.orchard import FORMAT_VERSION, OrchardMap, Session, add_session, load_session, problems, write_session
+from pomona.orchard import (
+    FORMAT_VERSION,
+    OrchardMap,
+    Session,
+    add_session,
+    load_session,
+    problems,
+    recognising,
+    write_session,
+)
 from pomona.settings import Settings
 from pomona.synth.clouds import scene_pair
 
@@ -156,6 +165,28 @@ def test_fruits_out_of_view_are_not_missed(tmp_path: Path, scenes: list[FruitClo
     assert added.n_matched == len(half)
     # Only at the cut can a fruit have more neighbours on the seen side than on its own.
     assert added.n_missed < 0.1 * len(half)
+
+
+def test_a_visit_that_only_the_map_knows_keeps_fruits_whole(
+    tmp_path: Path, scenes: list[FruitCloud], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no visit has enough of its fruits, those of the map have sights before the last one too.
+
+    A visit that shares one last sight with the first visit, and all others with the second, was said to have been
+    matched with the first: all that this match left out spoke against the fruits that the first two visits share.
+    """
+    monkeypatch.setattr(recognising, "matches_between", lambda *_, **__: {})
+    path, cloud = tmp_path / "orchard.gpkg", scenes[0]
+    rng = np.random.default_rng(4)
+    for month in range(6, 10):
+        seen = np.flatnonzero(rng.random(len(cloud)) < 0.9)
+        assert add_session(path, visit(turned(cloud.select(seen), month), f"2024-{month:02d}-01")).is_added
+    identities: dict[str, set[int]] = defaultdict(set)
+    observed = OrchardMap(path).observations()
+    for label, fruit in zip(observed.labels, observed.fruit_ids.tolist(), strict=True):
+        identities[label].add(fruit)
+    split = [label for label, fruits in identities.items() if len(fruits) > 1]
+    assert len(split) <= 0.01 * len(identities)
 
 
 def test_a_session_that_is_not_found_leaves_the_map_alone(grown: Path) -> None:

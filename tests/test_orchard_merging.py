@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.cli import main
-from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, problems
+from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, merging, problems, recognising
 from pomona.orchard.writing import update_layers
 from pomona.store.opening import snapshot, writing
 from pomona.synth.clouds import scene_pair
@@ -91,6 +92,20 @@ def test_a_merged_map_is_that_of_all_sessions(
     assert set(ids) <= set(OrchardMap(path).fruits().ids or ()) | {
         str(change.from_fruit_id) for change in merged.changes
     }
+
+
+def test_maps_whose_visits_do_not_match_by_themselves_are_joined_by_all_sights(
+    row: FruitCloud, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    visits = [visit(row, number) for number in range(4)]
+    path, other = grown(tmp_path / "ours.gpkg", visits[:2]), grown(tmp_path / "theirs.gpkg", visits[2:])
+    for module in (merging, recognising):
+        monkeypatch.setattr(module, "matches_between", lambda *_, **__: {})
+    assert merge_maps(path, other).is_merged
+    sights_of = [{label.split(".")[1] for label in sights} for sights in who_is_who(path)]
+    identities = Counter(fruit for fruits in sights_of for fruit in fruits)
+    assert sum(n > 1 for n in identities.values()) <= 0.03 * len(identities)
+    assert sum(len(fruits) > 1 for fruits in sights_of) <= 0.03 * len(identities)
 
 
 def test_what_the_other_s_fruits_became_is_told_and_kept(visits: list[Session], tmp_path: Path) -> None:

@@ -204,7 +204,7 @@ def _together(
         for number, visit in coming.items()
     }
     if found is not None and not any(between.values()):
-        between = matches_through_fruits(evidence, found, theirs.evidence.visits, theirs.last_sights())
+        between = matches_through_fruits(evidence, found, theirs.evidence.visits, theirs.sights())
     visits = sorted([*evidence.visits, *coming.values()], key=lambda visit: visit.seen.key)
     numbers = {visit.session_id: number for number, visit in enumerate(visits)}
     ours = [numbers[visit.session_id] for visit in evidence.visits]

@@ -14,7 +14,7 @@ from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.orchard.besides import Besides, read_besides
 from pomona.orchard.evidence import Evidence, KnownVisit, read_evidence
-from pomona.orchard.recognising import last_sights, worth_recognising
+from pomona.orchard.recognising import Sight, sights_of_fruits, worth_recognising
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import session_in_map
 from pomona.store.opening import snapshot
@@ -75,10 +75,10 @@ class OtherMap:
         yield f"{name} ({self.name})"
         yield from (f"{name} ({self.name}, {number})" for number in count(2))
 
-    def last_sights(self) -> list[tuple[int, int]]:
-        """Return for each of `fruits` the visit that saw it last, and its row there."""
-        last = last_sights(self.evidence)
-        return [last[int(name)] for name in self.fruits.ids or ()]
+    def sights(self) -> list[Sequence[Sight]]:
+        """Return for each of `fruits` the visits that saw it, with its rows there."""
+        seen = sights_of_fruits(self.evidence)
+        return [seen[int(name)] for name in self.fruits.ids or ()]
 
 
 def read_other(path: Path) -> OtherMap:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Collection, Container, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
 __all__ = [
     "MARGIN_M",
     "Recognised",
-    "last_sights",
+    "Sight",
     "matches_between",
     "matches_through_fruits",
     "matches_with_visits",
     "recognised",
     "seen_last_by",
+    "sights_of_fruits",
     "worth_recognising",
 ]
 
@@ -49,6 +51,9 @@ LARGE = 10_000
 
 NEARBY_M = 1.5
 """From the fruits of a session, as it seems to lie: what it may have seen. Of the farthest, a guess is off by less."""
+
+Sight = tuple[int, int]
+"""A visit, and its row for a fruit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,7 @@ def matches_with_visits(
     """
     assert found.match.map_from_query is not None
     matches = matches_between(evidence, visit, found.match.map_from_query, settings)
-    sights = [(0, row) for row in rows.tolist()]
+    sights = [[(0, row)] for row in rows.tolist()]
     return matches or matches_through_fruits(evidence, found, [visit], sights).get(0, {})
 
 
@@ -232,9 +237,12 @@ def _are_apart(in_map: NDArray[np.float64], other: KnownVisit) -> bool:
 
 
 def matches_through_fruits(
-    evidence: Evidence, found: Recognised, visits: Sequence[KnownVisit], sights: Sequence[tuple[int, int]]
+    evidence: Evidence, found: Recognised, visits: Sequence[KnownVisit], sights: Sequence[Sequence[Sight]]
 ) -> dict[int, dict[int, VisitPair]]:
-    """Return how visits match those of the map that saw the same fruits last, by the numbers of both.
+    """Return how visits match those of the map that saw the same fruits, by the numbers of both.
+
+    A fruit that was found is known to every visit that saw it, not to the last alone: what a match of two visits
+    does not pair speaks against being one fruit, and would part the last sight of a fruit from those before.
 
     Parameters
     ----------
@@ -243,15 +251,15 @@ def matches_through_fruits(
     visits
         Of the query, where they lie in its frame.
     sights
-        Visit and its row for each row of the query.
+        For each row of the query all visits that saw it, with their rows.
     """
-    match, last = found.match, last_sights(evidence)
+    match, all_sights = found.match, sights_of_fruits(evidence)
     assert match.map_from_query is not None
     of_pairs = zip(match.pairs[:, 0].tolist(), found.fruit_ids[match.pairs[:, 1]].tolist(), strict=True)
     between: dict[tuple[int, int], list[tuple[int, int, int]]] = defaultdict(list)
     for place, (asked, fruit_id) in enumerate(of_pairs):
-        (mine, row), (other, other_row) = sights[asked], last[fruit_id]
-        between[mine, other].append((other_row, row, place))
+        for (mine, row), (other, other_row) in product(sights[asked], all_sights[fruit_id]):
+            between[mine, other].append((other_row, row, place))
     matches: dict[int, dict[int, VisitPair]] = defaultdict(dict)
     for (mine, other), rows in sorted(between.items()):
         map_from_other = evidence.visits[other].map_from_session
@@ -269,10 +277,10 @@ def _turned(pair: VisitPair) -> VisitPair:
     return replace(pair, first_from_second=first_from_second, rows=pair.rows[:, ::-1])
 
 
-def last_sights(evidence: Evidence) -> Mapping[int, tuple[int, int]]:
-    """Return the last visit that saw each fruit, and its row there."""
-    return {
-        fruit_id: (number, row)
-        for number, visit in enumerate(evidence.visits)
-        for row, fruit_id in enumerate(visit.fruit_ids.tolist())
-    }
+def sights_of_fruits(evidence: Evidence) -> Mapping[int, Sequence[Sight]]:
+    """Return the visits that saw each fruit, with its row there."""
+    sights: dict[int, list[Sight]] = defaultdict(list)
+    for number, visit in enumerate(evidence.visits):
+        for row, fruit_id in enumerate(visit.fruit_ids.tolist()):
+            sights[fruit_id].append((number, row))
+    return sights
