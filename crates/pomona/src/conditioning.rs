@@ -1,7 +1,7 @@
 //! A cloud as the methods see it: every fruit once, no strays, about its own middle, in one unit where the scale is free.
 //!
-//! A match must not depend on where the origin of a cloud lies, in which unit a reconstruction came, on a row that is
-//! there twice or on one that lies a thousand kilometres away. So both clouds are conditioned before any method sees
+//! A match must not depend on where the origin of a cloud lies, on how its axes are turned, in which unit a reconstruction
+//! came, on a row that is there twice or on one that lies a thousand kilometres away. So both clouds are conditioned before any method sees
 //! them, and the answer is put back into the caller's rows, frames and units:
 //!
 //! 1. Fruits at exactly one place are one fruit; the first row stands for all.
@@ -11,6 +11,8 @@
 //! 4. Where more than [`CROWD`] share a cell of one spacing, which no plant bears, that many are kept: what is near each
 //!    other is compared with each other, and a heap of thousands would take hours.
 //! 5. What is left is moved to its mean; where the scale is free it is also scaled to one spacing.
+//! 6. It is turned into its principal axes, the longest first, each the way in which it reaches farther: so cells and the order
+//!    of fruits are the cloud's own, and a row lies in one layer of cells.
 
 use crate::answer::{Match, Pair, Registration};
 use crate::cloud::{FruitCloud, Views};
@@ -18,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use crate::neighbours::cells::{CellKey, CellMap};
 use crate::statistics::upper_median;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 /// Fruits whose spacing is measured: enough for a median that up to fifteen strays among them do not touch.
 const SAMPLE: usize = 32;
@@ -53,6 +55,8 @@ pub(crate) struct Conditioned {
     given: usize,
     /// The origin in the caller's frame.
     middle: Vector3<f64>,
+    /// The axes in the caller's frame.
+    axes: Rotation3<f64>,
     /// The unit of length in the caller's.
     unit: f64,
     /// Median distance to the sixth-nearest fruit, in the unit.
@@ -82,16 +86,39 @@ impl Conditioned {
             given: cloud.len(),
             rows,
             middle,
+            axes: Rotation3::identity(),
             unit,
             spacing: spacing / unit,
         }
     }
 
+    /// Turned into its principal axes.
+    #[must_use]
+    pub(crate) fn turned(mut self) -> Self {
+        self.axes = principal_axes(&self.cloud.positions);
+        for p in &mut self.cloud.positions {
+            *p = self.axes.inverse_transform_point(p);
+        }
+        let axes = self.axes.matrix();
+        for covariance in self.cloud.covariances.iter_mut().flatten() {
+            *covariance = axes.tr_mul(&(*covariance * axes));
+        }
+        self
+    }
+
     /// The same of a cloud that was conditioned before: its `rows`, about `middle`; the scale is metric.
     pub(crate) fn again(cloud: &FruitCloud, rows: Vec<usize>, middle: Vector3<f64>, spacing: f64) -> Self {
         let first_of: Vec<usize> = (0..cloud.len()).collect();
-        let unit = 1.0;
-        Self { cloud: moved(cloud, &rows, &first_of, &middle, unit), given: cloud.len(), rows, middle, unit, spacing }
+        let (axes, unit) = (Rotation3::identity(), 1.0);
+        Self {
+            cloud: moved(cloud, &rows, &first_of, &middle, unit),
+            given: cloud.len(),
+            rows,
+            middle,
+            axes,
+            unit,
+            spacing,
+        }
     }
 
     /// Puts its fruits into another order.
@@ -175,7 +202,12 @@ impl Conditioned {
 
     /// Takes conditioned places into the caller's frame.
     pub(crate) fn outward(&self) -> Similarity {
-        Similarity { rotation: nalgebra::Rotation3::identity(), translation: self.middle, scale: self.unit }
+        Similarity { rotation: self.axes, translation: self.middle, scale: self.unit }
+    }
+
+    /// A direction of the caller's frame between conditioned places.
+    pub(crate) fn direction(&self, of_caller: &Vector3<f64>) -> Vector3<f64> {
+        self.axes.inverse_transform_vector(of_caller)
     }
 }
 
@@ -299,6 +331,22 @@ fn middle(positions: &[Point3<f64>], rows: &[usize]) -> Vector3<f64> {
     let origin = positions[first];
     let sum: Vector3<f64> = rows.iter().map(|&row| positions[row] - origin).sum();
     origin.coords + sum / rows.len() as f64
+}
+
+/// The principal axes of places about their mean as a proper rotation, the longest first. The first two point where the third
+/// moment is above zero, which no turn of the frame changes.
+fn principal_axes(positions: &[Point3<f64>]) -> Rotation3<f64> {
+    let scatter: Matrix3<f64> = positions.iter().map(|p| p.coords * p.coords.transpose()).sum();
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let [along, up] = [order[0], order[1]].map(|i| {
+        let axis = eigen.eigenvectors.column(i).into_owned();
+        let third: f64 = positions.iter().map(|p| axis.dot(&p.coords).powi(3)).sum();
+        if third < 0.0 { -axis } else { axis }
+    });
+    let axes = Matrix3::from_columns(&[along, up, along.cross(&up)]);
+    if axes.iter().all(|x| x.is_finite()) { Rotation3::from_matrix_unchecked(axes) } else { Rotation3::identity() }
 }
 
 fn moved(cloud: &FruitCloud, rows: &[usize], first_of: &[usize], middle: &Vector3<f64>, unit: f64) -> FruitCloud {

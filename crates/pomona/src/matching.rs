@@ -67,14 +67,15 @@ impl MapIndex {
         config.validate()?;
         let given = map;
         let map = Conditioned::new(map, scale);
+        if method == Method::Verified && map.cloud.len() > crate::verified::MAX_FRUITS {
+            return match scale {
+                Scale::Metric => Self::compacted(given, map, &config),
+                Scale::Free => Err(too_many(map.cloud.len(), crate::verified::MAX_FRUITS)),
+            };
+        }
+        let map = map.turned();
         let fruits = &map.cloud;
         let prepared = match method {
-            Method::Verified if fruits.len() > crate::verified::MAX_FRUITS => {
-                return match scale {
-                    Scale::Metric => Self::compacted(given, map, &config),
-                    Scale::Free => Err(too_many(fruits.len(), crate::verified::MAX_FRUITS)),
-                };
-            }
             Method::Verified => PreparedMap::Verified(Box::new(VerifiedMap::new(fruits, scale))),
             Method::Paper if fruits.len() < config.constellation.k => PreparedMap::TooFew,
             Method::Paper => PreparedMap::Paper(Box::new(crate::paper::PaperMap::new(&fruits.positions, &config)?)),
@@ -154,8 +155,9 @@ impl MapIndex {
     fn answer(&self, query: &FruitCloud, request: &Request) -> Result<Match> {
         query.validate()?;
         request.validate()?;
-        let query = Conditioned::new(query, self.scale);
-        let request = Request { noise_m: self.map.noise(request.noise_m)?, ..*request };
+        let query = Conditioned::new(query, self.scale).turned();
+        let up = request.up.map(|[of_query, of_map]| [query.direction(&of_query), self.map.direction(&of_map)]);
+        let request = Request { noise_m: self.map.noise(request.noise_m)?, up, ..*request };
         let found = self.found(&query, &request)?;
         Ok(self.restored(&query, found))
     }
@@ -205,7 +207,7 @@ impl MapIndex {
         query.validate()?;
         let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: false };
         request.validate()?;
-        let query = Conditioned::new(query, self.scale);
+        let query = Conditioned::new(query, self.scale).turned();
         let pose = self.map.conditioned_pose(&query, pose);
         let request = Request { noise_m: self.map.noise(noise_m)?, ..request };
         let config = &self.config.verified;
@@ -277,7 +279,7 @@ impl ReadyCloud {
     /// A cloud that is wrong.
     pub fn new(cloud: &FruitCloud) -> Result<Self> {
         cloud.validate()?;
-        let given = Conditioned::new(cloud, Scale::Metric);
+        let given = Conditioned::new(cloud, Scale::Metric).turned();
         let prepared = VerifiedMap::without_seeds(&given.cloud);
         Ok(Self { given, prepared })
     }

@@ -1,8 +1,8 @@
-//! What must not matter to a match: unit, origin, copies and strays, by either method.
+//! What must not matter to a match: unit, origin, axes, copies and strays, by either method.
 
 mod support;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use pomona::{Config, FruitCloud, Match, Method, Request, Scale, Verdict, Views, match_clouds};
 use proptest::prelude::*;
 use support::{Random, Scene};
@@ -40,6 +40,10 @@ fn factor() -> impl Strategy<Value = f64> {
 
 fn offset() -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-1e7..1e7f64).prop_map(Vector3::from)
+}
+
+fn turn() -> impl Strategy<Value = Rotation3<f64>> {
+    prop::array::uniform3(-3.0..3.0f64).prop_map(|turn| Rotation3::new(Vector3::from(turn)))
 }
 
 /// Far from everything, to where coordinates end.
@@ -84,6 +88,22 @@ proptest! {
     }
 
     #[test]
+    fn how_the_axes_of_a_cloud_are_turned(method in method(), seed in 0..8u64, turns in [turn(), turn()]) {
+        let scene = visits(seed);
+        let plain = search(&scene.query, &scene.map, method, Scale::Metric);
+        let [query, map] = [(&scene.query, turns[0]), (&scene.map, turns[1])].map(|(cloud, turn)| {
+            FruitCloud::from_positions(cloud.positions.iter().map(|p| turn * p).collect())
+        });
+        let found = search(&query, &map, method, Scale::Metric);
+        prop_assert_eq!(rows(&found), rows(&plain));
+        for (found, plain) in found.pairs.iter().zip(&plain.pairs) {
+            let apart = (found.probability - plain.probability).abs();
+            // Some distances are compared in single precision.
+            prop_assert!(apart < 1e-4, "{apart}");
+        }
+    }
+
+    #[test]
     fn strays_in_either_cloud(
         method in method(), scale in prop::sample::select(vec![Scale::Metric, Scale::Free]), seed in 0..8u64,
         origin in offset(), extra in [strays(), strays()],
@@ -112,6 +132,29 @@ proptest! {
         prop_assert_eq!(rows(&search(&query, &scene.map, method, Scale::Metric)), rows(&plain));
         prop_assert_eq!(rows(&search(&scene.query, &map, method, Scale::Metric)), rows(&plain));
     }
+}
+
+/// Covariances and verticals turn with the cloud that they are of.
+#[test]
+fn what_is_known_in_a_frame_turns_with_it() {
+    let mut scene = visits(3);
+    let covariance = |row: usize| Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-3 * (1 + row % 3) as f64));
+    scene.query.covariances = Some((0..scene.query.len()).map(covariance).collect());
+    let up = |cloud: Vector3<f64>| [scene.map_from_query.rotation.inverse() * cloud, cloud];
+    let request = Request { up: Some(up(Vector3::z())), ..Request::default() };
+    let ask = |query: &FruitCloud, request: &Request| {
+        match_clouds(query, &scene.map, request, &Config::default()).expect("valid clouds")
+    };
+    let turn = Rotation3::new(Vector3::new(0.7, -2.0, 1.1));
+    let mut turned = scene.query.clone();
+    turned.positions.iter_mut().for_each(|p| *p = turn * *p);
+    turned.covariances.iter_mut().flatten().for_each(|c| *c = turn * *c * turn.inverse());
+    let [of_query, of_map] = up(Vector3::z());
+    let (plain, found) =
+        (ask(&scene.query, &request), ask(&turned, &Request { up: Some([turn * of_query, of_map]), ..request }));
+    assert_eq!(plain.verdict, Verdict::Found);
+    assert_eq!(rows(&found), rows(&plain));
+    assert!(found.pairs.iter().zip(&plain.pairs).all(|(a, b)| (a.probability - b.probability).abs() < 1e-4));
 }
 
 #[test]

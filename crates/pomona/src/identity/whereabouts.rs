@@ -71,7 +71,7 @@ pub struct Whereabouts {
 pub fn whereabouts(map: &FruitCloud, visit: &FruitCloud) -> Result<Option<Whereabouts>> {
     map.validate()?;
     visit.validate()?;
-    let visit = Conditioned::new(visit, Scale::Metric);
+    let visit = Conditioned::new(visit, Scale::Metric).turned();
     if [map, &visit.cloud].iter().any(|cloud| cloud.len() <= COMPANIONS) {
         return Ok(None);
     }
