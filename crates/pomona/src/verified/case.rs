@@ -90,6 +90,11 @@ impl Finding<'_> {
         self.settled.as_ref().map_or(f64::NEG_INFINITY, |settled| settled.evidence)
     }
 
+    /// Evidence as it grew or as it stands in the end, nats, whichever is more.
+    pub(super) fn most_evidence(&self) -> f64 {
+        self.overlap.log_odds.max(self.evidence())
+    }
+
     /// Share of the fruits of the query that are found, of those that the map can show in their depths all along the row.
     pub(super) fn share_of_row(&self) -> f64 {
         let found: f64 = self.settled.iter().flat_map(|settled| &settled.beliefs.probabilities).sum();
@@ -190,7 +195,7 @@ impl<'a> Search<'a> {
     ///
     /// Where fruits hang on wires or in cones, a wrong pose lays rows of fruits along rows of fruits, and many lie somewhat
     /// nearer than strangers do. That adds up, but once each is asked who is who, most pairs are likelier wrong than right.
-    pub(super) fn holds(&self, finding: &mut Finding, kept: [f64; 2], log: &mut Log) -> bool {
+    pub(super) fn holds(&self, finding: &mut Finding<'a>, kept: [f64; 2], log: &mut Log) -> bool {
         let grown = finding.overlap.log_odds;
         let [least, believed] = kept.map(|share| share * log.threshold);
         if grown <= least {
@@ -214,14 +219,24 @@ impl<'a> Search<'a> {
         pairs.iter().map(|pair| pair.1).sum::<f64>() / pairs.len() as f64
     }
 
-    /// Looks closely at a finding, over all that it reaches; returns its evidence.
-    pub(super) fn settle(&self, finding: &mut Finding) -> f64 {
+    /// Looks closely at a finding, over all that it reaches, beyond gaps too where that says more; returns its evidence.
+    pub(super) fn settle(&self, finding: &mut Finding<'a>) -> f64 {
         let Finding { growth, settled, .. } = finding;
         let settled = settled.get_or_insert_with(|| {
-            if !growth.whole {
-                growth.reach_all();
+            let as_grown = settle(growth, self.noise_m);
+            if growth.whole {
+                return as_grown;
             }
-            settle(growth, self.noise_m)
+            let mut bridged = growth.clone();
+            if !bridged.reach_all() {
+                return as_grown;
+            }
+            let beyond = settle(&bridged, self.noise_m);
+            if beyond.evidence > as_grown.evidence {
+                *growth = bridged;
+                return beyond;
+            }
+            as_grown
         });
         settled.evidence
     }

@@ -37,7 +37,8 @@ impl Search<'_> {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
-        let rivals = |finding: &Finding| self.rivals(&overlap, &finding.overlap, pattern);
+        let most = log_odds.max(settled.evidence);
+        let rivals = |other: &Finding| self.rivals((&overlap, most), (&other.overlap, other.most_evidence()), pattern);
         let pairs = self.pairs(&settled.beliefs, &overlap);
         let outdone = others.iter().any(rivals);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);

@@ -23,7 +23,7 @@ pub(super) const RIVAL_CANDIDATES: usize = 24;
 const RIVAL: f64 = 0.5;
 
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
-const BENT: f64 = 0.05;
+pub(super) const BENT: f64 = 0.05;
 
 /// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
 const MIRRORED: f64 = 1.3;
@@ -121,12 +121,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether another optimum has nearly as much evidence elsewhere.
+    /// Whether another optimum has nearly as much evidence, nats, elsewhere.
     ///
-    /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere.
-    pub(super) fn rivals(&self, best: &Overlap, other: &Overlap, pattern: f64) -> bool {
-        let elsewhere = self.elsewhere(best, other);
-        is_most(elsewhere) && elsewhere * other.log_odds > pattern.max(RIVAL * best.log_odds)
+    /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere: of the
+    /// best's fruits, and of its own, for a pose that is found on one tree says little of where another stands.
+    pub(super) fn rivals(&self, (best, most): (&Overlap, f64), (other, nats): (&Overlap, f64), pattern: f64) -> bool {
+        let elsewhere = self.elsewhere(best, other).min(self.unexplained(best, other));
+        is_most(elsewhere) && elsewhere * nats > pattern.max(RIVAL * most)
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.
@@ -140,9 +141,22 @@ impl<'a> Search<'a> {
             let bent = BENT * best.pose.scale * (p - other.middle).norm();
             at.map(|at| (other.pose.image(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
         };
-        let apart: Vec<bool> = self.query.points.iter().zip(&best.predictions).filter_map(apart).collect();
-        apart.iter().filter(|&&apart| apart).count() as f64 / apart.len().max(1) as f64
+        share(self.query.points.iter().zip(&best.predictions).filter_map(apart))
     }
+
+    /// Share of the fruits of another optimum's overlap that the best does not put where that puts them.
+    fn unexplained(&self, best: &Overlap, other: &Overlap) -> f64 {
+        let apart = |(best, other): (&Option<Landing>, &Option<Landing>)| {
+            let there = other.as_ref()?.place;
+            Some(best.is_none_or(|at| (at.place - there).norm() > 0.5 * self.map.spacing))
+        };
+        share(best.predictions.iter().zip(&other.predictions).filter_map(apart))
+    }
+}
+
+fn share(of: impl Iterator<Item = bool>) -> f64 {
+    let (those, all) = of.fold((0, 0), |(those, all), one| (those + u32::from(one), all + 1));
+    f64::from(those) / f64::from(all.max(1))
 }
 
 pub(super) fn is_most(share: f64) -> bool {

@@ -23,10 +23,10 @@ const WHOLE_ROUNDS: usize = 2;
 pub(super) const HOLD: f64 = 2.0;
 
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
-const CONVINCING: f64 = 2.0;
+pub(super) const CONVINCING: f64 = 2.0;
 
 /// A pose that grows over the cells of the query.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Growth<'a> {
     pub(super) patches: Patchwork<'a>,
     /// The nearest fruit of the map, where no other fruit of the query is likelier to be it.
@@ -94,7 +94,7 @@ impl<'a> Growth<'a> {
 
     /// Predicts the fruits of the reached cells, and finds their nearest partners; of several claims on one fruit the likeliest
     /// wins.
-    fn meet(&mut self, widening: f64) {
+    pub(super) fn meet(&mut self, widening: f64) {
         self.patches.predict(
             |patches, cell| patches.footing(cell, ALL, HOLD),
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
@@ -138,7 +138,7 @@ impl<'a> Growth<'a> {
     }
 
     /// New poses, noise and shared displacement from the current pairs: one `rigid` pose, or patches.
-    fn refit(&mut self, rigid: bool) {
+    pub(super) fn refit(&mut self, rigid: bool) {
         let patches = &mut self.patches;
         if !patches.fit_as_one() {
             return;
@@ -157,7 +157,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Reaches the neighbours of cells whose surroundings speak for the pose; returns whether any is new.
-    fn spread(&mut self) -> bool {
+    pub(super) fn spread(&mut self) -> bool {
         let cells = &self.patches.cells;
         let mut new = Vec::new();
         for (i, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.reached) {
@@ -177,7 +177,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Fits to the pairs and makes them anew.
-    fn go_on(&mut self) {
+    pub(super) fn go_on(&mut self) {
         for _ in 0..WHOLE_ROUNDS {
             self.refit(false);
             self.meet(1.0);
@@ -189,21 +189,5 @@ impl<'a> Growth<'a> {
         let cell = &self.patches.cells[i];
         let around = || cell.around.iter().map(|&(other, closeness)| closeness * self.log_odds[other as usize]);
         self.whole || cell.reached && around().sum::<f64>() > CONVINCING
-    }
-
-    /// Looks once at the cells that growth did not reach: a crown may be cut off by a gap without fruits.
-    ///
-    /// They add pairs where they convince, but nothing to the evidence, which would be the better of two tries.
-    pub(crate) fn reach_all(&mut self) {
-        for cell in self.patches.cells.iter_mut().filter(|cell| !cell.reached) {
-            (cell.reached, cell.pose) = (true, self.patches.pose);
-        }
-        self.meet(1.0);
-        let outside: Vec<usize> = (0..self.patches.cells.len()).filter(|&i| !self.convincing(i)).collect();
-        for i in outside {
-            self.patches.cells[i].reached = false;
-        }
-        self.meet(1.0);
-        self.go_on();
     }
 }

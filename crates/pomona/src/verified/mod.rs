@@ -5,7 +5,7 @@
 //! 2. Each candidate's pose is weighed by the log-odds of the fruits around it against what chance predicts at the
 //!    local density, with an early exit (`proposal`, `vertical`); the best of different poses (`contender`) are refined
 //!    (`hypothesis`). A fruit that several claim is the strongest claim's (`claims`).
-//! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`).
+//! 3. Verified seeds grow over the overlap in rigid patches with a smooth displacement (`growth`), and beyond gaps (`bridges`).
 //! 4. A pose is accepted when its log-odds exceed what the number of tries lets chance reach (`acceptance`), hold when every
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
 //!    stands out of all others of the search (`outlier`).
@@ -19,6 +19,7 @@
 
 mod acceptance;
 mod axes;
+mod bridges;
 mod case;
 mod chance;
 mod claims;
