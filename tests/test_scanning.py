@@ -113,9 +113,11 @@ def test_shows_itself_and_is_matched(row: Path) -> None:
 
 def test_destroys_nothing(row: Path, tmp_path: Path) -> None:
     boxes = tmp_path / "boxes.csv"
-    boxes.write_text("frame,xmin,ymin,xmax,ymax,x,y,z,diameter_sigma_m\n0,10,10,40,40,0,0,0,0\n")  # also alike
-    with pytest.raises(PomonaError, match="is the input"):
+    boxes.write_text("frame,xmin,ymin,xmax,ymax\n0,10,10,40,40\n")
+    before = boxes.read_bytes()
+    with pytest.raises(PomonaError, match="is there already and is not what a scan writes"):
         pomona.scan(row, detections=boxes, output=boxes)
+    assert boxes.read_bytes() == before
     (tmp_path / "notes.csv").write_text("mine\n")
     with pytest.raises(PomonaError, match="is there already and is not what a scan writes"):
         pomona.scan(row, output=tmp_path / "notes.csv")

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from pomona.table_headers import GROWN_HEADERS, HEAD_BYTES, has_header, head_of, told_of_map, told_of_scan
+
 __all__ = [
     "BOXES",
     "BOXES_DRAWN",
@@ -52,9 +54,6 @@ __all__ = [
     "is_of_demo",
     "visits_of_season",
 ]
-
-HEAD_BYTES = 4096
-"""Of the beginning or the end of a file, where it says what it is."""
 
 SQLITE = b"SQLite format 3\0"
 
@@ -117,15 +116,8 @@ DEMO_NAME = "demo "
 
 """Of the visits of `pomona demo`, and in their tables."""
 
-GROWN_COLUMNS = {
-    "series.csv": "fruit_id,date,diameter_mm,sigma_mm",
-    "curves.csv": "fruit_id,date,diameter_mm,low_mm,high_mm",
-    "fruits.csv": "fruit_id,n_dates,rate_mm_per_day,forecast_mm,outlier",
-    "blocks.csv": "block,n_fruits,mean_mm,rate_mm_per_day,forecast_mm",
-    "classes.csv": "date,from_mm,below_mm,n_fruits,kg,packs",
-}
 GROWN_PICTURES = ("curves.png", "sizes.png", "variability.png")
-"""What `pomona growth` writes, and the columns by which its tables are told."""
+"""What `pomona growth` draws."""
 
 Database = Literal["session", "map", "other"]
 
@@ -184,56 +176,43 @@ def _is_sqlite(path: Path) -> bool:
         return file.read(len(SQLITE)) == SQLITE
 
 
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(HEAD_BYTES)
-
-
 def _tail(path: Path) -> bytes:
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - HEAD_BYTES))
         return file.read()
 
 
-def _has_columns(*names: str) -> Callable[[Path], bool]:
-    def tells(path: Path) -> bool:
-        first = _head(path).decode("utf-8-sig").splitlines()[0]
-        return set(names) <= set(next(csv.reader([first])))
-
-    return tells
-
-
 def _is_ply(path: Path) -> bool:
-    return _head(path).startswith(b"ply\n") and PLY_MARK.encode() in _head(path)
+    return head_of(path).startswith(b"ply\n") and PLY_MARK.encode() in head_of(path)
 
 
 def _has_poses(path: Path) -> bool:
-    return _head(path).startswith(POSES_MARK.encode())
+    return head_of(path).startswith(POSES_MARK.encode())
 
 
 def _is_way(path: Path) -> bool:
-    return _head(path).startswith(WAY_MARK.encode())
+    return head_of(path).startswith(WAY_MARK.encode())
 
 
 def _is_geojson(path: Path) -> bool:
-    head = _head(path)
+    head = head_of(path)
     return head.startswith(b'{"type": "FeatureCollection"') and (b"LOCAL_CS" in head or GEOJSON_MARK in head)
 
 
 def _is_shapefile(path: Path) -> bool:
     """Tell any of the files of a Shapefile by those that say where it lies, and from which day: in 1980, as ours do."""
-    if not _head(path.with_suffix(".dbf")).startswith(DBASE_MARK):
+    if not head_of(path.with_suffix(".dbf")).startswith(DBASE_MARK):
         return False
-    head = _head(path.with_suffix(".prj"))
+    head = head_of(path.with_suffix(".prj"))
     return b"LOCAL_CS" in head or head.startswith(b'GEOGCS["GCS_WGS_1984"')
 
 
 def _is_parquet(path: Path) -> bool:
-    return _head(path).startswith(b"PAR1") and PARQUET_MARK in _tail(path)
+    return head_of(path).startswith(b"PAR1") and PARQUET_MARK in _tail(path)
 
 
 def _is_mcap(path: Path) -> bool:
-    return _head(path).startswith(b"\x89MCAP0\r\n") and MCAP_MARK.encode() in _head(path)[:100]
+    return head_of(path).startswith(b"\x89MCAP0\r\n") and MCAP_MARK.encode() in head_of(path)[:100]
 
 
 def _is_session(path: Path) -> bool:
@@ -242,18 +221,17 @@ def _is_session(path: Path) -> bool:
 
 def _is_scanned(path: Path) -> bool:
     tells = {".gpkg": _is_session, ".ply": _is_ply}
-    # A CSV with the sizes' sigmas is one of a scan; the true fruits of a recording have none.
-    return tells.get(path.suffix.lower(), _has_columns("x", "y", "z", "diameter_sigma_m"))(path)
+    return tells.get(path.suffix.lower(), told_of_scan)(path)
 
 
 def _is_picture(path: Path) -> bool:
     """Tell a plot from a photograph: Matplotlib signs at the beginning, in PDF in front of the last table."""
     starts = (b"\x89PNG", b"%PDF", b"<?xml")
-    return _head(path).startswith(starts) and b"Matplotlib" in _head(path) + _tail(path)
+    return head_of(path).startswith(starts) and b"Matplotlib" in head_of(path) + _tail(path)
 
 
 def _is_video(path: Path) -> bool:
-    return _head(path)[4:8] == b"ftyp" and VIDEO_MARK.encode() in _tail(path)
+    return head_of(path)[4:8] == b"ftyp" and VIDEO_MARK.encode() in _tail(path)
 
 
 def _is_model(path: Path) -> bool:
@@ -262,15 +240,15 @@ def _is_model(path: Path) -> bool:
 
 
 def _is_report(path: Path) -> bool:
-    return REPORT_MARK in _head(path)
+    return REPORT_MARK in head_of(path)
 
 
 def _is_index(path: Path) -> bool:
-    return _head(path).startswith(INDEX_MARK)
+    return head_of(path).startswith(INDEX_MARK)
 
 
 def _has_drawn_boxes(folder: Path) -> bool:
-    return all(path.name.endswith(BOXES_DRAWN) and BOXES_DRAWN_MARK in _head(path) for path in folder.iterdir())
+    return all(path.name.endswith(BOXES_DRAWN) and BOXES_DRAWN_MARK in head_of(path) for path in folder.iterdir())
 
 
 def _has_note(folder: Path) -> bool:
@@ -335,7 +313,7 @@ def _is_demo(folder: Path) -> bool:
 
 def _is_grown(folder: Path) -> bool:
     """Tell a folder in which every file with one of growth's names is of its kind."""
-    tells = {name: _has_columns(*columns.split(",")) for name, columns in GROWN_COLUMNS.items()}
+    tells = {name: has_header(header) for name, header in GROWN_HEADERS.items()}
     tells |= dict.fromkeys(GROWN_PICTURES, _is_picture)
     return all(is_kind(folder / name) for name, is_kind in tells.items() if (folder / name).exists())
 
@@ -351,8 +329,8 @@ def _is_truth(path: Path) -> bool:
 
 
 SCANNED = Like("what a scan writes", _is_scanned)
-PAIRS = Like("a table of pairs", _has_columns("query", "map", "probability", "distance_m"))
-BOXES = Like("a table of boxes", _has_columns("image", "xmin", "ymin", "xmax", "ymax", "score"))
+PAIRS = Like("a table of pairs", has_header("query,map,probability,distance_m"))
+BOXES = Like("a table of boxes", has_header("image,xmin,ymin,xmax,ymax,score"))
 MODEL = Like("a model that was trained here", _is_model)
 DRAWN_BOXES = Like("a folder of drawn boxes", _has_drawn_boxes, is_folder=True)
 PULLED = Like("a pulled map, which takes a name of its own", lambda _: False)
@@ -365,8 +343,13 @@ VIDEO = Like("a preview", _is_video)
 KEPT = Like("a folder that a scan keeps", _has_note, is_folder=True)
 RENDERED = Like("a rendered recording", _has_note, is_folder=True)
 VISITS = Like("a folder of drawn visits", _has_drawn_visits, is_folder=True)
-CALIPER_PAIRS = Like("a table of calipers beside diameters", _has_columns("fruit_id", "measured_mm", "caliper_mm"))
-THINNING = Like("a table of thinning", _has_columns("fruit_id", "cluster", "drop_probability", "action"))
+CALIPER_PAIRS = Like(
+    "a table of calipers beside diameters", has_header("fruit_id,label,session,date,measured_mm,caliper_mm")
+)
+THINNING = Like(
+    "a table of thinning",
+    has_header("fruit_id,tree,cluster,n_in_cluster,diameter_mm,rate_mm_per_day,drop_probability,action"),
+)
 REPORT = Like("a report of a season", _is_report)
 INDEX = Like("the index of a map", _is_index)
 GROWN = Like("a folder of growth", _is_grown, is_folder=True)
@@ -374,7 +357,8 @@ BY_DATE = Like("a folder of observations by date", _has_dates, is_folder=True)
 FARM_PLAN = Like("a first plan, which takes a name of its own", lambda _: False)
 DEMO = Like("a folder of the demo", _is_demo, is_folder=True)
 EXPORTS = {
-    "csv": Like("a CSV of fruits", _has_columns("x", "y", "z")),
+    # Of a session or a cloud it has the columns of a scan's, or any: it may be the only file of a visit.
+    "csv": Like("a CSV that was exported from a map", told_of_map),
     "ply": Like("a PLY of fruits", _is_ply),
     "geojson": Like("a GeoJSON of fruits", _is_geojson),
     "shp": Like("a Shapefile of fruits", _is_shapefile),
