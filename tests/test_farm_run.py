@@ -194,6 +194,17 @@ def test_one_recording_that_fails_stops_its_own_row_only(farm):
     assert begun(run(farm)) == {"map b", "export b csv"}
 
 
+def test_a_row_goes_on_without_a_visit_that_has_no_fruits(farm):
+    empty = visit_of(farm, "b", 1)
+    empty.write_text(empty.read_text().splitlines(keepends=True)[0])
+    reasons = run(farm, code=1)[-1]["reasons"]
+    skip = f'skip = ["b/{empty.stem}"]'
+    said = f"rec/b/{empty.name}: has no fruits, expected at least one; the row goes on without it by {skip}"
+    assert reasons["map b"] == f"{said} in the plan's [recordings]"
+    (farm / "farm.toml").write_text(PLAN.replace("[map]", f"{skip}\n[map]"))
+    assert begun(run(farm)) == {"map b", "export b csv"}
+
+
 def test_a_visit_of_another_row_is_not_found_and_told(farm):
     shutil.copy(visit_of(farm, "b", 1), visit_of(farm, "a", 1))
     lines = run(farm)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 from collections.abc import Callable
@@ -147,7 +146,7 @@ def is_like(like: Like, path: Path) -> bool:
         if path.is_dir() or like.is_folder:
             return path.is_dir() == like.is_folder and like.tells(path)
         return path.stat().st_size == 0 or like.tells(path)
-    except (OSError, ValueError, LookupError, csv.Error):
+    except (OSError, ValueError, LookupError):
         return False
 
 

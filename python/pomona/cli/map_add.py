@@ -82,6 +82,10 @@ def map_add(
     if name is not None and len(sessions) > 1:
         raise PomonaError(f"--name: found it with {len(sessions)} sessions, expected one; each has a name of its own")
     visits = [load_session(path, date=date, unit=None if unit is None else unit.value) for path in sessions]
+    for path, visit in zip(sessions, visits, strict=True):
+        if not len(visit.cloud):
+            # Named by its file: a farm tells so how the row goes on without it.
+            raise PomonaError(f"{path}: has no fruits, expected at least one")
     visits = [visit if name is None else dataclasses.replace(visit, name=name) for visit in visits]
     flags = call_flags(method, scale, noise_m, up, per_frame, threads)
     settings = Settings.load(config, flags) if config or any(flag is not None for flag in flags.values()) else None
