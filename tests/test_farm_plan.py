@@ -81,7 +81,12 @@ def test_the_pattern_is_guessed_from_the_names(tmp_path, names, expected):
         (["a.mp4"], "{row}.mp4", "expected {date} in it, once"),
         (["a/2024-08-09.mp4"], "{row}/{row}{date}.mp4", "expected {row} in it, once"),
         (["a/2024-08-09.avi"], "{row}/{date}.mp4", "is called {row}/{date}.mp4"),
-        (["a/2024-13-09.mp4"], "{row}/{date}.mp4", "date: found '2024-13-09', expected one like 2024-08-09"),
+        (
+            ["a/2024-13-09.mp4"],
+            "{row}/{date}.mp4",
+            "date: found '2024-13-09', expected a day of the calendar: there is no",
+        ),
+        (["a/2024-08-09_250000.mp4"], "{row}/{date}.mp4", "found '2024-08-09_250000', expected one like 2024-08-09"),
         (["a/2024-08-09.mp4", "a/20240809.mp4"], "{row}/{date}.mp4", "are both row a on 2024-08-09"),
         (["A/2024-08-09.mp4", "a/2024-08-28.mp4"], "{row}/{date}.mp4", "the rows A and a, expected one name"),
         (["-rf/2024-08-09.mp4"], "{row}/{date}.mp4", "row: found '-rf', expected a name that a file can have"),

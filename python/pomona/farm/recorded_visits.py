@@ -10,6 +10,7 @@ from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 from pomona.reading import shown
 from pomona.table_lines import table_lines
@@ -154,7 +155,8 @@ def _date(where: str, text: str) -> str:
         year, month, day, hour, minute, second = (int(part or 0) for part in parts.groups())
         date = datetime(year, month, day, hour, minute, second)  # local, as the farm's clock
     except ValueError:
-        raise PomonaError(f"{where}: date: found {shown(text)}, expected one like 2024-08-09") from None
+        expected = expected_day(text, "one like 2024-08-09")
+        raise PomonaError(f"{where}: date: found {shown(text)}, {expected}") from None
     return date.date().isoformat() if parts[4] is None else date.isoformat()
 
 

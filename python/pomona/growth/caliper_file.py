@@ -8,6 +8,7 @@ from datetime import date
 from pathlib import Path
 from statistics import median
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 from pomona.reading import number_in, shown
 from pomona.table_lines import table_lines
@@ -113,7 +114,8 @@ def _date_of(where: str, row: dict[str, str]) -> date | None:
         return None
     day = _day_or_none(row["date"])
     if day is None:
-        raise PomonaError(f"{where}: date: found {shown(row['date'])}, expected a day as 2024-08-09")
+        expected = expected_day(row["date"], "a day as 2024-08-09")
+        raise PomonaError(f"{where}: date: found {shown(row['date'])}, {expected}")
     return day
 
 

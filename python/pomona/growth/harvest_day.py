@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import date, datetime
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 from pomona.growth.measured import SEASON_DAYS
 from pomona.reading import shown
@@ -26,7 +27,7 @@ def harvest_day(told: date | str | None) -> date | None:
     try:
         return date.fromisoformat(told)
     except (TypeError, ValueError):
-        raise PomonaError(f"--harvest: found {shown(told)}, expected a day as 2024-09-10") from None
+        raise PomonaError(f"--harvest: found {shown(told)}, {expected_day(told, 'a day as 2024-09-10')}") from None
 
 
 def harvest_after(last_visit: date, told: date | str | None) -> date | None:

@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 from pomona.reading import number_in, shown
 from pomona.table_lines import table_lines
@@ -151,7 +152,8 @@ def _day(where: str, cell: str) -> date:
     try:
         return date.fromisoformat(cell.strip())
     except ValueError:
-        raise PomonaError(f"{where}: date: found {shown(cell)}, expected a day as 2024-08-09") from None
+        expected = expected_day(cell, "a day as 2024-08-09")
+        raise PomonaError(f"{where}: date: found {shown(cell)}, {expected}") from None
 
 
 def _degrees_c(where: str, name: str, cell: str) -> float:

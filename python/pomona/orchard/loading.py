@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud, Unit
 from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_places
+from pomona.cloud.near_names import DIAMETER, near_names
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.file_names import given_path
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import read_session
+from pomona.reading import shown
 from pomona.store.values import iso_date
 
 __all__ = ["load_session"]
@@ -42,6 +44,11 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
     PomonaError
         When the file cannot be read, has no date that anybody has noted, or has no distances or diameters of fruits
         and nobody says that they are right: ``unit="m"``.
+
+    Warns
+    -----
+    PomonaWarning
+        When a column of a cloud is kept as text whose name nearly is one that counts, as `diameter_mm`.
     """
     path, day = given_path(path), None if date is None else iso_date(date)
     read = _session if path.suffix.lower() == ".gpkg" else _cloud
@@ -50,6 +57,8 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
         if unit is None:
             check_places(path, session.cloud.positions)
             _check_diameters(path, session.cloud.diameters_m)
+    if path.suffix.lower() != ".gpkg":
+        _tell_near_names(path, session.cloud)
     return session
 
 
@@ -83,6 +92,14 @@ def _check_diameters(path: Path, diameters_m: NDArray[np.float64] | None) -> Non
     if len(known_m) and not low_m <= (median_m := float(np.median(known_m))) <= high_m:
         found = f"the median diameter is {median_m:.3g} m, expected {low_m:g} to {high_m:g} m"
         warnings.warn(f"{path}: {found}; check the unit", PomonaWarning, stacklevel=3)
+
+
+def _tell_near_names(path: Path, cloud: FruitCloud) -> None:
+    """Warn, and refuse nothing: what is only text is no damage to a map, as sizes in another unit are."""
+    for name, known in near_names(cloud):
+        metres = ", in metres," if known == DIAMETER else ""
+        found = f"found the column {shown(name)}, which is kept as text"
+        warnings.warn(f"{path}: {found}; expected {known}{metres} for it to count", PomonaWarning, stacklevel=3)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import date, datetime
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 
 __all__ = ["FARTHEST_M", "FREE", "is_scale_free", "iso_date"]
@@ -29,9 +30,8 @@ def iso_date(day: str | date, source: str = "session") -> str:
     try:
         moment = datetime.fromisoformat(text)
     except (TypeError, ValueError):
-        raise PomonaError(
-            f"{source}: found the date {text!r}, expected ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12"
-        ) from None
+        expected = expected_day(text, "ISO 8601 as 2021-09-27 or 2021-09-27T11:40:12")
+        raise PomonaError(f"{source}: found the date {text!r}, {expected}") from None
     if moment.tzinfo is not None:
         # Dates are ordered as text, which zones would break; growth is counted in the orchard's days.
         raise PomonaError(f"{source}: found the date {text!r} with a time zone, expected the orchard's local time")

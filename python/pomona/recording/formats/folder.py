@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
 from pomona.reading import parsed_json, read_text, shown
 from pomona.recording.calibration import Calibration
@@ -230,8 +231,7 @@ def _date(folder: Path, about: dict[str, Any]) -> str | None:
             datetime.datetime.fromisoformat(str(about["date"]))
         except ValueError:
             where = folder / "recording.json"
-            raise PomonaError(
-                f"{where}: date: found {shown(about['date'])}, expected ISO 8601, as 2021-09-27T11:40:12"
-            ) from None
+            expected = expected_day(about["date"], "ISO 8601, as 2021-09-27T11:40:12")
+            raise PomonaError(f"{where}: date: found {shown(about['date'])}, {expected}") from None
         return str(about["date"])
     return date_in_name(folder.resolve().name)

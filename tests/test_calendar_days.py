@@ -1,0 +1,51 @@
+"""A date that there is not is told as that, and not as one that is written in a wrong way."""
+
+import json
+from datetime import date
+from pathlib import Path
+
+import pytest
+
+from pomona import PomonaError
+from pomona.calendar_days import expected_day
+from pomona.farm.recorded_visits import visits_by_table
+from pomona.growth.harvest_day import harvest_day
+from pomona.store.values import iso_date
+
+NO_DAY = "expected a day of the calendar: there is no such day"
+
+
+@pytest.mark.parametrize(
+    "text", ["2024-02-30", "20240230", " 2023-02-29 ", "2024-04-31T10:00:00", "2024-13-01", "2024-00-10", "0000-01-01"]
+)
+def test_a_day_that_there_is_not(text: str) -> None:
+    assert expected_day(text, "a day") == NO_DAY
+
+
+@pytest.mark.parametrize("text", ["9 August", "", "2024-2-30", "2024-02-20T25:00:00", "202402301", 5, None])
+def test_what_is_written_otherwise(text: object) -> None:
+    assert expected_day(text, "a day") == "expected a day"
+
+
+def test_every_day_of_a_leap_year_is_one() -> None:
+    days = (date.fromordinal(date(2024, 1, 1).toordinal() + day) for day in range(366))
+    assert {expected_day(day.isoformat(), "a day") for day in days} == {"expected a day"}
+
+
+def test_it_is_told_where_days_are_said(pomona, here: Path) -> None:
+    for refusing, words in (
+        (lambda: iso_date("2024-02-30"), "session: found the date '2024-02-30', "),
+        (lambda: harvest_day("2024-06-31"), "--harvest: found '2024-06-31', "),
+        (lambda: visits_by_table(here / "table.csv"), "line 2: date: found '2024-02-30', "),
+    ):
+        (here / "table.csv").write_text("row,date,recording\na,2024-02-30,map.csv\n")
+        with pytest.raises(PomonaError) as refused:
+            refusing()
+        assert str(refused.value).endswith(words + NO_DAY)
+    code, printed, told = pomona("map", "add", "new.gpkg", "map.csv", "--date", "2024-02-30")
+    assert (code, printed) == (2, "")
+    assert told == f"pomona: session: found the date '2024-02-30', {NO_DAY}\n"
+    (here / "R" / "recording.json").write_text(json.dumps({"date": "2024-02-30"}))
+    code, _, told = pomona("scan", "R", "-o", "new.gpkg")
+    assert (code, told.count("\n")) == (2, 1)
+    assert told.endswith(f"recording.json: date: found '2024-02-30', {NO_DAY}\n")
