@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 
-__all__ = ["LIKELY", "may_hang", "tell_trees"]
+__all__ = ["LIKELY", "hang_chances", "may_hang", "tell_trees"]
 
 LIKELY = 0.5
 """Probability of being a fruit above which one that was missed is one."""
@@ -27,6 +27,27 @@ def may_hang(fruits: FruitCloud) -> NDArray[np.bool_]:
     states, chances = (fruits.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
     judged = zip(states, chances, strict=True)
     return np.array([state != "gone" and (state != "missed" or float(p or 1) > LIKELY) for state, p in judged], bool)
+
+
+def hang_chances(fruits: FruitCloud) -> NDArray[np.float64]:
+    """Probability of each point, (N,), that it is a fruit and hangs.
+
+    ``state_probability`` is told of what is a fruit: of `missed` that it hangs, of `gone` that it does not. Of `seen`
+    and `new` it is that it is a fruit at all, and what was seen by the last visit that looked hangs.
+
+    Parameters
+    ----------
+    fruits : FruitCloud
+        Of a map, with the columns ``state``, ``state_probability`` and ``fruit_probability``; a state or a probability
+        that they do not say is taken for sure.
+    """
+    unsaid = ("",) * len(fruits)
+    states, of_states, of_fruits = (
+        fruits.extras.get(name, unsaid) for name in ("state", "state_probability", "fruit_probability")
+    )
+    told = np.array(states)
+    sure, real = (np.array([float(one or 1) for one in each], np.float64) for each in (of_states, of_fruits))
+    return np.asarray(real * np.select([told == "missed", told == "gone"], [sure, 1.0 - sure], 1.0))
 
 
 def tell_trees(states: Sequence[str], chances: Sequence[float | None]) -> NDArray[np.bool_]:
