@@ -29,7 +29,8 @@ def scores(found: SeasonGrowth, drawn: DrawnSizes) -> dict[str, object]:
 def covers(found: SeasonGrowth, number: int, true_mm: NDArray[np.float64]) -> bool:
     """Whether the interval of a block's mean holds the truth."""
     low, high = np.quantile(found.foretold.summaries["blocks"][:, number, -2], NINETY)
-    return bool(low <= true_mm[found.blocks[number].members].mean() <= high)
+    chances = np.where(np.isnan(true_mm), 0.0, found.blocks[number].chances)
+    return bool(low <= chances @ np.nan_to_num(true_mm) / chances.sum() <= high)
 
 
 def line(rows: list[dict[str, object]]) -> tuple[str, ...]:

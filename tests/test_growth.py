@@ -19,8 +19,9 @@ from pomona.growth.blocks import Block, blocks_of
 from pomona.growth.chance import Chance
 from pomona.growth.curve_families import FAMILIES, CurveFamily, FamilyName
 from pomona.growth.fitting import fit_shape
-from pomona.growth.foretelling import CAMERA_SPREAD
+from pomona.growth.foretelling import CAMERA_SPREAD, NINETY
 from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.measured import MeasuredFruits
 from pomona.growth.mixed_quantiles import mixed_quantile
 from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
 from pomona.growth.size_table import SizeTable
@@ -259,13 +260,13 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
     states = tuple("gone" if row < 40 else "seen" for row in range(90))
     cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": states})
     found = blocks_of(replace(fruits, cloud=cloud))
-    assert [int(block.members.sum()) for block in found] == [50, 20, 30]
+    assert [block.n_fruits for block in found] == [50, 20, 30]
     in_rows = replace(fruits.cloud, extras={"row": ("east",) * 30 + ("west",) * 59 + ("",)})
     of_rows = [block for block in blocks_of(replace(fruits, cloud=in_rows)) if block.kind == "row"]
-    rows = [(block.name, int(block.members.sum())) for block in of_rows]
+    rows = [(block.name, block.n_fruits) for block in of_rows]
     assert rows == [("east", 30), ("west", 59)]
     over = replace(fruits.cloud, extras={"state": ("gone",) * 90})
-    assert int(blocks_of(replace(fruits, cloud=over))[0].members.sum()) == 90
+    assert blocks_of(replace(fruits, cloud=over))[0].n_fruits == 90
 
 
 def test_fruits_of_no_tree_are_a_block_where_others_have_one(
@@ -286,12 +287,50 @@ def test_fruits_of_no_tree_are_a_block_where_others_have_one(
     assert titles == ["row 1", "row 1", "all"]
 
 
-def test_what_is_likelier_no_fruit_counts_in_no_block(grown: SeasonGrowth) -> None:
-    states = ("missed",) * 60 + ("new",) * 30
-    chances = ("0.31",) * 40 + ("0.62",) * 20 + ("0.31",) * 30
-    cloud = replace(grown.fruits.cloud, extras={"state": states, "fruit_probability": chances})
-    found = blocks_of(replace(grown.fruits, cloud=cloud))[0]
-    assert found.members.tolist() == [False] * 40 + [True] * 50
+def judged(grown: SeasonGrowth, **extras: tuple[str, ...]) -> MeasuredFruits:
+    return replace(grown.fruits, cloud=replace(grown.fruits.cloud, extras=extras))
+
+
+def test_each_counts_by_the_probability_that_it_is_a_fruit_and_hangs(grown: SeasonGrowth) -> None:
+    fruits = judged(
+        grown,
+        state=("seen", "new", "missed", "missed", "gone", "gone") + ("seen",) * 84,
+        state_probability=("0.9", "0.3", "0.1", "", "0.8", "") + ("1.0",) * 84,
+        fruit_probability=("0.9", "0.3", "0.5", "0.6", "0.5", "1.0") + ("1.0",) * 84,
+    )
+    expected = [0.9, 0.3, 0.05, 0.6, 0.1, 0.0, *[1.0] * 84]
+    found = blocks_of(fruits)
+    np.testing.assert_allclose(found[0].chances, expected, atol=1e-12)
+    assert [block.n_fruits for block in found] == [86, 26, 30, 30]
+    assert fruits.hanging.tolist() == [True] * 2 + [False, True, False, False] + [True] * 84, "as forecasts are told"
+    sizes_mm = np.array([10.0] * 6 + [60.0] * 84)
+    assert found[1].mean_of(sizes_mm) == pytest.approx((1.95 * 10.0 + 24 * 60.0) / 25.95)
+
+
+def test_trees_on_which_half_a_fruit_is_expected_are_no_block(grown: SeasonGrowth) -> None:
+    """Two of three trees were picked: of their fruits the map says missed, and that one in a hundred hangs."""
+    states, sure = ("missed",) * 60 + ("seen",) * 30, ("0.01",) * 60 + ("1.0",) * 30
+    assert [block.n_fruits for block in blocks_of(judged(grown, state=states, state_probability=sure))] == [31, 30]
+    assert [block.n_fruits for block in blocks_of(judged(grown, state=states))] == [90, 30, 30, 30]
+
+
+def test_counts_kilograms_and_classes_hold_the_doubt_of_what_hangs(grown: SeasonGrowth) -> None:
+    """Of 60 missed fruits one in ten hangs: 36 are expected with the spread of 60 lots, and no 90."""
+    picked = judged(grown, state=("missed",) * 60 + ("seen",) * 30, state_probability=("0.1",) * 60 + ("1.0",) * 30)
+    found, sure = growth_of(picked, harvest=HARVEST), grown.foretold.summaries
+    told = found.foretold.summaries
+    spread = np.sqrt(60 * 0.1 * 0.9)
+    n_fruits = told["n_fruits"][:, 0]
+    assert found.blocks[0].n_fruits == 36
+    assert n_fruits.mean() == pytest.approx(36, abs=0.5)
+    assert n_fruits.std() == pytest.approx(spread, rel=0.15)
+    assert sure["n_fruits"][:, 0].std() < 1e-9, "of what is sure to hang there is no doubt"
+    low, high = np.quantile(n_fruits, NINETY)
+    assert (low, high) == pytest.approx((36 - 1.645 * spread, 36 + 1.645 * spread), abs=1.0)
+    of_classes, kg, kg_of_all = told["counts"][:, :, -1], told["masses_kg"][:, :, -1], sure["masses_kg"][:, :, -1]
+    assert of_classes.mean(axis=0).sum() == pytest.approx(36, abs=0.5)
+    assert kg.mean(axis=0).sum() / kg_of_all.mean(axis=0).sum() == pytest.approx(36 / 90, rel=0.1)
+    np.testing.assert_array_equal(found.foretold.sizes_mm, grown.foretold.sizes_mm, "forecasts of fruits stay")
 
 
 def test_an_error_that_all_visits_share_is_in_the_intervals(grown: SeasonGrowth) -> None:

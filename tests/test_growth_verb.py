@@ -18,7 +18,7 @@ from pomona.growth.drawn_names import drawn_name
 from pomona.growth.growth_pictures import draw_curves, draw_variability
 from pomona.growth.growth_pictures import draw_sizes as draw_size_classes
 from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
-from pomona.growth.size_classes import class_counts, parsed_classes
+from pomona.growth.size_classes import class_counts, class_masses, parsed_classes
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.season_page import Wishes, season_document
 
@@ -70,6 +70,7 @@ def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, row: GrownRo
     assert list(fruits[0]) == [
         "fruit_id", "tree", "n_dates", "rate_mm_per_day", "rate_sigma_mm_per_day", "rate_relative_per_day",
         "forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier",
+        "hangs_probability",
     ]  # fmt: skip
     assert [int(line["fruit_id"]) for line in fruits] == list(range(1, 91))
     assert {line["tree"] for line in fruits} == {"1", "2", "3"}
@@ -278,6 +279,8 @@ def test_long_names_lose_their_middle() -> None:
 
 
 def test_sizes_classes_take_their_minimum_and_leave_their_maximum() -> None:
-    count = class_counts(parsed_classes("60,65,70"), np.array([True, True, True, True, False]))
-    sizes = np.array([[59.999], [60.0], [65.0], [70.0], [62.0]])
-    np.testing.assert_array_equal(count(sizes, np.zeros(5))[:, 0], [1, 1, 1, 1])
+    count, weigh = (one(parsed_classes("60,65,70")) for one in (class_counts, class_masses))
+    sizes, chances = np.array([[59.999], [60.0], [65.0], [70.0], [62.0]]), np.array([1.0, 1.0, 1.0, 0.25, 0.0])
+    np.testing.assert_array_equal(count(sizes, np.zeros(5), chances)[:, 0], [1, 1, 1, 0.25])
+    of_one_kg = 900.0 * np.pi / 6.0 * 0.07**3
+    assert weigh(sizes, np.zeros(5), chances)[3, 0] == pytest.approx(0.25 * of_one_kg)

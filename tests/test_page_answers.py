@@ -17,6 +17,7 @@ from page_maker import chromium, opened
 from pomona import geopackage
 from pomona.growth.bearing_trees import bearing_trees
 from pomona.orchard import OrchardMap
+from pomona.orchard.hanging import hang_chances
 from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.packed_columns import packed
 from pomona.viewer.season_page import Wishes, season_document
@@ -41,7 +42,7 @@ def test_the_first_look_answers_four_questions(browser: Any, row: GrownRow, tmp_
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:
         many, big, fast, to_do = page.locator(".answer").all_inner_texts()
         trees = page.locator(".trees tbody tr").all()
-    hanging = sum(state != "gone" for state in OrchardMap(row.path).fruits().extras["state"])
+    hanging = round(float(hang_chances(OrchardMap(row.path).fruits()).sum()))
     assert f"{hanging} fruits hang" in " ".join(many.split())
     assert re.search(r"\d\d\.\d mm on average", " ".join(big.split()))
     assert re.search(r"0\.\d\d mm a day", " ".join(fast.split()))
@@ -49,7 +50,7 @@ def test_the_first_look_answers_four_questions(browser: Any, row: GrownRow, tmp_
     assert len(trees) == 3
 
 
-def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_what_is_likelier_no_fruit_counts_by_its_probability(browser: Any, row: GrownRow, tmp_path: Path) -> None:
     path = tmp_path / "doubted.gpkg"
     shutil.copy(row.path, path)
     with contextlib.closing(geopackage.connect(path)) as connection, connection:
@@ -58,12 +59,38 @@ def test_what_is_likelier_no_fruit_is_not_counted(browser: Any, row: GrownRow, t
     write_report(path, tmp_path / "report.html", Wishes())
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:
         many, _, _, to_do = (" ".join(text.split()) for text in page.locator(".answer").all_inner_texts())
-        assert f"{N - 5} fruits hang" in many
+        assert f"{N - 4} fruits hang" in many, "82 that were seen, 2.7 and 1.5 that are expected"
         assert "5 seen once are likelier no fruit" in many
         assert "3 fruits hid from the last visit" in to_do
         page.get_by_role("tab", name="Fruits").click()
         page.get_by_label("State").select_option("hanging")
         assert f"{N - 5} of {N} fruits" in page.locator(".filter-bar").inner_text()
+
+
+@pytest.mark.parametrize(
+    ("sure", "n_hang", "said", "lost"),
+    [
+        (0.2, N - 24, "6 fruits hid from the last visit, 24 more have probably gone", "24 more were seen and have"),
+        (0.97, N - 1, "29 fruits hid from the last visit, 1 more has probably gone", "1 more was seen and has"),
+        (0.01, N - 30, "30 fruits not seen by the last visit have probably gone", "30 more were seen and have"),
+    ],
+)
+def test_what_the_last_visit_missed_counts_as_far_as_it_hangs(
+    browser: Any, row: GrownRow, tmp_path: Path, sure: float, n_hang: int, said: str, lost: str
+) -> None:
+    """A tree was picked: the map calls its 30 fruits missed, and doubts that they hang."""
+    path = tmp_path / "picked.gpkg"
+    shutil.copy(row.path, path)
+    with contextlib.closing(geopackage.connect(path)) as connection, connection:
+        connection.execute("UPDATE fruits SET state = 'missed', state_probability = ? WHERE id <= 30", (sure,))
+    write_report(path, tmp_path / "report.html", Wishes())
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        many, _, _, to_do = (" ".join(text.split()) for text in page.locator(".answer").all_inner_texts())
+        counts = [line.locator("td").first.inner_text() for line in page.locator(".trees tbody tr").all()]
+    assert f"{n_hang} fruits hang" in many
+    assert f"{lost} probably gone" in many
+    assert said in to_do
+    assert sum(map(int, counts)) == pytest.approx(n_hang, abs=1)
 
 
 def told_to_do(browser: Any, path: Path, document: dict[str, Any]) -> list[str]:
@@ -145,7 +172,7 @@ def test_one_visit_shows_its_sizes(browser: Any, tmp_path: Path) -> None:
         shown = [line.split()[-2:] for line in page.locator(".trees tbody tr").all_inner_texts()]
         assert shown == [[f"{sizes_mm[trees == name].mean():.1f}", "\N{EN DASH}"] for name in ("1", "2")]
         counts = page.locator(".sizes td:last-child").all_inner_texts()
-        assert sum(map(int, counts)) == len(sizes_mm)
+        assert sum(map(int, counts)) == pytest.approx(hang_chances(fruits).sum(), abs=2), "each is rounded"
         assert int(counts[-1]) == (sizes_mm >= 60.0).sum()
         page.get_by_role("tab", name="Sizes").click()
         table = page.locator("#panel-sizes table")
@@ -177,6 +204,7 @@ def test_the_fruits_of_no_tree_have_no_mean_of_all(browser: Any, tmp_path: Path)
     document = drawn_document(300, with_pictures=False)
     document["trees"][2]["name"] = ""
     document["fruits"]["state"] = packed(np.repeat([1, 1, 3], 100))
+    document["fruits"]["state_probability"] = packed(np.ones(300), 0.001)
     document["growth"]["blocks"] = document["growth"]["blocks"][:3]
     (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:

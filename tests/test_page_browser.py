@@ -21,6 +21,7 @@ from pomona import FruitCloud, geopackage
 from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.built_page import built_page, report_of
+from pomona.viewer.packed_columns import packed
 from pomona.viewer.season_page import Wishes
 from pomona.viewer.season_report import write_report
 from test_calipers import long_table
@@ -333,6 +334,8 @@ def test_names_of_trees_are_texts_in_the_page_and_in_a_spreadsheet(browser: Any,
 def test_fruits_and_trees_go_by_their_rows(browser: Any, tmp_path: Path) -> None:
     """Rows are in the order that they are told in: 2 before 10, by number."""
     document = drawn_document(400, with_pictures=False)
+    for name in ("state_probability", "fruit_probability"):
+        document["fruits"][name] = packed(np.ones(400), 0.001)
     for tree, row in zip(document["trees"], ("row 2", "row 2", "row 10", "row 10"), strict=True):
         tree["row"] = row
     document["growth"]["blocks"].append({**document["growth"]["blocks"][0], "kind": "row", "name": "row 10"})

@@ -96,7 +96,7 @@ def told_season(orchard: Path, truths: Mapping[str, Path], report: Path) -> Demo
     of_all = grown.foretold.summaries["blocks"][:, 0]
     return DemoSeason(
         identities=_judged(orchard, truths),
-        n_hanging=int(grown.blocks[0].members.sum()),
+        n_hanging=grown.blocks[0].n_fruits,
         mean_mm=float(of_all[:, now].mean()),
         rate_mm_per_day=float(of_all[:, -1].mean()),
         harvest=last + TO_HARVEST,

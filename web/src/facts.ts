@@ -25,9 +25,18 @@ export interface Facts {
   readonly action: Action;
 }
 
-/** Neither gone nor, once missed, likelier no fruit at all: as `pomona growth` counts. */
+/** Neither gone nor, once missed, likelier no fruit at all: what `pomona growth` foretells. */
 export function hangs({ state, fruitProbability }: Season, fruit: number): boolean {
   return state[fruit] !== GONE && !(state[fruit] === MISSED && fruitProbability[fruit] <= 0.5);
+}
+
+/** What an older map does not say is taken for sure. */
+export const orOne = (probability: number): number => (Number.isNaN(probability) ? 1 : probability);
+
+/** Probability that a fruit is one and hangs: as `pomona growth` counts. Of what was missed or is gone the map's own is one of fruits. */
+export function hangChance({ state, stateProbability, fruitProbability }: Season, fruit: number): number {
+  const sure = orOne(stateProbability[fruit]);
+  return orOne(fruitProbability[fruit]) * (state[fruit] === MISSED ? sure : state[fruit] === GONE ? 1 - sure : 1);
 }
 
 export function factsOf({ season, target }: Page, fruit: number): Facts {

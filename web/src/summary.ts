@@ -1,10 +1,16 @@
 /** Counts of what hangs, of all and by tree. */
-import { actionOf, hangs, lastMeasured } from "./facts";
+import { actionOf, hangChance, hangs, lastMeasured, orOne } from "./facts";
 import type { Page } from "./page";
 import type { Block } from "./told/document";
 import { STATES, type Season } from "./told/season";
 
 const GONE = STATES.indexOf("gone");
+
+/** How many of some fruits hang, and how many no longer do, as is expected. */
+export function expected(season: Season, rows: readonly number[]): { hang: number; gone: number } {
+  const hang = rows.reduce((sum, fruit) => sum + hangChance(season, fruit), 0);
+  return { hang, gone: rows.reduce((sum, fruit) => sum + orOne(season.fruitProbability[fruit]), 0) - hang };
+}
 
 export function hangingRows(season: Season): number[] {
   return Array.from({ length: season.n }, (_, i) => i).filter((fruit) => hangs(season, fruit));
@@ -28,7 +34,10 @@ export function isTimeToThin({ season, target }: Page): boolean {
 export interface TreeSummary {
   readonly tree: number;
   readonly label: string;
+  /** How many hang, as is expected. */
   readonly fruits: number;
+  /** Those that thinning plans with, whole: the likely ones. */
+  readonly likely: number;
   readonly gone: number;
   readonly drops: number;
   readonly thin: number;
@@ -48,12 +57,13 @@ export function meanMm({ growth }: Season, block: Block | null | undefined, tree
 }
 
 export function treeSummaries({ season, target }: Page): TreeSummary[] {
-  const counts = season.trees.map(() => ({ fruits: 0, gone: 0, drops: 0, thin: 0, measured: 0, measuredMm: 0, clusters: new Set<number>() }));
+  const counts = season.trees.map(() => ({ fruits: 0, likely: 0, gone: 0, drops: 0, thin: 0, measured: 0, measuredMm: 0, clusters: new Set<number>() }));
   for (let fruit = 0; fruit < season.n; fruit++) {
     const count = counts[season.tree[fruit]];
     if (season.state[fruit] === GONE) count.gone++;
+    count.fruits += hangChance(season, fruit);
     if (hangs(season, fruit)) {
-      count.fruits++;
+      count.likely++;
       const mm = lastMeasured(season, fruit);
       if (!Number.isNaN(mm)) [count.measured, count.measuredMm] = [count.measured + 1, count.measuredMm + mm];
     }

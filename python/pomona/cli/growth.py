@@ -57,14 +57,18 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
 
     import numpy as np
 
+    from pomona.growth.growth_tables import count_intervals
+
     drawn = grown.foretold.summaries["blocks"]
     mean, (low, high) = drawn.mean(axis=0), np.quantile(drawn, (0.05, 0.95), axis=0)
-    now = len(grown.fruits.days) - 1
+    now, counts = len(grown.fruits.days) - 1, count_intervals(grown)
     blocks = [
         {
             "block": block.kind,
             "name": block.name or None,
-            "n_fruits": int(block.members.sum()),
+            "n_fruits": block.n_fruits,
+            "n_fruits_low": counts[row][0],
+            "n_fruits_high": counts[row][1],
             "mean_mm": float(mean[row, now]),
             "rate_mm_per_day": float(mean[row, -1]),
             "forecast_mm": float(mean[row, -2]) if grown.harvest else None,

@@ -13,7 +13,7 @@ __all__ = ["Chance", "evenly_spread"]
 _SEED = 22
 
 Shared = Literal["visits", "straying", "errors", "camera"]
-Single = Literal["fruits", "trees", "later"]
+Single = Literal["fruits", "trees", "later", "hanging"]
 
 Numbers = NDArray[np.float64]
 

@@ -40,8 +40,9 @@ intrinsics apples of `kinect_apples` were 8 % too large, with calibrated ones 2 
 _A_DAY = 1.0
 """Over which the rate of the last visit is taken."""
 
-Summary = Callable[[Numbers, Numbers], Numbers]
-"""Takes the (N, Q) sizes in mm and the (N,) rates of one draw, gives an array of what is wanted of all fruits."""
+Summary = Callable[[Numbers, Numbers, Numbers], Numbers]
+"""Takes the (N, Q) sizes in mm and the (N,) rates of one draw and how far each hangs, (N,), 0 or 1 in a draw; gives an
+array of what is wanted of all fruits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +79,7 @@ def foretell(
     *,
     n_visits: int,
     rows: NDArray[np.int64],
+    hang_chances: Numbers,
     summaries: Mapping[str, Summary],
 ) -> Foretold:
     """Draw all fruits together again and again, each draw by its weight; keep means and summaries.
@@ -92,6 +94,8 @@ def foretell(
     n_visits : int
     rows : (N,) int64
         Of each fruit that is told of, the row in the tables of the curves.
+    hang_chances : (N,) float64
+        That it is a fruit and hangs: drawn for each by itself.
     summaries : mapping of str to Summary
     """
     beliefs = np.array([curve.weight for curve in curves])
@@ -101,16 +105,18 @@ def foretell(
     told: dict[str, list[Numbers]] = {name: [] for name in summaries}
     weights: list[float] = []
     logs: list[_Moments] = []
+    least = ndtri(1.0 - hang_chances)
     for curve, belief in zip(curves, beliefs.tolist(), strict=True):
         logs += [_Moments()] if belief else []
-        for weight, own_logs, own_rates, visits in _draws(curve, belief, moments):
+        for weight, own_logs, own_rates, visits, lots in _draws(curve, belief, moments):
             log_sizes, relative_rates = own_logs[rows], own_rates[rows]
             sizes_mm = np.exp(log_sizes)
             rates_mm = relative_rates * sizes_mm[:, n_visits - 1]
             for kept, drawn in ((logs[-1], log_sizes), (rates, rates_mm), (relative, relative_rates), (scales, visits)):
                 kept.add(drawn, weight)
+            hangs = (lots[rows] > least).astype(np.float64)
             for name, summary in summaries.items():
-                told[name].append(summary(sizes_mm, rates_mm))
+                told[name].append(summary(sizes_mm, rates_mm, hangs))
             weights.append(weight)
     low, middle, high = (np.exp(_quantile(level, logs)) for level in (NINETY[0], 0.5, NINETY[1]))
     return Foretold(
@@ -139,10 +145,11 @@ def _count(belief: float) -> int:
 
 def _draws(
     curve: WeighedCurve, belief: float, moments: Sequence[datetime]
-) -> Iterator[tuple[float, Numbers, Numbers, Numbers]]:
-    """Give weight, log sizes (N, Q), relative rates a day (N,) at the last visit, errors of visits (S,); draw by draw.
+) -> Iterator[tuple[float, Numbers, Numbers, Numbers, Numbers]]:
+    """Give weight, log sizes (N, Q), relative rates a day (N,) at the last visit, errors of visits (S,), lots (N,).
 
-    The sum of the weights is the belief in the curve.
+    Draw by draw; a lot is a standard normal number that says whether a fruit hangs. The sum of the weights is the
+    belief in the curve.
     """
     table, family = curve.table, curve.fitted.family
     times, n_visits = curve.clock.times(moments), len(table.times)
@@ -170,6 +177,7 @@ def _draws(
             own[:, None] + model.log_size(later) + np.delete(strayed, n_visits),
             per_day * (shape.rate_per_day * family.slope(x) + strays_by),
             effects.visits - strayed[:n_visits],
+            chance.single("hanging", len(own)),
         )
 
 

@@ -84,7 +84,7 @@ def draw_curves(growth: SeasonGrowth) -> Figure:
         )
     axes.plot([], [], ".", color=INK, label="sizes as measured")
     axes.set(ylabel="diameter, mm")
-    n_fruits = int(growth.fruits.hanging.sum())
+    n_fruits = growth.blocks[0].n_fruits
     _say(figure, f"{amount(n_fruits, 'fruit')} over {amount(n_visits, 'visit')}", _about(growth))
     axes.legend(frameon=False, labelcolor=INK, loc="upper left")
     _days_below(axes)
@@ -175,7 +175,7 @@ def _mean_of_trees(axes: Axes, growth: SeasonGrowth, along_m: NDArray[np.float64
     drawn = growth.foretold.summaries["blocks"]
     now = len(growth.fruits.days) - 1
     trees = [row for row, block in enumerate(growth.blocks) if block.kind == "tree" and block.name] or [0]
-    x = np.array([along_m[growth.blocks[row].members].mean() for row in trees])
+    x = np.array([growth.blocks[row].mean_of(along_m) for row in trees])
     for column, colour in ((now, BLUE), (now + 1, ORANGE))[: 2 if growth.harvest else 1]:
         of_day = drawn[:, trees, column]
         mean, (low, high) = of_day.mean(axis=0), np.quantile(of_day, NINETY, axis=0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
 from pomona.csv_rows import write_rows
+from pomona.growth.blocks import HALF_A_FRUIT
 from pomona.growth.foretelling import NINETY
 from pomona.growth.season_growth import SeasonGrowth
 
@@ -21,6 +22,7 @@ __all__ = [
     "FRUIT_COLUMNS",
     "SERIES_COLUMNS",
     "class_lines",
+    "count_intervals",
     "used_classes",
     "write_table",
     "write_tables",
@@ -30,20 +32,17 @@ SERIES_COLUMNS = ("fruit_id", "date", "diameter_mm", "sigma_mm")
 CURVE_COLUMNS = ("fruit_id", "date", "diameter_mm", "low_mm", "high_mm")
 FRUIT_COLUMNS = (
     *("fruit_id", "tree", "n_dates", "rate_mm_per_day", "rate_sigma_mm_per_day", "rate_relative_per_day"),
-    *("forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier"),
+    *("forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier", "hangs_probability"),
 )
 BLOCK_COLUMNS = (
     *("block", "name", "n_fruits", "x", "y", "z", "date", "mean_mm", "mean_low_mm", "mean_high_mm", "spread_mm"),
     *("rate_mm_per_day", "rate_sigma_mm_per_day"),
-    *("forecast_date", "forecast_mm", "forecast_low_mm", "forecast_high_mm"),
+    *("forecast_date", "forecast_mm", "forecast_low_mm", "forecast_high_mm", "n_fruits_low", "n_fruits_high"),
 )
 CLASS_COLUMNS = (
     *("date", "from_mm", "below_mm", "n_fruits", "n_fruits_low", "n_fruits_high"),
     *("kg", "kg_low", "kg_high", "packs", "packs_low", "packs_high"),
 )
-
-_ONE_FRUIT = 0.5
-"""Expected in a class: less is rounded to none."""
 
 Numbers = NDArray[np.float64]
 Line = Sequence[object]
@@ -109,27 +108,34 @@ def _curves(growth: SeasonGrowth) -> Iterator[Line]:
 def _fruits(growth: SeasonGrowth) -> Iterator[Line]:
     fruits, told = growth.fruits, growth.foretold
     trees, n_days, hanging, is_growing = fruits.trees.of_fruits(), fruits.n_days, fruits.hanging, growth.is_growing
+    chances = fruits.hang_chances
     for row in _in_order_of_ids(growth):
         is_foretold = growth.harvest is not None and hanging[row]
         forecast = (sizes[row, -1] if is_foretold else None for sizes in (told.sizes_mm, told.lows_mm, told.highs_mm))
         rates = told.rates_mm_per_day, told.rate_sigmas_mm_per_day, told.relative_rates_per_day
         about = fruits.ids[row], trees[row], n_days[row], *(rate[row] if is_growing[row] else None for rate in rates)
-        yield *about, *forecast, int(growth.odd[row])
+        yield *about, *forecast, int(growth.odd[row]), chances[row]
 
 
 def _blocks(growth: SeasonGrowth) -> Iterator[Line]:
     drawn = growth.foretold.summaries["blocks"]
     mean, (low, high), sigma = drawn.mean(axis=0), np.quantile(drawn, NINETY, axis=0), drawn.std(axis=0)
-    now = len(growth.fruits.days) - 1
+    now, counts = len(growth.fruits.days) - 1, count_intervals(growth)
     for row, block in enumerate(growth.blocks):
-        place = growth.fruits.cloud.positions[block.members].mean(axis=0)
-        sizes_mm = growth.foretold.sizes_mm[block.members, now]
-        about = block.kind, block.name, int(block.members.sum()), *place, growth.days[now]
+        place, sizes_mm = block.mean_of(growth.fruits.cloud.positions), growth.foretold.sizes_mm[:, now]
+        spread_mm = np.sqrt(block.mean_of((sizes_mm - block.mean_of(sizes_mm)) ** 2))
+        about = block.kind, block.name, block.n_fruits, *place, growth.days[now]
         forecast: Line = (None,) * 4
         if growth.harvest is not None:
             forecast = growth.harvest, mean[row, -2], low[row, -2], high[row, -2]
-        current = mean[row, now], low[row, now], high[row, now], sizes_mm.std()
-        yield *about, *current, mean[row, -1], sigma[row, -1], *forecast
+        current = mean[row, now], low[row, now], high[row, now], spread_mm
+        yield *about, *current, mean[row, -1], sigma[row, -1], *forecast, *counts[row]
+
+
+def count_intervals(growth: SeasonGrowth) -> list[tuple[int, int]]:
+    """Return the ends of the 90 % interval of how many fruits of each block hang."""
+    low, high = np.quantile(growth.foretold.summaries["n_fruits"], NINETY, axis=0)
+    return list(zip(np.rint(low).astype(int).tolist(), np.rint(high).astype(int).tolist(), strict=True))
 
 
 def class_lines(growth: SeasonGrowth, pack_kg: float) -> list[Line]:
@@ -148,7 +154,7 @@ def class_lines(growth: SeasonGrowth, pack_kg: float) -> list[Line]:
 def used_classes(growth: SeasonGrowth) -> NDArray[np.int64]:
     """Rows of the size classes from the smallest to the largest fruit, of the last visit and of the harvest."""
     counts = growth.foretold.summaries["counts"][:, :, len(growth.fruits.days) - 1 :]
-    found = np.flatnonzero(counts.mean(axis=0).sum(axis=1) >= _ONE_FRUIT)
+    found = np.flatnonzero(counts.mean(axis=0).sum(axis=1) >= HALF_A_FRUIT)
     return np.arange(found.min(), found.max() + 1) if len(found) else found
 
 

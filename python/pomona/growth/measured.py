@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import BearingTrees, bearing_trees
 from pomona.orchard import Observations, OrchardMap
-from pomona.orchard.hanging import may_hang
+from pomona.orchard.hanging import hang_chances, may_hang
 
 __all__ = ["SEASON_DAYS", "MeasuredFruits", "measured_fruits", "require_one_season", "require_two_days"]
 
@@ -72,6 +72,14 @@ class MeasuredFruits:
         """Which fruits hang for all that the map knows, (N,); all, once none does: the season is looked back at."""
         hanging = may_hang(self.cloud)
         return hanging if hanging.any() else np.ones(len(self.ids), dtype=bool)
+
+    @property
+    def hang_chances(self) -> NDArray[np.float64]:
+        """Probability of each that it is a fruit and hangs, (N,); once none hangs, that it was one."""
+        chances = hang_chances(self.cloud)
+        if may_hang(self.cloud).any() and chances.any():
+            return chances
+        return hang_chances(replace(self.cloud, extras={**self.cloud.extras, "state": ("",) * len(chances)}))
 
     @property
     def n_days(self) -> NDArray[np.int64]:

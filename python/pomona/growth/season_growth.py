@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pomona.growth.blocks import Block, block_means, blocks_of
+from pomona.growth.blocks import Block, block_counts, block_means, blocks_of
 from pomona.growth.foretelling import Foretold, foretell
 from pomona.growth.fruit_order import reckoned_order
 from pomona.growth.harvest_day import harvest_after
@@ -41,8 +41,8 @@ class SeasonGrowth:
     limits_mm : (C - 1,) float64
         Of the size classes.
     foretold : Foretold
-        Sizes on the days of `days`, and rates on the last visit; `summaries` has ``blocks``, ``counts`` and
-        ``masses_kg``.
+        Sizes on the days of `days`, and rates on the last visit; `summaries` has ``blocks``, ``n_fruits`` of blocks,
+        ``counts`` and ``masses_kg``.
     days : tuple of date
         Of the visits, and then the harvest where it was asked for.
     harvest : date or None
@@ -137,10 +137,12 @@ def growth_of(
         wanted,
         n_visits=len(moments),
         rows=rows,
+        hang_chances=fruits.hang_chances,
         summaries={
             "blocks": block_means(blocks),
-            "counts": class_counts(limits, fruits.hanging),
-            "masses_kg": class_masses(limits, fruits.hanging),
+            "n_fruits": block_counts(blocks),
+            "counts": class_counts(limits),
+            "masses_kg": class_masses(limits),
         },
     )
     days = tuple(moment.date() for moment in wanted)

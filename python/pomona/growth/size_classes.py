@@ -50,21 +50,25 @@ def rising_limits(limits_mm: ArrayLike) -> NDArray[np.float64]:
     return limits
 
 
-def class_counts(limits_mm: NDArray[np.float64], members: NDArray[np.bool_]) -> Summary:
+def class_counts(limits_mm: NDArray[np.float64]) -> Summary:
     """How many fruits are in each class at each time, (C, Q): one more class than limits, below the first and above."""
 
-    def summary(sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64]) -> NDArray[np.float64]:
-        return _sums(limits_mm, sizes_mm[members], np.ones_like(sizes_mm[members]))
+    def summary(
+        sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64], hangs: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return _sums(limits_mm, sizes_mm, np.broadcast_to(hangs[:, None], sizes_mm.shape))
 
     return summary
 
 
-def class_masses(limits_mm: NDArray[np.float64], members: NDArray[np.bool_]) -> Summary:
+def class_masses(limits_mm: NDArray[np.float64]) -> Summary:
     """Kilograms in each class at each time, (C, Q)."""
 
-    def summary(sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64]) -> NDArray[np.float64]:
-        masses_kg = KG_PER_M3 * np.pi / 6.0 * (sizes_mm[members] / 1000.0) ** 3
-        return _sums(limits_mm, sizes_mm[members], masses_kg)
+    def summary(
+        sizes_mm: NDArray[np.float64], _rates: NDArray[np.float64], hangs: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        masses_kg = KG_PER_M3 * np.pi / 6.0 * (sizes_mm / 1000.0) ** 3
+        return _sums(limits_mm, sizes_mm, hangs[:, None] * masses_kg)
 
     return summary
 

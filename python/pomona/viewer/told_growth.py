@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.growth.foretelling import NINETY
-from pomona.growth.growth_tables import CLASS_COLUMNS, class_lines
+from pomona.growth.growth_tables import CLASS_COLUMNS, class_lines, count_intervals
 from pomona.growth.season_growth import SeasonGrowth
 from pomona.viewer.packed_columns import packed
 from pomona.viewer.told_fruits import TENTH_MM, FruitsTold
@@ -58,12 +58,14 @@ def _spread(values: Numbers, rows: NDArray[np.int64], n: int) -> Numbers:
 def _blocks(growth: SeasonGrowth) -> list[dict[str, Any]]:
     """Tell counts, mean sizes on each day and rates of all fruits, of rows and of trees, with 90 % intervals."""
     drawn = growth.foretold.summaries["blocks"]
-    mean, (low, high) = drawn.mean(axis=0), np.quantile(drawn, NINETY, axis=0)
+    mean, (low, high), counts = drawn.mean(axis=0), np.quantile(drawn, NINETY, axis=0), count_intervals(growth)
     return [
         {
             "kind": block.kind,
             "name": block.name,
-            "n_fruits": int(block.members.sum()),
+            "n_fruits": block.n_fruits,
+            "n_fruits_low": counts[number][0],
+            "n_fruits_high": counts[number][1],
             **{
                 name: values[number, :-1].round(2).tolist()
                 for name, values in (("mean_mm", mean), ("low_mm", low), ("high_mm", high))

@@ -1,6 +1,6 @@
 /** What a grower can do now, the most pressing first; one line each. */
 import type { Page } from "../page";
-import { hangingRows, treeSummaries, type TreeSummary } from "../summary";
+import { expected, hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
 import { DAY_MS, day, fruits, fullDay, percent, whole } from "../words";
@@ -89,6 +89,10 @@ function slowTrees({ growth }: Season, trees: readonly TreeSummary[]): string[] 
 }
 
 function hidden(season: Season): string[] {
-  const n = hangingRows(season).filter((fruit) => season.state[fruit] === MISSED).length;
-  return n === 0 ? [] : [`${fruits(n)} hid from the last visit`];
+  const missed = hangingRows(season).filter((fruit) => season.state[fruit] === MISSED);
+  const { hang, gone } = expected(season, missed);
+  const [hid, went] = [Math.round(hang), Math.round(gone)];
+  const has = went === 1 ? "has" : "have";
+  if (hid === 0) return went === 0 ? [] : [`${fruits(went)} not seen by the last visit ${has} probably gone`];
+  return [`${fruits(hid)} hid from the last visit${went === 0 ? "" : `, ${whole(went)} more ${has} probably gone`}`];
 }

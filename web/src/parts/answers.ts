@@ -2,7 +2,7 @@
 import { element, replaceAll, type Child } from "../elements";
 import type { Page } from "../page";
 import { advice } from "./advice";
-import { hangingRows, sizesNow } from "../summary";
+import { expected, hangingRows, sizesNow } from "../summary";
 import { STATES, type Season } from "../told/season";
 import { day, mm, number, whole } from "../words";
 
@@ -21,17 +21,16 @@ function answer(question: string, said: string, unit: string, ...more: Child[]):
 const line = (text: string): HTMLElement => element("p", { class: "soft" }, text);
 
 function howMany({ season }: Page): HTMLElement {
-  const hanging = hangingRows(season);
+  const { hang, gone } = expected(season, Array.from({ length: season.n }, (_, i) => i));
   const named = season.trees.filter((tree) => tree.name).length;
-  const where = named > 0 ? `on ${named} trees, ${whole(hanging.length / named)} a tree` : "no single trees known";
-  return answer("How many", whole(hanging.length), "fruits hang", line(where), ...others(season, hanging.length).map(line));
+  const where = named > 0 ? `on ${named} trees, ${whole(hang / named)} a tree` : "no single trees known";
+  return answer("How many", whole(hang), "fruits hang", line(where), ...others(season, Math.round(gone)).map(line));
 }
 
 /** What was seen and is not counted. */
-function others({ n, state }: Season, nHanging: number): string[] {
-  const gone = state.filter((one) => STATES[one] === "gone").length;
-  const doubted = n - nHanging - gone;
-  const lost = gone > 0 ? gone === 1 ? "1 more was seen and is gone" : `${whole(gone)} more were seen and are gone` : "none is gone so far";
+function others(season: Season, gone: number): string[] {
+  const doubted = season.n - hangingRows(season).length - season.state.filter((one) => STATES[one] === "gone").length;
+  const lost = gone > 0 ? gone === 1 ? "1 more was seen and has probably gone" : `${whole(gone)} more were seen and have probably gone` : "none is gone so far";
   return doubted > 0 ? [lost, `${whole(doubted)} seen once ${doubted === 1 ? "is" : "are"} likelier no fruit`] : [lost];
 }
 

@@ -14,7 +14,7 @@ export function thinning(page: Page, goTo: (tab: "row" | "fruits") => void): HTM
     const why = page.season.noGrowth ?? "no fruit was measured on both of the last two days";
     return element("p", { class: "notice" }, `Thinning needs the growth between two days: ${why}.`);
   }
-  const most = Math.max(...treeSummaries(page).map((tree) => tree.fruits));
+  const most = Math.max(...treeSummaries(page).map((tree) => tree.likely));
   const input = element("input", { type: "number", min: 0, max: most, id: "target", input: () => set(input.value) });
   const slider = element("input", { type: "range", min: 0, max: most, "aria-label": "Fruits that a tree shall keep", input: () => set(slider.value) });
   const set = (value: string): void => page.target.set(value === "" ? null : Math.max(0, Math.round(Number(value))));
@@ -50,14 +50,14 @@ function rule(fast: number, from: number, to: number): string {
   return `${fastest}; what grows less than half as fast will drop. Of the others ${ORDER}`;
 }
 
-function lineOf({ label, fruits, drops, thin, clustersToThin }: TreeSummary): HTMLElement {
-  const numbers = [fruits, drops, fruits - drops, thin, clustersToThin];
+function lineOf({ label, likely, drops, thin, clustersToThin }: TreeSummary): HTMLElement {
+  const numbers = [likely, drops, likely - drops, thin, clustersToThin];
   return element("tr", {}, element("th", { scope: "row", title: label }, label), ...numbers.map((n) => element("td", {}, whole(n))));
 }
 
 function totalOf(trees: readonly TreeSummary[]): HTMLElement {
   const sum = (of: (tree: TreeSummary) => number): number => trees.reduce((total, tree) => total + of(tree), 0);
-  const all = { fruits: sum((tree) => tree.fruits), drops: sum((tree) => tree.drops), thin: sum((tree) => tree.thin) };
+  const all = { fruits: sum((tree) => tree.fruits), likely: sum((tree) => tree.likely), drops: sum((tree) => tree.drops), thin: sum((tree) => tree.thin) };
   const line = lineOf({ tree: -1, label: "All", gone: 0, block: null, measured: 0, measuredMm: NaN, ...all, clustersToThin: sum((tree) => tree.clustersToThin) });
   line.className = "total";
   return line;

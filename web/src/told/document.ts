@@ -43,6 +43,8 @@ export interface Block {
   readonly kind: "all" | "row" | "tree";
   readonly name: string;
   readonly n_fruits: number;
+  readonly n_fruits_low: number;
+  readonly n_fruits_high: number;
   readonly mean_mm: readonly number[];
   readonly low_mm: readonly number[];
   readonly high_mm: readonly number[];
