@@ -84,6 +84,7 @@ pub mod neighbours;
 pub mod odometry;
 pub mod paper;
 pub mod pose;
+mod principal;
 mod random;
 pub mod row_search;
 mod statistics;

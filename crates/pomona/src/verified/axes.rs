@@ -1,6 +1,7 @@
 //! Principal axes of a row: what its extent says of a pose.
 
 use super::landscape::Landscape;
+use crate::principal::Principal;
 use nalgebra::Matrix3;
 
 /// Fewer fruits have no extent to go by.
@@ -15,13 +16,6 @@ pub(super) const HALF_TURNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0]
 
 /// Axes of a row as a proper rotation, along it, up and in depth; `None` where the cloud is no row.
 pub(super) fn row_axes(cloud: &Landscape) -> Option<Matrix3<f64>> {
-    let scatter = cloud.points.iter().fold(Matrix3::zeros(), |sum, p| sum + p * p.transpose()) / cloud.len() as f64;
-    let eigen = scatter.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let extents = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-    let [along, up] = [order[0], order[1]].map(|i| eigen.eigenvectors.column(i).into_owned());
-    let axes = Matrix3::from_columns(&[along, up, along.cross(&up)]);
-    let told = extents.windows(2).all(|two| two[0] > LEAST_RATIO * two[1]);
-    (told && axes.iter().all(|x| x.is_finite())).then_some(axes)
+    let Principal { axes, extents } = Principal::of(cloud.points.iter())?;
+    extents.windows(2).all(|two| two[0] > LEAST_RATIO * two[1]).then_some(axes)
 }

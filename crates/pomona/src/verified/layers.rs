@@ -7,7 +7,8 @@
 //! have, the mean of the likelihood ratio is one.
 
 use crate::neighbours::others::{Neighbours, each_row};
-use nalgebra::{Matrix3, Vector3};
+use crate::principal::Principal;
+use nalgebra::Vector3;
 
 /// Noise under which fruits meet, in spacings: 2 to 4 cm in an orchard.
 const NOISE: f64 = 0.1;
@@ -26,11 +27,9 @@ const UNSURE: f64 = 2.0;
 ///
 /// Of the three axes of the cloud the one counts along which most fruits meet.
 pub(super) fn denser(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64, density: &[f64]) -> f64 {
-    let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-    let scatter = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum::<Matrix3<f64>>();
-    let axes = scatter.symmetric_eigen().eigenvectors;
-    let along = |axis: Vector3<f64>| moved_along(&axis, points, neighbours, spacing, density);
-    axes.column_iter().map(|axis| along(axis.into_owned())).fold(1.0, f64::max)
+    let axes = Principal::of(points.iter()).map(|found| found.ways());
+    let along = |axis| moved_along(&axis, points, neighbours, spacing, density);
+    axes.into_iter().flatten().map(along).fold(1.0, f64::max)
 }
 
 /// Mean likelihood ratio of a fruit on the cloud moved along `axis`, either way, less `UNSURE` standard deviations.

@@ -10,7 +10,8 @@ use super::evidence::evidence;
 use super::layers::BEYOND_A_CLUSTER;
 use super::overlap::Overlap;
 use super::patches::{Landing, Patchwork};
-use nalgebra::{Matrix3, Vector3};
+use crate::principal::Principal;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// No pose moved along the row may have this share of the evidence. Of 9,122 true answers, of the test cells and of plantings that
@@ -59,21 +60,18 @@ fn due(laid: &Patchwork) -> f64 {
 /// Ways to move the overlap along its two longer axes, either way: further than a cluster is wide, by half its extent at the most.
 fn shifts(laid: &Patchwork) -> Vec<Vector3<f64>> {
     let landings: Vec<_> = laid.predictions.iter().flatten().collect();
-    let count = landings.len().max(1) as f64;
-    let middle = landings.iter().map(|at| at.place).sum::<Vector3<f64>>() / count;
+    let count = landings.len() as f64;
     let step = (landings.iter().map(|at| at.variance).sum::<f64>() / count).sqrt();
-    let off: Vec<Vector3<f64>> = landings.iter().map(|at| at.place - middle).collect();
-    let eigen = off.iter().map(|off| off * off.transpose()).sum::<Matrix3<f64>>().symmetric_eigen();
-    let thin = eigen.eigenvalues.imin();
-    let along = |axis: usize| {
-        let way = eigen.eigenvectors.column(axis).into_owned();
-        let places = off.iter().map(|off| off.dot(&way));
-        let (first, last) = places.fold((0.0f64, 0.0f64), |(first, last), x| (first.min(x), last.max(x)));
+    let Some(principal) = Principal::of(landings.iter().map(|at| &at.place)) else { return Vec::new() };
+    let [along, up, _] = principal.ways();
+    let steps = |way: Vector3<f64>| {
+        let places = landings.iter().map(|at| at.place.dot(&way));
+        let (first, last) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         let [least, farthest] = [BEYOND_A_CLUSTER, FARTHEST].map(|spacings| spacings * laid.map.spacing);
         let steps = (((0.5 * (last - first)).min(farthest) - least) / step).max(0.0) as usize;
         (0..steps).flat_map(move |i| [1.0, -1.0].map(|sign| way * (sign * (least + i as f64 * step))))
     };
-    (0..3).filter(|&axis| axis != thin).flat_map(along).collect()
+    [along, up].into_iter().flat_map(steps).collect()
 }
 
 #[cfg(test)]
