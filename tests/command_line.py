@@ -11,11 +11,15 @@ from pomona.synth.clouds import scene_pair
 POMONA = Path(sys.executable).with_name("pomona")
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
+Pomona = Callable[..., tuple[int, str, str]]
+"""What a run gives in short: exit code, stdout, stderr."""
 
 
-def run(*arguments: object, stdin: str = "") -> subprocess.CompletedProcess[str]:
+def run(*arguments: object, stdin: str = "", cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """In a process of its own."""
-    return subprocess.run([POMONA, *map(str, arguments)], input=stdin, capture_output=True, text=True)
+    return subprocess.run(
+        [POMONA, *map(str, arguments)], input=stdin, cwd=cwd, capture_output=True, text=True, timeout=600
+    )
 
 
 def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:

@@ -5,14 +5,13 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from command_line import Run
+from command_line import Pomona, Run
 from pomona import FruitCloud, Views
 from pomona.cli import main
 from pomona.orchard import add_session, load_session, write_session
@@ -47,20 +46,6 @@ def full_cloud() -> FruitCloud:
 
 
 @pytest.fixture
-def pomona(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """The command line, in this process: exit code, stdout, stderr."""
-
-    def run_main(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["pomona", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return ended.value.code, printed.out, printed.err
-
-    return run_main
-
-
-@pytest.fixture
 def run_here(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """The command line, in this process: what a process of its own would give, faster."""
 
@@ -73,6 +58,17 @@ def run_here(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
         return subprocess.CompletedProcess(arguments, ended.value.code, printed.out, printed.err)
 
     return run_main
+
+
+@pytest.fixture
+def pomona(run_here: Run) -> Pomona:
+    """The command line, in this process, in short."""
+
+    def ran(*arguments: object) -> tuple[int, str, str]:
+        done = run_here(*arguments)
+        return done.returncode, done.stdout, done.stderr
+
+    return ran
 
 
 @pytest.fixture(scope="session")

@@ -3,18 +3,16 @@
 import csv
 import json
 import math
-from collections.abc import Callable
 from datetime import date, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import Pomona
 from growth_maker import GrownRow, grow_row
 from pomona.growth.agreement import agreement_of
 from pomona.growth.caliper_pairs import CaliperPair
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")

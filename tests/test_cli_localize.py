@@ -2,14 +2,14 @@
 
 import json
 import shutil
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.row_drive import step_to
 
+from command_line import run
 from pomona import Localizer
 from pomona.detect.opening import open_detector
 from pomona.localize import following
@@ -22,9 +22,7 @@ MAP, DRIVE = ROW / "2024-08-09" / "fruits.csv", ROW / "2024-08-28"
 FRAMES = ("--from", 4, "--to", 16, "--every", 4)
 
 
-def localize(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pomona", "localize", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+localize = partial(run, "localize")
 
 
 def true_poses() -> np.ndarray:

@@ -3,25 +3,21 @@
 import json
 import shutil
 import sqlite3
-import subprocess
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import command_line
+from command_line import Run, assert_refused
 from pomona import FruitCloud
-from pomona.cli import main
 from pomona.orchard import FORMAT_VERSION, Session, add_session, write_session
 from pomona.orchard.session import GUESSED
 from pomona.synth.clouds import scene_pair
 
-POMONA = Path(sys.executable).with_name("pomona")
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([POMONA, "map", *map(str, arguments)], capture_output=True, text=True)
+run = partial(command_line.run, "map")
 
 
 @pytest.fixture(scope="module")
@@ -128,20 +124,11 @@ def test_wrong_input_is_one_line(
     arguments: tuple[str, ...],
     words: str,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run_here: Run,
 ) -> None:
-    """In this process, for speed: the words that the command line gives to its `main`."""
     before = {path: path.read_bytes() for path in orchard.parent.iterdir()}
     monkeypatch.chdir(orchard.parent)
-    monkeypatch.setattr(sys, "argv", ["pomona", "map", *arguments])
-    with pytest.raises(SystemExit) as caught:
-        main()
-    said = capsys.readouterr()
-    assert caught.value.code == 2
-    assert said.out == ""
-    assert said.err.startswith("pomona: ")
-    assert said.err.count("\n") == 1
-    assert words in said.err
+    assert_refused(run_here("map", *arguments), words)
     assert {path: path.read_bytes() for path in orchard.parent.iterdir()} == before
 
 

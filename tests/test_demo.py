@@ -1,12 +1,11 @@
 """The demo: from cloud to map to picture, and where to look."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import assert_refused, run
 from pomona.demo import Demo, run_demo
 from pomona.demo_row import run_row_demo
 from pomona.errors import PomonaError
@@ -43,23 +42,19 @@ def test_makes_the_same_again_over_its_own_files(made: Demo) -> None:
 
 
 def test_the_verb_ends_with_files_that_are_there(tmp_path: Path) -> None:
-    pomona = Path(sys.executable).with_name("pomona")
-    done = subprocess.run([pomona, "demo", "-o", "made"], cwd=tmp_path, capture_output=True, text=True)
+    done = run("demo", "-o", "made", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("Found: ")
     for name in ("match.png", "orchard.gpkg", "pairs.csv"):
         assert f"made/{name}" in done.stdout
         assert (tmp_path / "made" / name).stat().st_size > 0
     go_on = next(line for line in done.stdout.splitlines() if "pomona match" in line).split()
-    assert subprocess.run([pomona, *go_on[1:]], cwd=tmp_path, capture_output=True).returncode == 0
+    assert run(*go_on[1:], cwd=tmp_path).returncode == 0
 
 
 def test_refuses_a_folder_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    pomona = Path(sys.executable).with_name("pomona")
-    done = subprocess.run([pomona, "demo", "-o", tmp_path / "file"], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
+    assert_refused(run("demo", "-o", tmp_path / "file"))
 
 
 ROW = Path(__file__).parents[1] / "examples" / "row"

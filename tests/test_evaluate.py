@@ -2,7 +2,6 @@
 
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from command_line import Pomona
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.evaluate import PairScore, score_pairs, score_placed_pairs
@@ -139,9 +139,6 @@ def seen(tmp_path: Path) -> Path:
     right = [f"q{row},m{order[row]}" for row in range(1, 41)]
     (tmp_path / "pairs.csv").write_text("\n".join(["query,map", "q0,m0", f"q50,m{order[51]}", *right]) + "\n")
     return tmp_path
-
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 def judged(pomona: Pomona, seen: Path, *flags: object) -> dict[str, float]:

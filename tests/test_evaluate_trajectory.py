@@ -1,7 +1,6 @@
 """Trajectories against truth: what is known by construction, what evo says, and what users write wrongly."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from command_line import Pomona
 from pomona import FruitCloud
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.localize import Localization, Step, Way
@@ -30,8 +30,6 @@ from pomona.trajectory_scores import (
 
 DATA = Path(__file__).parents[1] / "testdata" / "trajectories"
 EVO = json.loads((DATA / "evo.json").read_text())["runs"]
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 def straight(n: int, step_m: float = 1.0) -> np.ndarray:

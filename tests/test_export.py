@@ -3,7 +3,6 @@
 import csv
 import json
 import struct
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from command_line import Pomona
 from growth_maker import grow_row
 from pomona import FruitCloud, PomonaError
 from pomona.cli import app
@@ -108,9 +108,6 @@ def orchard(tmp_path: Path, session_file: Path, full_cloud: FruitCloud) -> Path:
         write_session(tmp_path / f"{date}.gpkg", cloud, name=date, date=date, recording="test")
         assert add_session(tmp_path / "orchard.gpkg", load_session(tmp_path / f"{date}.gpkg")).is_added
     return tmp_path / "orchard.gpkg"
-
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 def test_observations_are_a_long_table(pomona: Pomona, orchard: Path) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from command_line import POMONA
 from pomona.cloud import FruitCloud
 from test_orchard_safety import on_a_small_disk
-
-POMONA = Path(sys.executable).with_name("pomona")
 
 FAULTY = (
     "match query.csv map.csv -o disk/pairs.csv",

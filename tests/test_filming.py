@@ -2,14 +2,13 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from command_line import run
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
@@ -25,16 +24,10 @@ SMALL = ("--trees", "1", "--pairs", "10", "--width", "320", "--height", "180", "
 REACH_M = (0.0, 8.0)
 
 
-def pomona(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "pomona", *map(str, arguments)], capture_output=True, text=True, check=False
-    )
-
-
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     folder = tmp_path_factory.mktemp("video") / "row"
-    done = pomona("synth", "video", "-o", folder, *SMALL)
+    done = run("synth", "video", "-o", folder, *SMALL)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"{folder}: 10 pairs of 320x180\n"
     return folder
@@ -57,7 +50,7 @@ def test_a_video_opens_as_a_recording_with_its_truth(recording):
 def test_a_scan_of_it_finds_its_fruits(recording, tmp_path):
     """By true boxes, with depth between left and right: the fruits that show well are found where they are."""
     session = tmp_path / "row.gpkg"
-    done = pomona("scan", recording, "-o", session, "--depth", "stereo", "--retrack", "--json")
+    done = run("scan", recording, "-o", session, "--depth", "stereo", "--retrack", "--json")
     assert done.returncode == 0, done.stderr
     boxes = np.genfromtxt(recording / "boxes.csv", delimiter=",", names=True)
     wide = np.minimum(boxes["xmax"] - boxes["xmin"], boxes["ymax"] - boxes["ymin"]) >= 7
@@ -79,14 +72,14 @@ def test_an_interrupted_video_is_gone_on_with(recording, tmp_path):
     for name in ("left/0007.png", "left/0008.png", "left/0009.png", "ids/0008.png", "calibration.json", "boxes.csv"):
         (folder / name).unlink()
     kept_s = (folder / "left/0006.png").stat().st_mtime_ns
-    assert pomona("synth", "video", "-o", folder, *SMALL).returncode == 0
+    assert run("synth", "video", "-o", folder, *SMALL).returncode == 0
     assert content(folder) == content(recording)
     assert (folder / "left/0006.png").stat().st_mtime_ns == kept_s
 
 
 def test_a_video_of_other_settings_is_refused(recording):
     before = content(recording)
-    done = pomona("synth", "video", "-o", recording, *SMALL, "--seed", 5)
+    done = run("synth", "video", "-o", recording, *SMALL, "--seed", 5)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "seed: found 0, expected 5: remove the folder or take another" in done.stderr
@@ -94,13 +87,13 @@ def test_a_video_of_other_settings_is_refused(recording):
         (("--system", "wall"), "design.system: found 'spindle', expected 'wall': remove"),
         (("--shutter-ms", 3), "eyes[0].shutter_s: found 0.002, expected 0.003: remove"),
     ):
-        assert named in pomona("synth", "video", "-o", recording, *SMALL, *flags).stderr
+        assert named in run("synth", "video", "-o", recording, *SMALL, *flags).stderr
     assert content(recording) == before
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path):
     (tmp_path / "mine.txt").write_text("notes")
-    done = pomona("synth", "video", "-o", tmp_path, *SMALL)
+    done = run("synth", "video", "-o", tmp_path, *SMALL)
     assert done.returncode == 2
     assert "is there already and is not a rendered recording" in done.stderr
     assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
@@ -118,7 +111,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     ],
 )
 def test_what_cannot_be_is_one_line_and_writes_nothing(tmp_path, asked, said):
-    done = pomona("synth", "video", "-o", tmp_path / "row", *SMALL, *asked)
+    done = run("synth", "video", "-o", tmp_path / "row", *SMALL, *asked)
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1

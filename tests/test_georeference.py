@@ -3,8 +3,6 @@
 import json
 import sqlite3
 import struct
-import subprocess
-import sys
 from pathlib import Path
 
 import duckdb
@@ -15,22 +13,18 @@ from pyogrio.raw import read as read_layer
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
+from command_line import run
 from pomona import FruitCloud, PomonaError
 from pomona.earth import Anchor, anchored, ecef_from_geodetic, from_utm, geodetic_from_ecef
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.trajectory import Trajectory
 
-POMONA = Path(sys.executable).with_name("pomona")
 ZONE = 32632
 EAST_M, NORTH_M, HEIGHT_M = 512_345.0, 5_277_000.0, 421.5
 HEADING = Rotation.from_euler("z", 33, degrees=True).as_matrix()
 """From a level frame, x along the row, to east, north, up."""
 LEVEL_FROM_MAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """A map's frame is a camera's: x right, y down, z forward."""
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([POMONA, *map(str, arguments)], capture_output=True, text=True)
 
 
 def on_earth(places_in_map: np.ndarray) -> np.ndarray:

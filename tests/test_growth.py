@@ -1,6 +1,5 @@
 """Growth of the fruits of a map against curves that are known: sizes, rates, forecasts and how far each is trusted."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -12,6 +11,7 @@ from benchmarks.growth_outside import course_outside
 from benchmarks.growth_scores import scores
 from numpy.typing import NDArray
 
+from command_line import Pomona
 from growth_maker import BLOOM, GrownRow, grow_row, rows_of
 from pomona import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
@@ -28,8 +28,6 @@ from pomona.growth.size_table import SizeTable
 from pomona.growth.straying import SPELL_DAYS, straying
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.synth.seasons import SEASONS
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 HARVEST = BLOOM + timedelta(days=135)
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import Pomona
 from growth_maker import BLOOM, GrownRow, grow_row, rows_of
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.growth.curve_families import FAMILIES
@@ -21,8 +21,6 @@ from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
 from pomona.growth.size_classes import class_counts, class_masses, parsed_classes
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.season_page import Wishes, season_document
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 HARVEST = BLOOM + timedelta(days=135)
 

@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import sqlite3
-import subprocess
-import sys
 from datetime import date
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from command_line import assert_refused, run
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.cli import app
 from pomona.demo import run_demo
@@ -30,7 +29,6 @@ from pomona.tree_rows.numbering_of_trees import UNNUMBERED, numbers_along
 from pomona.tree_rows.told_rows import told_rows
 from pomona.tree_rows.tree_spacing import crowding
 
-POMONA = Path(sys.executable).with_name("pomona")
 SHIPPED = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09" / "fruits.csv"
 TURN = Rotation.from_euler("xyz", [-90, 4, 3], degrees=True).as_matrix()
 """From a row with z up to a camera's frame: x right, y down, z forward."""
@@ -364,7 +362,8 @@ def test_given_trees_stay_until_they_are_forgotten(orchard: Path, tmp_path: Path
     (tmp_path / "trees.csv").write_text("name,x,y,z\nmine,{},{},{}\n".format(*first))
 
     def told(*arguments: str | Path) -> tuple[list[str], str]:
-        done = subprocess.run([POMONA, "map", "trees", orchard, *arguments], capture_output=True, text=True, check=True)
+        done = run("map", "trees", orchard, *arguments)
+        assert done.returncode == 0, done.stderr
         return done.stdout.splitlines(), done.stderr
 
     lines, warned = told("--trees", tmp_path / "trees.csv")
@@ -407,10 +406,7 @@ def test_a_table_that_cannot_be_is_refused_in_a_line(orchard: Path, tmp_path: Pa
     path = tmp_path / "trees.csv"
     path.write_text(table)
     before = orchard.read_bytes()
-    done = subprocess.run([POMONA, "map", "trees", orchard, "--trees", path], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert line in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_refused(run("map", "trees", orchard, "--trees", path), line)
     assert orchard.read_bytes() == before
 
 

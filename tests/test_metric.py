@@ -2,13 +2,12 @@
 
 import csv
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import run
 from model_maker import Model
 from pomona import FruitCloud, PomonaError
 from pomona.free_scale import metric
@@ -17,11 +16,6 @@ from pomona.reconstruction import open_reconstruction
 from posed_row import PosedRow, posed_row
 
 DAY = ("--date", "2024-08-09")
-
-
-def pomona(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pomona", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +32,7 @@ def given(row: PosedRow, tmp_path: Path) -> tuple[Path, Path, Path]:
 
 def test_a_model_becomes_metric_where_the_map_is(row, given, tmp_path):
     model, orchard, boxes = given
-    done = pomona("metric", model, orchard, "--detections", boxes, "-o", tmp_path / "metres", "--json")
+    done = run("metric", model, orchard, "--detections", boxes, "-o", tmp_path / "metres", "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert told["scale"] == pytest.approx(row.scale, rel=0.005)
@@ -57,7 +51,7 @@ def test_text_with_rigs_and_boxes_by_picture_say_the_same(row, given, tmp_path):
     layout.rigs = True
     layout.write(tmp_path / "text", "text")
     boxes = row.write_boxes(tmp_path / "named.csv", by="image")
-    done = pomona("metric", tmp_path / "text", given[1], "--detections", boxes, "-o", tmp_path / "metres")
+    done = run("metric", tmp_path / "text", given[1], "--detections", boxes, "-o", tmp_path / "metres")
     assert done.returncode == 0, done.stderr
     assert "metres a unit" in done.stdout
     assert {file.name for file in (tmp_path / "metres").iterdir()} == {
@@ -71,7 +65,7 @@ def test_text_with_rigs_and_boxes_by_picture_say_the_same(row, given, tmp_path):
 def test_no_match_is_a_result_and_nothing_is_written(given, tmp_path):
     model, _, boxes = given
     other = posed_row(8).write_map(tmp_path / "other.csv")
-    done = pomona("metric", model, other, "--detections", boxes, "-o", tmp_path / "metres")
+    done = run("metric", model, other, "--detections", boxes, "-o", tmp_path / "metres")
     assert done.returncode == 1
     assert done.stderr == ""
     assert "NoMatch" in done.stdout
@@ -84,7 +78,7 @@ def test_a_folder_that_is_there_is_left_alone(given, tmp_path):
     (tmp_path / "kept").mkdir()
     for output in (model, tmp_path / "kept"):
         for force in ((), ("--force",)):
-            done = pomona("metric", model, orchard, "--detections", boxes, "-o", output, *force)
+            done = run("metric", model, orchard, "--detections", boxes, "-o", output, *force)
             assert done.returncode == 2
             assert done.stderr.count("\n") == 1
     assert {file.name: file.read_bytes() for file in model.iterdir()} == before
@@ -94,7 +88,7 @@ def test_a_folder_that_is_there_is_left_alone(given, tmp_path):
 def test_a_session_with_a_map_is_in_its_metres_and_a_map_takes_it(row, given, tmp_path):
     model, orchard, boxes = given
     session = tmp_path / "visit.gpkg"
-    done = pomona("triangulate", model, "--detections", boxes, "--map", orchard, "-o", session, *DAY)
+    done = run("triangulate", model, "--detections", boxes, "--map", orchard, "-o", session, *DAY)
     assert done.returncode == 0, done.stderr
     found = read_session(session)
     assert not found.is_scale_free
@@ -107,13 +101,13 @@ def test_a_session_with_a_map_is_in_its_metres_and_a_map_takes_it(row, given, tm
     away = found.trajectory.session_from_camera[:, :3, 3] - np.linalg.inv(row.camera_from_map)[:, :3, 3]
     assert np.abs(away).max() < 0.01
     assert found.configuration["scan"]["scale"]["scale"] == pytest.approx(row.scale, rel=0.005)
-    assert pomona("map", "add", tmp_path / "orchard.gpkg", session).returncode == 0
+    assert run("map", "add", tmp_path / "orchard.gpkg", session).returncode == 0
 
 
 def test_a_session_without_a_scale_says_so_and_no_map_takes_it(row, given, tmp_path):
     model, orchard, boxes = given
     session = tmp_path / "free.gpkg"
-    done = pomona("triangulate", model, "--detections", boxes, "-o", session, *DAY)
+    done = run("triangulate", model, "--detections", boxes, "-o", session, *DAY)
     assert done.returncode == 0, done.stderr
     assert "without a scale" in done.stdout
     found = read_session(session)
@@ -121,7 +115,7 @@ def test_a_session_without_a_scale_says_so_and_no_map_takes_it(row, given, tmp_p
     assert found.cloud.diameters_m is None
     sizes = np.array(found.cloud.extras["diameter_model_units"], float) * row.scale
     assert np.median(sizes) == pytest.approx(np.median(row.diameters_m), rel=0.05)
-    added = pomona("map", "add", tmp_path / "orchard.gpkg", session)
+    added = run("map", "add", tmp_path / "orchard.gpkg", session)
     assert added.returncode == 2
     assert "without a scale" in added.stderr
     assert not (tmp_path / "orchard.gpkg").exists()
@@ -129,13 +123,13 @@ def test_a_session_without_a_scale_says_so_and_no_map_takes_it(row, given, tmp_p
         add_session(tmp_path / "orchard.gpkg", found)
     with pytest.raises(PomonaError, match="only a match with --scale free takes it"):
         FruitCloud.read(session)
-    matched = pomona("match", session, orchard, "--scale", "free", "--json")
+    matched = run("match", session, orchard, "--scale", "free", "--json")
     assert json.loads(matched.stdout)["scale"] == pytest.approx(row.scale, rel=0.005)
 
 
 def test_boxes_with_ids_name_the_fruits(row, given, tmp_path):
     boxes = row.write_boxes(tmp_path / "named.csv", ids=True)
-    done = pomona("triangulate", given[0], "--detections", boxes, "-o", tmp_path / "named.gpkg", *DAY)
+    done = run("triangulate", given[0], "--detections", boxes, "-o", tmp_path / "named.gpkg", *DAY)
     assert done.returncode == 0, done.stderr
     names = read_session(tmp_path / "named.gpkg").cloud.ids
     assert names
@@ -151,7 +145,7 @@ def test_a_detector_looks_at_the_pictures(row, given, tmp_path):
         cv2.imwrite(str(pictures / f"{number:04d}.png"), np.full((480, 640, 3), (40, 120, 30), np.uint8))
     (pictures / "0003.png").write_bytes(b"no picture")
     looked = ("--pictures", tmp_path / "pictures", "--model", "shipped")
-    done = pomona("triangulate", given[0], *looked, "-o", tmp_path / "none.gpkg", *DAY)
+    done = run("triangulate", given[0], *looked, "-o", tmp_path / "none.gpkg", *DAY)
     assert done.returncode == 0, done.stderr
     assert "0 fruits triangulated from 0 of 0 boxes, 1 picture skipped" in done.stdout
 
@@ -182,7 +176,7 @@ def test_wrong_input_is_one_line(row, given, tmp_path, change, said):
         boxes.write_text("frame,xmin,ymin,xmax,ymax\n0,1,1,9,9\n")
     elif change == "no pictures":
         arguments += ["--pictures", tmp_path / "nowhere"]
-    done = pomona("triangulate", model, *arguments, "-o", output, *DAY)
+    done = run("triangulate", model, *arguments, "-o", output, *DAY)
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1

@@ -2,7 +2,6 @@
 
 import sqlite3
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,8 @@ import pyogrio
 import pytest
 from fuzz import geopackage as fuzzed
 
+from command_line import Run, assert_refused
 from pomona import PomonaError
-from pomona.cli import main
 from pomona.orchard import OrchardMap, add_session, load_session, problems, remove_session
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
@@ -224,9 +223,7 @@ def test_a_session_that_cannot_be_is_refused(session: Path, script: str, line: s
 @pytest.mark.parametrize(
     "content", [b"", b"SQLite format 3\0" + bytes(84), b"SQLite format 3\0" + bytes(range(256)) * 40]
 )
-def test_the_command_line_says_it_in_a_line(
-    tmp_path: Path, content: bytes, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_line_says_it_in_a_line(tmp_path: Path, content: bytes, run_here: Run) -> None:
     path = tmp_path / "odd.gpkg"
     path.write_bytes(content)
     for verb in (
@@ -235,14 +232,8 @@ def test_the_command_line_says_it_in_a_line(
         ("map", "remove", "--yes"),
         ("export", "--to", "csv", "-o", "a.csv"),
     ):
-        arguments = [*verb, str(path), *(["a"] if "remove" in verb else [])]
-        monkeypatch.setattr(sys, "argv", ["pomona", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        assert (ended.value.code, printed.out) == (2, "")
-        assert printed.err.startswith(f"pomona: {path}: ")
-        assert printed.err.count("\n") == 1
+        done = run_here(*verb, path, *(["a"] if "remove" in verb else []))
+        assert_refused(done, f"pomona: {path}: ")
 
 
 def test_pages_that_repeat_themselves_end(orchard: Path) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from command_line import Run, assert_refused
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.cli import main
 from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, merging, problems, recognising
 from pomona.orchard.writing import update_layers
 from pomona.store.opening import snapshot, writing
@@ -163,8 +163,7 @@ def test_another_session_of_a_name_gets_another_name_which_is_told(
     visits: list[Session],
     together: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run_here: Run,
 ) -> None:
     called = ["row 1", "row 1 (theirs)", "row 1", "july", "row 1 (theirs)"]
     named = [replace(one, name=name) for one, name in zip(visits, called, strict=True)]
@@ -181,8 +180,7 @@ def test_another_session_of_a_name_gets_another_name_which_is_told(
             (one,),
         )
         connection.execute("UPDATE control_points SET session = 'row 1'")
-    assert run(monkeypatch, "merge", path, other, "--json") == 0
-    merged = json.loads(capsys.readouterr().out)
+    merged = json.loads(run_here("map", "merge", path, other, "--json").stdout)
     now = {"row 1": "row 1 (theirs, 3)", "row 1 (theirs)": "row 1 (theirs) (theirs)"}
     assert merged["renamed"] == now
     assert merged["shared"] == ["row 1 (theirs, 2)"]
@@ -195,19 +193,16 @@ def test_another_session_of_a_name_gets_another_name_which_is_told(
     ]
     assert asked(path, "SELECT session FROM control_points") == [("row 1 (theirs, 3)",)]
     # Merged again, all of it is there.
-    assert run(monkeypatch, "merge", path, other, "--json") == 0
-    merged = json.loads(capsys.readouterr().out)
+    merged = json.loads(run_here("map", "merge", path, other, "--json").stdout)
     assert (merged["sessions"], merged["renamed"], len(merged["shared"])) == ([], {}, 4)
 
 
-def test_names_that_changed_are_said_a_line_each(
-    visits: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_that_changed_are_said_a_line_each(visits: list[Session], tmp_path: Path, run_here: Run) -> None:
     path = grown(tmp_path / "ours.gpkg", visits[:1])
     other = grown(tmp_path / "theirs.gpkg", [replace(visits[2], name=DATES[0])])
-    assert run(monkeypatch, "merge", path, other) == 0
+    done = run_here("map", "merge", path, other)
     line = f"{DATES[0]}: another session is called so, here it is {DATES[0]} (theirs)"
-    assert line in capsys.readouterr().out.splitlines()
+    assert line in done.stdout.splitlines()
 
 
 def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Session], tmp_path: Path) -> None:
@@ -229,18 +224,10 @@ def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Ses
     assert alone != states(path)
 
 
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: str | Path) -> int | str | None:
-    monkeypatch.setattr("sys.argv", ["pomona", "map", *map(str, arguments)])
-    with pytest.raises(SystemExit) as caught:
-        main()
-    return caught.value.code
-
-
 def test_what_cannot_be_merged_is_said_in_a_line(
     visits: list[Session],
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run_here: Run,
 ) -> None:
     other = grown(tmp_path / "theirs.gpkg", [visits[2]])
     again = {"june.svo2": "0" * 64}
@@ -252,20 +239,17 @@ def test_what_cannot_be_merged_is_said_in_a_line(
         (rescanned, f"{path}: session {DATES[3]} is in the map already, as {DATES[0]}: the same input files"),
     ]
     for with_whom, line in said:
-        assert run(monkeypatch, "merge", path, with_whom) == 2
-        assert capsys.readouterr().err == f"pomona: {line}\n"
+        assert_refused(run_here("map", "merge", path, with_whom), f"pomona: {line}\n")
     damaged = tmp_path / "damaged.gpkg"
     content = bytearray(path.read_bytes())
     content[11 * 4096 : 12 * 4096] = bytes(4096)  # of a table: the file still opens
     damaged.write_bytes(content)
-    assert run(monkeypatch, "merge", damaged, other, "-o", tmp_path / "whole.gpkg") == 2
-    assert capsys.readouterr().err.startswith(f"pomona: {damaged}: ")
-    assert run(monkeypatch, "merge", path, other, "-o", other) == 2
-    assert "is the input" in capsys.readouterr().err
-    assert run(monkeypatch, "merge", path, other) == 0
-    out = capsys.readouterr().out.splitlines()
-    assert out[0].startswith(f"{other}: sessions that came: 1, in both: 0; ")
-    assert run(monkeypatch, "check", path) == 0
+    assert_refused(run_here("map", "merge", damaged, other, "-o", tmp_path / "whole.gpkg"), f"pomona: {damaged}: ")
+    assert_refused(run_here("map", "merge", path, other, "-o", other), "is the input")
+    done = run_here("map", "merge", path, other)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"{other}: sessions that came: 1, in both: 0; ")
+    assert run_here("map", "check", path).returncode == 0
     with sqlite3.connect(path) as connection:
         assert connection.execute("SELECT count(*) FROM sessions").fetchone() == (3,)
 

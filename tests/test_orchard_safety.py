@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from command_line import POMONA, assert_refused
 from pomona import PomonaError
 from pomona.orchard import OrchardMap, add_session, load_session, problems, write_session
 from pomona.synth.clouds import scene_pair
-
-POMONA = Path(sys.executable).with_name("pomona")
 
 # `map add` in a process that kills itself at statement N of its connection, for good: no handler runs, no file is
 # closed. With a cache of ten pages SQLite writes into the map itself long before the commit.
@@ -139,18 +138,10 @@ def test_a_killed_start_can_be_started_again(tmp_path: Path, visits: tuple[Path,
     assert [left for left in tmp_path.iterdir() if left.suffix != ".partial"] == [path]
 
 
-def assert_refused(done: subprocess.CompletedProcess[str], path: Path, reason: str) -> None:
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    assert done.stderr.startswith(f"pomona: {path}: ")
-    assert reason in done.stderr
-    assert done.stderr.count("\n") == 1
-
-
 def test_a_file_that_may_not_grow_leaves_the_map(orchard: Path, started: Path, visits: tuple[Path, Path]) -> None:
     limit = orchard.stat().st_size + 8192
     done = map_add(orchard, visits[1], preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
-    assert_refused(done, orchard, "the file is as it was before")
+    assert_refused(done, f"pomona: {orchard}: ", "the file is as it was before")
     assert_as_before(orchard, started, visits[1])
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from command_line import Run, assert_refused
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.cli import main
 from pomona.orchard import (
     Change,
     OrchardMap,
@@ -178,27 +178,21 @@ def test_of_several_one_that_lies_apart_waits_for_what_lies_between(row: FruitCl
 def test_the_command_line_adds_several_and_tells_what_changed(
     visits: list[Session],
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run_here: Run,
 ) -> None:
     files = []
     for one in visits[:3]:
         files.append(str(tmp_path / f"{one.name}.gpkg"))
         write_session(files[-1], one.cloud, name=one.name, date=one.date, recording="test")
     orchard = str(tmp_path / "orchard.gpkg")
-    monkeypatch.setattr("sys.argv", ["pomona", "map", "add", orchard, *files])
-    with pytest.raises(SystemExit) as caught:
-        main()
-    assert caught.value.code == 0
-    told = capsys.readouterr().out.splitlines()
+    done = run_here("map", "add", orchard, *files)
+    assert done.returncode == 0
+    told = done.stdout.splitlines()
     assert [line.split(":")[0] for line in told if not line.startswith(" ")] == list(DATES[:3])
     changes = OrchardMap(orchard).changes()
     assert len([line for line in told if line.startswith("  fruit ")]) == len(changes)
-    monkeypatch.setattr("sys.argv", ["pomona", "map", "add", orchard, *files, "--date", "2024-06-01"])
-    with pytest.raises(SystemExit) as caught:
-        main()
-    assert caught.value.code == 2
-    assert "--date: found it with 3 sessions, expected one" in capsys.readouterr().err
+    again = run_here("map", "add", orchard, *files, "--date", "2024-06-01")
+    assert_refused(again, "--date: found it with 3 sessions, expected one")
 
 
 @pytest.mark.parametrize(

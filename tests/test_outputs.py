@@ -3,7 +3,7 @@
 import hashlib
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 import typer.main
 
+from command_line import Pomona
 from pomona.cli import app
 from pomona.likes import database_of
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 def contents(folder: Path) -> dict[str, str]:

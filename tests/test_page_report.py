@@ -3,20 +3,18 @@
 import base64
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from command_line import Pomona
 from growth_maker import grow_row
 from pomona import FruitCloud
 from pomona.fruit_crop import FruitCrop
 from pomona.orchard import Session, add_session
 from pomona.viewer.told_crops import small_crop
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import json
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -16,6 +16,7 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 
+from command_line import Pomona
 from growth_maker import grow_row
 from page_maker import served
 from pomona import FruitCloud, PomonaError
@@ -24,8 +25,6 @@ from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.own_address import own_address
 from pomona.viewer.page_server import listening
 from test_crops import webp
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")

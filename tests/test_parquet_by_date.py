@@ -3,13 +3,13 @@
 import shutil
 import struct
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import duckdb
 import pytest
 
+from command_line import run
 from pomona.orchard import OrchardMap, add_sessions, load_session, remove_session
 from pomona.synth.seasons import SEASONS, draw_season
 from pomona.synth.seasons.season_files import write_season
@@ -27,8 +27,7 @@ def orchard(tmp_path_factory) -> Path:
 
 
 def export(orchard: Path, folder: Path, *flags: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pomona", "export", str(orchard), "--to", "parquet-by-date", "-o", str(folder)]
-    return subprocess.run([*command, *flags], capture_output=True, text=True, check=False)
+    return run("export", orchard, "--to", "parquet-by-date", "-o", folder, *flags)
 
 
 def read(folder: Path) -> list[tuple[object, ...]]:

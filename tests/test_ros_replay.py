@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 from collections import defaultdict
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bag_maker import START_NS, image, info, stereo, tf, write_bag
+from command_line import run
 from pomona import FruitCloud, PomonaError, PomonaWarning
 from pomona.recording import open_recording
 from pomona.recording.bags.bag_recording import BagRecording
@@ -32,9 +34,7 @@ EYE = np.eye(4)
 OURS = {"pose", "odometry", "path", "detections", "status", "fruits", "robot"}
 
 
-def replay(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pomona", "ros", "replay", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+replay = partial(run, "ros", "replay")
 
 
 def read(path: Path) -> tuple[list[tuple[str, int, bytes]], dict[str, list]]:

@@ -1,7 +1,6 @@
 """Seasons of visits: what each sees, measures and tells of the truth."""
 
 import json
-import sys
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pomona.cli import main
+from command_line import assert_refused
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.synth.row_geometry import FruitSolids, Leaves, Limbs, RowGeometry
@@ -212,21 +211,13 @@ def test_what_cannot_be_is_refused(changes: dict, line: str) -> None:
         replace(SEASONS["hard"], **changes)
 
 
-def run_pomona(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
-    monkeypatch.setattr(sys, "argv", ["pomona", *arguments])
-    with pytest.raises(SystemExit) as exit_:
-        main()
-    return exit_.value.code
-
-
 SHORT = ("synth", "season", "easy", "--trees", "1", "--fruits", "20:20")
 
 
-def test_the_command_writes_a_season_and_takes_its_folder_again(tmp_path, monkeypatch, capsys) -> None:
+def test_the_command_writes_a_season_and_takes_its_folder_again(tmp_path, run_here) -> None:
     folder = tmp_path / "season"
     arguments = (*SHORT, "-o", str(folder), "--seed", "2", "--hidden", "0", "--noise-mm", "0", "--same-frame")
-    assert run_pomona(monkeypatch, *arguments, "--visits", "3") == 0
-    assert capsys.readouterr().out.count("fruits, near side") == 3
+    assert run_here(*arguments, "--visits", 3).stdout.count("fruits, near side") == 3
     truth = json.loads((folder / "truth.json").read_text())
     dates = [visit["date"] for visit in truth["visits"]]
     assert [date.fromisoformat(day) for day in dates] == sorted(date.fromisoformat(day) for day in dates)
@@ -236,7 +227,7 @@ def test_the_command_writes_a_season_and_takes_its_folder_again(tmp_path, monkey
             if fruit is not None:
                 np.testing.assert_allclose(cloud.positions[row], visit["positions_in_map_m"][fruit - 1], atol=0.05)
     (folder / "notes.txt").write_text("mine")
-    assert run_pomona(monkeypatch, *arguments, "--visits", "2") == 0
+    assert run_here(*arguments, "--visits", 2).returncode == 0
     assert {path.name for path in folder.iterdir()} == {
         f"{dates[0]}.csv",
         f"{dates[-1]}.csv",
@@ -245,25 +236,22 @@ def test_the_command_writes_a_season_and_takes_its_folder_again(tmp_path, monkey
     }
 
 
-def test_the_command_leaves_visits_alone_that_it_did_not_write(tmp_path, monkeypatch, capsys) -> None:
+def test_the_command_leaves_visits_alone_that_it_did_not_write(tmp_path, run_here) -> None:
     mine = tmp_path / "2024-07-01.csv"
     mine.write_text("x,y,z\n0,0,0\n")
-    assert run_pomona(monkeypatch, *SHORT, "-o", str(tmp_path)) == 2
-    assert "is not a folder of the season easy with seed 0" in capsys.readouterr().err
-    assert run_pomona(monkeypatch, *SHORT, "-o", str(tmp_path), "--visits", "2", "--force") == 0
+    assert_refused(run_here(*SHORT, "-o", tmp_path), "is not a folder of the season easy with seed 0")
+    assert run_here(*SHORT, "-o", tmp_path, "--visits", 2, "--force").returncode == 0
     assert mine.read_text() == "x,y,z\n0,0,0\n"
 
 
-def test_another_season_is_not_replaced_without_a_word(tmp_path, monkeypatch, capsys) -> None:
+def test_another_season_is_not_replaced_without_a_word(tmp_path, run_here) -> None:
     folder = tmp_path / "season"
     arguments = (*SHORT, "-o", str(folder), "--visits", "2")
-    assert run_pomona(monkeypatch, *arguments, "--seed", "1") == 0
+    assert run_here(*arguments, "--seed", 1).returncode == 0
     before = (folder / "truth.json").read_bytes()
-    capsys.readouterr()
-    assert run_pomona(monkeypatch, *arguments, "--seed", "2") == 2
-    assert "is not a folder of the season easy with seed 2" in capsys.readouterr().err
+    assert_refused(run_here(*arguments, "--seed", 2), "is not a folder of the season easy with seed 2")
     assert (folder / "truth.json").read_bytes() == before
-    assert run_pomona(monkeypatch, *arguments, "--seed", "2", "--force") == 0
+    assert run_here(*arguments, "--seed", 2, "--force").returncode == 0
     assert json.loads((folder / "truth.json").read_text())["seed"] == 2
 
 
@@ -278,11 +266,8 @@ def test_another_season_is_not_replaced_without_a_word(tmp_path, monkeypatch, ca
         (("synth", "season", "easy", "--seed", "-1"), "seed -1 is negative"),
     ],
 )
-def test_the_command_refuses_in_one_line(tmp_path, monkeypatch, capsys, arguments, line) -> None:
-    assert run_pomona(monkeypatch, *arguments, "-o", str(tmp_path / "none")) == 2
-    told = capsys.readouterr().err
-    assert line in told
-    assert told.count("\n") == 1
+def test_the_command_refuses_in_one_line(tmp_path, run_here, arguments, line) -> None:
+    assert_refused(run_here(*arguments, "-o", tmp_path / "none"), line)
     assert not (tmp_path / "none").exists()
 
 

@@ -1,19 +1,17 @@
 """Scans by `--slam`: a shipped recording, one that is stopped, and recordings that it can do nothing with."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from command_line import Pomona
 from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
 from recording_maker import make_recording
 
 ROW = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09"
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 
 def test_scan_with_slam(pomona: Pomona, tmp_path: Path) -> None:

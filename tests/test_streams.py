@@ -2,14 +2,12 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from command_line import POMONA
 from pomona.orchard import load_session
-
-POMONA = Path(sys.executable).with_name("pomona")
 
 
 def run(folder: Path, command: str) -> subprocess.CompletedProcess[str]:

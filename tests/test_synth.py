@@ -1,13 +1,12 @@
 """The seeded generator: what its cells promise."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pomona.cli import main
+from command_line import assert_refused
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.synth.clouds import CELLS, ScenePair, scene_pair
@@ -193,15 +192,8 @@ def test_an_unknown_cell_is_told_with_the_ones_there_are() -> None:
         scene_pair("base", -1)
 
 
-def run_pomona(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
-    monkeypatch.setattr(sys, "argv", ["pomona", *arguments])
-    with pytest.raises(SystemExit) as exit_:
-        main()
-    return exit_.value.code
-
-
-def test_the_command_writes_what_scene_pair_draws(tmp_path, monkeypatch) -> None:
-    assert run_pomona(monkeypatch, "synth", "clouds", "part45", "--seed", "3", "-o", str(tmp_path / "one")) == 0
+def test_the_command_writes_what_scene_pair_draws(tmp_path, run_here) -> None:
+    assert run_here("synth", "clouds", "part45", "--seed", 3, "-o", tmp_path / "one").returncode == 0
     pair = scene_pair("part45", 3)
     truth = json.loads((tmp_path / "one" / "truth.json").read_text())
     np.testing.assert_allclose(truth["map_from_query"], pair.map_from_query)
@@ -209,7 +201,7 @@ def test_the_command_writes_what_scene_pair_draws(tmp_path, monkeypatch) -> None
     assert query.ids == pair.query.ids
     np.testing.assert_allclose(query.positions, pair.query.positions, atol=1e-6)
 
-    assert run_pomona(monkeypatch, "synth", "clouds", "six", "--seeds", "4:6", "-o", str(tmp_path / "many")) == 0
+    assert run_here("synth", "clouds", "six", "--seeds", "4:6", "-o", tmp_path / "many").returncode == 0
     assert sorted(path.name for path in (tmp_path / "many").iterdir()) == sorted(
         f"{side}_{seed}{suffix}"
         for side, suffix in (("query", ".csv"), ("map", ".csv"), ("truth", ".json"))
@@ -217,9 +209,9 @@ def test_the_command_writes_what_scene_pair_draws(tmp_path, monkeypatch) -> None
     )
 
 
-def test_the_command_refuses_an_empty_range_of_seeds(tmp_path, monkeypatch, capsys) -> None:
-    assert run_pomona(monkeypatch, "synth", "clouds", "base", "--seeds", "6:6", "-o", str(tmp_path / "none")) == 2
-    assert "'6:6', expected FIRST:END" in capsys.readouterr().err
+def test_the_command_refuses_an_empty_range_of_seeds(tmp_path, run_here) -> None:
+    done = run_here("synth", "clouds", "base", "--seeds", "6:6", "-o", tmp_path / "none")
+    assert_refused(done, "'6:6', expected FIRST:END")
     assert not (tmp_path / "none").exists()
 
 

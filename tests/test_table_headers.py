@@ -1,12 +1,12 @@
 """A table gives its place to a new one only where a verb wrote exactly such a table: no table of one's own is lost."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import Pomona
 from growth_maker import GrownRow, grow_row
 from pomona import OrchardMap
 from pomona.detect.picture_boxes import COLUMNS
@@ -16,8 +16,6 @@ from pomona.growth.growth_tables import BLOCK_COLUMNS, CLASS_COLUMNS, CURVE_COLU
 from pomona.likes import BOXES, CALIPER_PAIRS, EXPORTS, GROWN, PAIRS, SCANNED, THINNING, Like, is_like
 from pomona.pairs import PAIR_COLUMNS
 from pomona.table_headers import GROWN_HEADERS
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 OF_SCAN = "id,x,y,z,diameter_m,cxx,cyy,czz,cxy,cxz,cyz,n_views,diameter_sigma_m,colour,probability"
 OF_MAP = "id,x,y,z,diameter_m,state,last_seen,n_sessions,n_missed,state_probability,fruit_probability"

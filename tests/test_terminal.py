@@ -5,20 +5,15 @@ import csv
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import pomona.cli
+from command_line import POMONA, Pomona
 from pomona import FruitCloud, PomonaError
 from pomona.cli.terminal import shown
 from pomona.orchard import write_session
-
-POMONA = Path(sys.executable).with_name("pomona")
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\nrow\x9b31m \u202egnp.tac\u2069\u2028\x7f"
 """Sets the title, clears the screen, begins a line, turns the direction of writing."""

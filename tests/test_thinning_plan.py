@@ -4,7 +4,6 @@ import csv
 import json
 import re
 import shutil
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -12,14 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from command_line import Pomona
 from growth_maker import GrownRow, grow_row
 from pomona import geopackage
 from pomona.growth.clusters import clusters_of
 from pomona.growth.fruit_drop import SURE_TO, MeasuredRates, drop_of
 from pomona.viewer.season_page import Wishes, season_document
 from test_page_document import unpacked
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 DROPPING = range(0, 60, 6)
 

@@ -3,22 +3,18 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pomona as package
+from command_line import POMONA, Pomona
 from onnx_maker import yolov8
 from pomona import PomonaError
 from pomona.detect.onnx.network import open_session
 from pomona.matching import Index
 from pomona.threads import capped_threads, cores
-
-POMONA = Path(sys.executable).with_name("pomona")
-
-Pomona = Callable[..., tuple[int, str, str]]
 
 CLOUD = np.random.default_rng(1).uniform(0, 3, (20, 3))
 
