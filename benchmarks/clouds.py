@@ -59,9 +59,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("clouds")
     if data is None:
-        sys.stderr.write("clouds: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     folder = data / "clouds"
     rows = []

@@ -53,9 +53,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--model", help="a file, or the name of a shipped one; else the shipped one and the wide one")
     parser.add_argument("--draw", type=Path, help="folder for pictures with boxes, a folder for each way to look")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("detector")
     if data is None:
-        print("detector: no data at POMONA_DATA or ../shared/data: skipped")
         return
     models = [options.model] if options.model else [SHIPPED, str(WIDE)]
     tables = [_table(model, augment, data, options.draw) for model in models for augment in (False, True)]

@@ -41,9 +41,8 @@ class Measured:
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks diameters", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("diameters")
     if data is None:
-        sys.stderr.write("diameters: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     calipers_mm = read_calipers(data / "kinect_apples" / "calipers.csv")
     with tempfile.TemporaryDirectory() as scratch:

@@ -150,9 +150,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--seeds", type=int, default=3, help="runs of each disturbance that chance has a part in")
     parser.add_argument("--cases", nargs="*", default=[], help="only cases whose names hold one of these; not written")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("disturbed")
     if data is None:
-        sys.stderr.write("disturbed: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     dates = [Date(data / "rendered_row" / date) for date in DATES]
     chosen = [case for case in CASES if not options.cases or any(part in case.name for part in options.cases)]

@@ -39,9 +39,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--frames", type=int, nargs="+", default=[40, 1000, 10000], help="lengths at 640x360")
     parser.add_argument("--large", type=int, nargs="+", default=[40, 400], help="lengths at 1280x720")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("endurance")
     if data is None:
-        sys.stderr.write("endurance: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     source = data / "rendered_row" / DATES[0]
     with tempfile.TemporaryDirectory() as scratch:

@@ -30,9 +30,8 @@ PUBLISHED_MM = 46.0
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks field", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("field")
     if data is None:
-        sys.stderr.write("field: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     folder = data / "field_rgbd"
     with (folder / "ground_truth_field_data.csv").open(newline="", encoding="utf-8") as file:

@@ -53,10 +53,7 @@ def main(arguments: list[str]) -> None:
     rows.sort(key=lambda row: (list(SEASONS).index(str(row["season"])), YEARS.index(str(row["years"]))))
     write_rows("growth.csv", rows)
     text = report(rows)
-    data = shared_data()
-    if data is None:
-        sys.stderr.write("growth: real apples skipped, no folder of recordings (set POMONA_DATA)\n")
-    else:
+    if (data := shared_data("growth: real apples")) is not None:
         text += season_apples(data / "season_apples") + kinect_apples(data)
     write_text("growth.md", text)
 

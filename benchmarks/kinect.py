@@ -36,9 +36,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
     parser.add_argument("--shipped", action="store_true", help="take the *_fruits.csv that came with the captures")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("kinect")
     if data is None:
-        sys.stderr.write("kinect: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     with tempfile.TemporaryDirectory() as scratch:
         clouds = shipped(data) if options.shipped else scanned(data, Path(scratch))

@@ -37,9 +37,8 @@ MIN_VIEWS = (1, 5, 10)
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks lifting", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("lifting")
     if data is None:
-        sys.stderr.write("lifting: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     with tempfile.TemporaryDirectory() as scratch:
         captures = rigid_rows(data, Path(scratch))

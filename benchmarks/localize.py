@@ -119,7 +119,7 @@ def record(outcomes: list[Outcome], text: str) -> None:
 
 def _rows() -> Iterator[Path]:
     yield EXAMPLES
-    if (data := shared_data()) is not None:
+    if (data := shared_data("localize: rendered row")) is not None:
         yield data / "rendered_row"
 
 

@@ -55,9 +55,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--parts", nargs="+", choices=("drawn", "models"))
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("metric")
     if data is None:
-        sys.stderr.write("metric: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     rows: list[dict[str, object]] = []
     for part, of in (("drawn", clouds_of), ("models", reconstructions_of)):

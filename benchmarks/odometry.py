@@ -46,9 +46,8 @@ class Drive:
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks odometry", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("odometry")
     if data is None:
-        sys.stderr.write("odometry: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     cv2.setNumThreads(2)
     rows, found = [], {}

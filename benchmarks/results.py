@@ -2,16 +2,20 @@
 
 import csv
 import os
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "results"
 
 
-def shared_data() -> Path | None:
-    """Find the real recordings: POMONA_DATA, or ../shared/data beside the checkout; None where there are none."""
+def shared_data(asking: str) -> Path | None:
+    """Find the real recordings: POMONA_DATA, or ../shared/data beside the checkout; None, and said, where are none."""
     folder = Path(os.environ.get("POMONA_DATA", Path(__file__).parents[2] / "shared" / "data"))
-    return folder if folder.is_dir() else None
+    if folder.is_dir():
+        return folder
+    sys.stderr.write(f"{asking}: skipped, no folder of recordings (set POMONA_DATA)\n")
+    return None
 
 
 def read_rows(name: str) -> list[dict[str, str]]:

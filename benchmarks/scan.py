@@ -61,9 +61,8 @@ class Scanned:
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks scan", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("scan")
     if data is None:
-        sys.stderr.write("scan: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     with tempfile.TemporaryDirectory() as scratch:
         scans = {

@@ -48,9 +48,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
     parser.add_argument("--tree", default="tree1", help="prefix of the files in season_apples")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("season")
     if data is None:
-        sys.stderr.write("season: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     folder = data / "season_apples"
     views = {

@@ -7,7 +7,6 @@ of growth stands beside the calipers. Writes season_map.csv, season_map.md and d
 """
 
 import argparse
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -54,9 +53,8 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks season_map", description=__doc__)
     parser.add_argument("--seeds", type=int, help="of the disturbed dates")
     options = parser.parse_args(arguments)
-    data = shared_data()
+    data = shared_data("season_map")
     if data is None:
-        sys.stderr.write("season_map: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     folder = data / "season_apples"
     views = {"in the plane of the balls": dated(folder, flat=True), "lifted": dated(folder, flat=False)}

@@ -93,7 +93,7 @@ def main(arguments: list[str]) -> None:
 
 
 def walks() -> Iterator[Walk]:
-    data = shared_data()
+    data = shared_data("slam: rendered rows")
     for date in RENDERED if data is not None else ():
         recording = open_recording(data / "rendered_row" / date)
         yield seen(

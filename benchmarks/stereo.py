@@ -52,9 +52,8 @@ FRUIT_COLUMNS = (
 
 def main(arguments: list[str]) -> None:
     argparse.ArgumentParser(prog="python -m benchmarks stereo", description=__doc__).parse_args(arguments)
-    data = shared_data()
+    data = shared_data("stereo")
     if data is None:
-        sys.stderr.write("stereo: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     fruits = [row for date in DATES for row in fruit_rows(date, data / "rendered_row" / date)]
     pixels = [row for name in PAIRS for row in pixel_rows(name, data / "middlebury" / name)]

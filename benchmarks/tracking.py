@@ -38,9 +38,8 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks tracking", description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="runs of each disturbance")
     seeds = parser.parse_args(arguments).seeds
-    data = shared_data()
+    data = shared_data("tracking")
     if data is None:
-        sys.stderr.write("tracking: skipped, no folder of recordings (set POMONA_DATA)\n")
         return
     rows, curve, drift, shown = [], [], [], []
     for date in DATES:
