@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from orchard_maker import frame_of_its_own
 from pomona import FruitCloud, geopackage
 from pomona.orchard import (
     OrchardMap,
@@ -36,8 +36,7 @@ def visit(number: int, day: str) -> Session:
     row = scene_pair("base", seed=number).map
     rng = np.random.default_rng([number, int(day[-2:])])
     seen = np.flatnonzero(rng.random(len(row)) < 0.8)
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    frame = frame_of_its_own(rng)
     places = row.positions[seen] + rng.normal(0, 0.01, (len(seen), 3))
     cloud = FruitCloud(places, ids=tuple(f"{number} {day} {fruit}" for fruit in seen.tolist()))
     return Session(f"{number} {day}", day, "drawn", cloud.transformed(frame))

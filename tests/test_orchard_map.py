@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from orchard_maker import frame_of_its_own
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.orchard import (
     FORMAT_VERSION,
@@ -25,11 +25,7 @@ from pomona.synth.clouds import scene_pair
 
 def turned(cloud: FruitCloud, seed: int) -> FruitCloud:
     """The cloud in a random other frame."""
-    rng = np.random.default_rng(seed)
-    transform = np.eye(4)
-    transform[:3, :3] = Rotation.random(rng=rng).as_matrix()
-    transform[:3, 3] = rng.uniform(-5, 5, 3)
-    return cloud.transformed(transform)
+    return cloud.transformed(frame_of_its_own(np.random.default_rng(seed)))
 
 
 def visit(cloud: FruitCloud, date: str, **about: object) -> Session:

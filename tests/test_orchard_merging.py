@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from command_line import Run, assert_refused
+from orchard_maker import frame_of_its_own, grow_map, who_is_who
 from pomona import FruitCloud, PomonaError, geopackage
-from pomona.orchard import OrchardMap, Session, add_session, add_sessions, merge_maps, merging, problems, recognising
+from pomona.orchard import OrchardMap, Session, add_session, merge_maps, merging, problems, recognising
 from pomona.orchard.writing import update_layers
 from pomona.store.opening import snapshot, writing
 from pomona.synth.clouds import scene_pair
@@ -30,8 +30,7 @@ def visit(row: FruitCloud, number: int, part: slice = slice(None)) -> Session:
     rng = np.random.default_rng(number)
     along = np.argsort(row.positions @ np.linalg.svd(row.positions - row.positions.mean(axis=0))[2][0])
     seen = along[part][rng.random(len(along[part])) < 0.75]
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    frame = frame_of_its_own(rng)
     cloud = FruitCloud(
         row.positions[seen] + rng.normal(0, 0.012, (len(seen), 3)),
         ids=tuple(f"{number}.{fruit}" for fruit in seen.tolist()),
@@ -47,19 +46,6 @@ def visits(row: FruitCloud) -> list[Session]:
     return [visit(row, number, stretch) for number, stretch in enumerate(stretches)]
 
 
-def grown(path: Path, visits: list[Session]) -> Path:
-    assert all(added.is_added for added in add_sessions(path, visits))
-    return path
-
-
-def who_is_who(path: Path) -> set[frozenset[str]]:
-    seen = OrchardMap(path).observations()
-    sights: dict[int, set[str]] = {}
-    for fruit, label in zip(seen.fruit_ids.tolist(), seen.labels, strict=True):
-        sights.setdefault(fruit, set()).add(str(label))
-    return set(map(frozenset, sights.values()))
-
-
 def states(path: Path) -> list[tuple[str, ...]]:
     extras = OrchardMap(path).fruits().extras
     return sorted(zip(extras["state"], extras["n_sessions"], extras["n_missed"], strict=True))
@@ -67,7 +53,7 @@ def states(path: Path) -> list[tuple[str, ...]]:
 
 @pytest.fixture(scope="module")
 def together(visits: list[Session], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return grown(tmp_path_factory.mktemp("together") / "orchard.gpkg", visits)
+    return grow_map(tmp_path_factory.mktemp("together") / "orchard.gpkg", visits)
 
 
 @pytest.mark.parametrize("ours", [[0, 1], [0, 2, 4], [3, 4], [0, 1, 2, 3]])
@@ -77,8 +63,8 @@ def test_a_merged_map_is_that_of_all_sessions(
 ) -> None:
     first = sorted({*ours, *shared})
     second = [number for number in range(5) if number not in ours or number in shared]
-    path = grown(tmp_path / "ours.gpkg", [visits[number] for number in first])
-    other = grown(tmp_path / "theirs.gpkg", [visits[number] for number in second])
+    path = grow_map(tmp_path / "ours.gpkg", [visits[number] for number in first])
+    other = grow_map(tmp_path / "theirs.gpkg", [visits[number] for number in second])
     kept = other.read_bytes()
     ids = dict(zip(OrchardMap(path).fruits().ids or (), OrchardMap(path).fruits().positions.tolist(), strict=True))
     merged = merge_maps(path, other)
@@ -98,7 +84,7 @@ def test_maps_whose_visits_do_not_match_by_themselves_are_joined_by_all_sights(
     row: FruitCloud, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     visits = [visit(row, number) for number in range(4)]
-    path, other = grown(tmp_path / "ours.gpkg", visits[:2]), grown(tmp_path / "theirs.gpkg", visits[2:])
+    path, other = grow_map(tmp_path / "ours.gpkg", visits[:2]), grow_map(tmp_path / "theirs.gpkg", visits[2:])
     for module in (merging, recognising):
         monkeypatch.setattr(module, "matches_between", lambda *_, **__: {})
     assert merge_maps(path, other).is_merged
@@ -109,8 +95,8 @@ def test_maps_whose_visits_do_not_match_by_themselves_are_joined_by_all_sights(
 
 
 def test_what_the_other_s_fruits_became_is_told_and_kept(visits: list[Session], tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:2])
-    other = grown(tmp_path / "theirs.gpkg", visits[2:])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:2])
+    other = grow_map(tmp_path / "theirs.gpkg", visits[2:])
     before = {str(i) for i in OrchardMap(path).fruits().ids or ()}
     merged = merge_maps(path, other)
     seen, theirs = OrchardMap(path).observations(), OrchardMap(other).observations()
@@ -125,9 +111,9 @@ def test_what_the_other_s_fruits_became_is_told_and_kept(visits: list[Session], 
 
 
 def test_maps_that_do_not_overlap_stay_as_they_are(visits: list[Session], tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:2])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:2])
     stranger = visit(scene_pair("base", seed=9).map, 4)
-    other = grown(tmp_path / "theirs.gpkg", [stranger])
+    other = grow_map(tmp_path / "theirs.gpkg", [stranger])
     before = path.read_bytes(), other.read_bytes()
     output = tmp_path / "merged.gpkg"
     assert not merge_maps(path, other).is_merged
@@ -137,8 +123,8 @@ def test_maps_that_do_not_overlap_stay_as_they_are(visits: list[Session], tmp_pa
 
 
 def test_into_another_file(visits: list[Session], together: Path, tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:3])
-    other = grown(tmp_path / "theirs.gpkg", visits[3:])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:3])
+    other = grow_map(tmp_path / "theirs.gpkg", visits[3:])
     before = path.read_bytes(), other.read_bytes()
     output = tmp_path / "merged.gpkg"
     assert merge_maps(path, other, output=output).is_merged
@@ -150,8 +136,8 @@ def test_into_another_file(visits: list[Session], together: Path, tmp_path: Path
 
 
 def test_all_sessions_in_both_changes_nothing(visits: list[Session], tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:3])
-    other = grown(tmp_path / "theirs.gpkg", [visits[2], visits[0]])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:3])
+    other = grow_map(tmp_path / "theirs.gpkg", [visits[2], visits[0]])
     before = who_is_who(path)
     merged = merge_maps(path, other)
     assert (merged.sessions, set(merged.shared)) == ((), {visits[0].name, visits[2].name})
@@ -167,10 +153,10 @@ def test_another_session_of_a_name_gets_another_name_which_is_told(
 ) -> None:
     called = ["row 1", "row 1 (theirs)", "row 1", "july", "row 1 (theirs)"]
     named = [replace(one, name=name) for one, name in zip(visits, called, strict=True)]
-    path = grown(tmp_path / "ours.gpkg", named[:2])
+    path = grow_map(tmp_path / "ours.gpkg", named[:2])
     # The first visit is in both, under two names; its name there is another one's here.
     first = replace(visits[0], name="row 1 (theirs, 2)")
-    other = grown(tmp_path / "theirs.gpkg", [first, named[2], named[3], named[4]])
+    other = grow_map(tmp_path / "theirs.gpkg", [first, named[2], named[3], named[4]])
     with writing(on_earth(other, 9.0), "map") as (connection, _):
         connection.execute("DELETE FROM changes")
         one = int((OrchardMap(other).fruits().ids or ())[0])
@@ -198,8 +184,8 @@ def test_another_session_of_a_name_gets_another_name_which_is_told(
 
 
 def test_names_that_changed_are_said_a_line_each(visits: list[Session], tmp_path: Path, run_here: Run) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:1])
-    other = grown(tmp_path / "theirs.gpkg", [replace(visits[2], name=DATES[0])])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:1])
+    other = grow_map(tmp_path / "theirs.gpkg", [replace(visits[2], name=DATES[0])])
     done = run_here("map", "merge", path, other)
     line = f"{DATES[0]}: another session is called so, here it is {DATES[0]} (theirs)"
     assert line in done.stdout.splitlines()
@@ -207,7 +193,7 @@ def test_names_that_changed_are_said_a_line_each(visits: list[Session], tmp_path
 
 def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Session], tmp_path: Path) -> None:
     strangers = [visit(scene_pair("base", seed=9).map, number) for number in (1, 3)]
-    path = grown(tmp_path / "orchard.gpkg", [visits[0]])
+    path = grow_map(tmp_path / "orchard.gpkg", [visits[0]])
     assert not add_session(path, strangers[0]).is_added
     added = add_session(path, strangers[0], new_part=True)
     assert (added.is_added, added.n_matched, added.n_new) == (True, 0, len(strangers[0].cloud))
@@ -215,7 +201,7 @@ def test_parts_that_know_nothing_of_each_other(row: FruitCloud, visits: list[Ses
     assert add_session(path, strangers[1]).n_matched > 50
     assert add_session(path, visits[4]).n_matched > 50
     # A part says nothing of the fruits of another: those of the row are as they would be alone.
-    only = grown(tmp_path / "row.gpkg", [visits[0], visits[4]])
+    only = grow_map(tmp_path / "row.gpkg", [visits[0], visits[4]])
     assert who_is_who(only) < who_is_who(path)
     row_labels = {label for fruit in who_is_who(only) for label in fruit}
     assert row_labels.isdisjoint({label for fruit in who_is_who(path) - who_is_who(only) for label in fruit})
@@ -229,10 +215,10 @@ def test_what_cannot_be_merged_is_said_in_a_line(
     tmp_path: Path,
     run_here: Run,
 ) -> None:
-    other = grown(tmp_path / "theirs.gpkg", [visits[2]])
+    other = grow_map(tmp_path / "theirs.gpkg", [visits[2]])
     again = {"june.svo2": "0" * 64}
-    path = grown(tmp_path / "made.gpkg", [replace(visits[0], input_hashes=again), visits[1]])
-    rescanned = grown(tmp_path / "rescanned.gpkg", [replace(visits[3], input_hashes=again)])
+    path = grow_map(tmp_path / "made.gpkg", [replace(visits[0], input_hashes=again), visits[1]])
+    rescanned = grow_map(tmp_path / "rescanned.gpkg", [replace(visits[3], input_hashes=again)])
     said = [
         (path, f"{path}: is the map itself, expected another one to merge with {path}"),
         (tmp_path / "none.gpkg", f"{tmp_path / 'none.gpkg'}: is not there, expected a session or a map (.gpkg)"),
@@ -310,8 +296,8 @@ def fruit_places(path: Path, table: str) -> dict[str, np.ndarray]:
 
 
 def test_trees_and_the_place_on_earth_come_along(visits: list[Session], tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:2])
-    other = on_earth(with_trees(grown(tmp_path / "theirs.gpkg", visits[2:])), 9.0)
+    path = grow_map(tmp_path / "ours.gpkg", visits[:2])
+    other = on_earth(with_trees(grow_map(tmp_path / "theirs.gpkg", visits[2:])), 9.0)
     merged = merge_maps(path, other)
     assert merged.left_out == ()
     assert problems(path) == []
@@ -334,8 +320,8 @@ def test_trees_and_the_place_on_earth_come_along(visits: list[Session], tmp_path
 
 
 def test_what_the_map_has_its_own_of_is_left_out_and_told(visits: list[Session], tmp_path: Path) -> None:
-    path = on_earth(with_trees(grown(tmp_path / "ours.gpkg", visits[:3])), 9.0)
-    other = on_earth(with_trees(grown(tmp_path / "theirs.gpkg", visits[3:])), 9.1)
+    path = on_earth(with_trees(grow_map(tmp_path / "ours.gpkg", visits[:3])), 9.0)
+    other = on_earth(with_trees(grow_map(tmp_path / "theirs.gpkg", visits[3:])), 9.1)
     before = asked(path, "SELECT id, geom, name FROM trees"), asked(path, "SELECT * FROM georeference")
     merged = merge_maps(path, other)
     assert merged.is_merged
@@ -346,8 +332,8 @@ def test_what_the_map_has_its_own_of_is_left_out_and_told(visits: list[Session],
 
 
 def test_history_comes_along_by_ids_that_nobody_else_gets(visits: list[Session], tmp_path: Path) -> None:
-    path = grown(tmp_path / "ours.gpkg", visits[:2])
-    other = grown(tmp_path / "theirs.gpkg", visits[2:])
+    path = grow_map(tmp_path / "ours.gpkg", visits[:2])
+    other = grow_map(tmp_path / "theirs.gpkg", visits[2:])
     known = int((OrchardMap(other).fruits().ids or ())[0])
     with writing(other, "map") as (connection, _):
         connection.execute("DELETE FROM changes")

@@ -13,6 +13,7 @@ import numpy as np
 import pyogrio
 import pytest
 
+from orchard_maker import write_two_sessions
 from pomona import FruitCloud, PomonaError, atomic
 from pomona.orchard import OrchardMap, add_session, load_session, problems, write_session
 from pomona.synth.clouds import scene_pair
@@ -39,11 +40,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.fixture(scope="module")
 def visits(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Session files of two visits to one row."""
-    folder = tmp_path_factory.mktemp("visits")
-    pair = scene_pair("base", seed=3)
-    write_session(folder / "august.gpkg", pair.map, name="august", date="2024-08-01", recording="test")
-    write_session(folder / "september.gpkg", pair.query, name="september", date="2024-09-01", recording="test")
-    return folder / "august.gpkg", folder / "september.gpkg"
+    return write_two_sessions(tmp_path_factory.mktemp("visits"))
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from orchard_maker import frame_of_its_own, who_is_who
 from pomona import FruitCloud
-from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session, seen_parts
+from pomona.orchard import Session, add_session, problems, remove_session, seen_parts
 from pomona.orchard.adding import _beside, _join
 from pomona.orchard.evidence import Evidence
 from pomona.orchard.parts import parts_of_map
@@ -25,8 +25,7 @@ def visit(number: int, low: float, high: float) -> Session:
     along = row.positions @ np.linalg.svd(row.positions - row.positions.mean(axis=0))[2][0]
     from_m, to_m = np.quantile(along, (low, high))
     seen = np.flatnonzero((from_m <= along) & (along <= to_m) & (rng.random(len(row)) < 0.8))
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    frame = frame_of_its_own(rng)
     cloud = FruitCloud(
         row.positions[seen] + rng.normal(0, 0.01, (len(seen), 3)),
         ids=tuple(f"{number}.{fruit}" for fruit in seen.tolist()),
@@ -56,14 +55,6 @@ def two_parts(path: Path, visits: list[Session]) -> Path:
 def n_parts(path: Path) -> int:
     with snapshot(path) as (connection, _):
         return len(parts_of_map(connection))
-
-
-def who_is_who(path: Path) -> set[frozenset[str]]:
-    seen = OrchardMap(path).observations()
-    sights: dict[int, set[str]] = {}
-    for fruit, label in zip(seen.fruit_ids.tolist(), seen.labels, strict=True):
-        sights.setdefault(fruit, set()).add(str(label))
-    return set(map(frozenset, sights.values()))
 
 
 def test_a_visit_that_saw_two_parts_makes_one_of_them(visits: list[Session], tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from orchard_maker import frame_of_its_own
 from pomona import FruitCloud, PomonaError, Views, geopackage
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.synth.clouds import scene_pair
@@ -26,8 +26,7 @@ def visit(scene: FruitCloud, date: str, seed: int) -> Session:
     seen = scene.select(np.sort(rng.choice(len(scene), len(scene) * 9 // 10, replace=False)))
     sizes = np.where(rng.random(len(seen)) < 0.2, np.nan, seen.diameters_m * 1.1)  # type: ignore[operator]
     shifted = replace(seen, positions=seen.positions + rng.normal(0, 0.004, (len(seen), 3)), diameters_m=sizes)
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    frame = frame_of_its_own(rng)
     views = Views(frames=np.array([0, 1]), fruits=np.array([0, 1]))
     poses = Trajectory(np.array([0, 1]), np.array([0.0, 0.1]), np.tile(np.eye(4), (2, 1, 1)))
     return Session(date, date, "test", replace(shifted.transformed(frame), views=views), poses)

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from command_line import POMONA, assert_refused
+from orchard_maker import write_two_sessions
 from pomona import PomonaError
-from pomona.orchard import OrchardMap, add_session, load_session, problems, write_session
-from pomona.synth.clouds import scene_pair
+from pomona.orchard import OrchardMap, add_session, load_session, problems
 
 # `map add` in a process that kills itself at statement N of its connection, for good: no handler runs, no file is
 # closed. With a cache of ten pages SQLite writes into the map itself long before the commit.
@@ -47,11 +47,7 @@ print(statements)
 @pytest.fixture(scope="module")
 def visits(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Session files of two visits to one row."""
-    folder = tmp_path_factory.mktemp("visits")
-    pair = scene_pair("base", seed=3)
-    write_session(folder / "august.gpkg", pair.map, name="august", date="2024-08-01", recording="test")
-    write_session(folder / "september.gpkg", pair.query, name="september", date="2024-09-01", recording="test")
-    return folder / "august.gpkg", folder / "september.gpkg"
+    return write_two_sessions(tmp_path_factory.mktemp("visits"))
 
 
 @pytest.fixture(scope="module")

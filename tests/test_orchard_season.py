@@ -1,13 +1,12 @@
 """A map over a season: the same whatever came first, whoever went and came again."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from command_line import Run, assert_refused
+from orchard_maker import frame_of_its_own, grow_map, who_is_who
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.orchard import (
     Change,
@@ -36,8 +35,7 @@ def visit(row: FruitCloud, number: int, shows: np.ndarray | None = None) -> Sess
     sizes = (0.03 + 0.01 * number) * np.exp(np.random.default_rng(99).normal(0, 0.1, len(row))[seen])
     places = row.positions[seen] + rng.normal(0, 0.012, (len(seen), 3))
     strays = rng.uniform(row.positions.min(axis=0), row.positions.max(axis=0), (8, 3))
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+    frame = frame_of_its_own(rng)
     cloud = FruitCloud(
         np.vstack([places, strays]),
         ids=tuple(f"{number}.{fruit}" for fruit in [*seen.tolist(), *range(1000, 1008)]),
@@ -49,20 +47,6 @@ def visit(row: FruitCloud, number: int, shows: np.ndarray | None = None) -> Sess
 @pytest.fixture(scope="module")
 def visits(row: FruitCloud) -> list[Session]:
     return [visit(row, number) for number in range(4)]
-
-
-def grown(path: Path, visits: Sequence[Session]) -> Path:
-    assert all(added.is_added for added in add_sessions(path, visits))
-    return path
-
-
-def who_is_who(path: Path) -> set[frozenset[str]]:
-    """The sights of each fruit, by the names that the visits gave them."""
-    seen = OrchardMap(path).observations()
-    sights: dict[int, set[str]] = {}
-    for fruit, label in zip(seen.fruit_ids.tolist(), seen.labels, strict=True):
-        sights.setdefault(fruit, set()).add(str(label))
-    return set(map(frozenset, sights.values()))
 
 
 def judged(path: Path) -> dict[str, tuple[str, ...]]:
@@ -77,7 +61,7 @@ def judged(path: Path) -> dict[str, tuple[str, ...]]:
 @pytest.fixture(scope="module")
 def season(visits: list[Session], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A map to which the visits came in the order of their dates; nobody writes to it."""
-    return grown(tmp_path_factory.mktemp("season") / "orchard.gpkg", visits)
+    return grow_map(tmp_path_factory.mktemp("season") / "orchard.gpkg", visits)
 
 
 def test_a_fruit_has_one_identity_through_the_season(season: Path) -> None:
@@ -93,7 +77,7 @@ def test_a_fruit_has_one_identity_through_the_season(season: Path) -> None:
 def test_the_order_of_adding_changes_nothing(
     season: Path, visits: list[Session], order: tuple[int, ...], tmp_path: Path
 ) -> None:
-    other = grown(tmp_path / "orchard.gpkg", [visits[number] for number in order])
+    other = grow_map(tmp_path / "orchard.gpkg", [visits[number] for number in order])
     assert who_is_who(other) == who_is_who(season)
     assert judged(other) == judged(season)
     assert problems(other) == []
@@ -112,7 +96,7 @@ def test_one_that_goes_and_comes_again_leaves_all_as_it_was(
     path.write_bytes(season.read_bytes())
     assert remove_session(path, DATES[number]) is not None
     assert problems(path) == []
-    without = grown(tmp_path / "without.gpkg", [one for one in visits if one.name != DATES[number]])
+    without = grow_map(tmp_path / "without.gpkg", [one for one in visits if one.name != DATES[number]])
     assert who_is_who(path) == who_is_who(without)
     assert judged(path) == judged(without)
     assert add_session(path, visits[number]).is_added
@@ -243,7 +227,7 @@ def test_gone_is_what_was_thinned(row: FruitCloud, tmp_path: Path) -> None:
     thinned = rng.random(len(row)) < 0.3
     shows = [rng.random(len(row)) < 0.93 for _ in range(4)]
     visits = [visit(row, number, mask & ~(thinned & (number > 1))) for number, mask in enumerate(shows)]
-    path = grown(tmp_path / "orchard.gpkg", visits)
+    path = grow_map(tmp_path / "orchard.gpkg", visits)
     by_fruit = {label.split(".")[1]: facts[0] for label, facts in judged(path).items()}
     said = {int(name) for name, state in by_fruit.items() if state == "gone" and int(name) < len(row)}
     hung = {int(name) for name in by_fruit if int(name) < len(row)}

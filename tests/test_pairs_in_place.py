@@ -4,8 +4,8 @@ from dataclasses import replace
 from datetime import date, timedelta
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from orchard_maker import frame_of_its_own
 from pomona import FruitCloud
 from pomona.identity import VisitPair
 from pomona.orchard import Session
@@ -18,8 +18,7 @@ def orchard_seen(seen_by: list[list[int]], places: np.ndarray) -> tuple[list[Kno
     rng = np.random.default_rng(2)
     visits, frames = [], []
     for number, rows in enumerate(seen_by):
-        frame = np.eye(4)
-        frame[:3, :3], frame[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.uniform(-5, 5, 3)
+        frame = frame_of_its_own(rng)
         there = places[rows] + rng.normal(0, 0.005, (len(rows), 3))
         cloud = FruitCloud(there, diameters_m=np.full(len(rows), 0.06)).transformed(np.linalg.inv(frame))
         day = (date(2024, 7, 1) + timedelta(days=14 * number)).isoformat()
