@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pomona import FruitCloud, PomonaError, PomonaWarning
 from pomona.cloud import csv_file
+from refusal import refused_of
 
 
 def write(folder: Path, text: str) -> Path:
@@ -19,13 +20,7 @@ def write(folder: Path, text: str) -> Path:
 
 def refusal(folder: Path, text: str) -> str:
     """The one line after the name of the file."""
-    path = write(folder, text)
-    with pytest.raises(PomonaError) as caught:
-        FruitCloud.read(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    return message.removeprefix(f"{path}: ")
+    return refused_of(write(folder, text), FruitCloud.read)
 
 
 def test_everything_but_the_sightings_reads_back_the_same(tmp_path: Path, full_cloud: FruitCloud) -> None:

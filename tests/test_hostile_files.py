@@ -21,33 +21,23 @@ import zstandard
 
 from bag_maker import stereo, write_bag
 from onnx_maker import yolov8
-from pomona import FruitCloud, PomonaError, PomonaWarning
+from pomona import FruitCloud, PomonaWarning
 from pomona.detect.from_file import FileDetector
 from pomona.detect.onnx import OnnxDetector
 from pomona.pairs import read_pairs
 from pomona.recording import Calibration, open_recording
 from pomona.recording.bags.unpacked import MOST_CHUNK_BYTES, UnpackError, unpacked
 from pomona.recording.calibration.rig_files import find_optics
-from pomona.recording.checks.readable import unreadable_frames
+from pomona.recording.checks.readable import checked
 from pomona.recording.picture_size import encoded_size
 from pomona.settings import Settings
 from recording_maker import FIELDS, make_recording
+from refusal import refused
 
 LITTLE_BYTES = 1 << 30
 """A process may take so much more than it has when pomona is loaded: bombs here want three times that and more."""
 
 CAMERA = Calibration(640, 480, 600.0, 600.0, 320.0, 240.0)
-
-
-def refused(read, *parts: str) -> str:
-    with pytest.raises(PomonaError) as caught:
-        read()
-    line = str(caught.value)
-    assert "\n" not in line
-    assert len(line) < 1000
-    for part in parts:
-        assert part in line, line
-    return line
 
 
 def in_little_memory(code: str, *arguments: object) -> str:
@@ -58,7 +48,7 @@ def in_little_memory(code: str, *arguments: object) -> str:
         import cv2, numpy
         from pomona import PomonaError, PomonaWarning, FruitCloud
         from pomona.recording import open_recording
-        from pomona.recording.checks.readable import unreadable_frames
+        from pomona.recording.checks.readable import checked
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         most = pages * resource.getpagesize() + {LITTLE_BYTES}
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -113,7 +103,7 @@ def pictures(tmp_path):
 
 def test_a_picture_of_a_gigapixel_costs_its_frame_and_no_memory(pictures):
     (pictures / "left" / "0001.png").write_bytes(png_of(30_000, 30_000))
-    printed = in_little_memory("print(unreadable_frames(open_recording(path)))", pictures)
+    printed = in_little_memory("print(checked(open_recording(path)).unreadable)", pictures)
     assert "found 30000x30000 pixels, expected 640x480 as in the calibration" in printed
     assert printed.startswith("{1: ")
 
@@ -337,7 +327,7 @@ def test_pictures_behind_links_are_taken(pictures, tmp_path):
     shutil.move(pictures / "left", tmp_path / "elsewhere")
     (pictures / "left").symlink_to(tmp_path / "elsewhere")
     (tmp_path / "link").symlink_to(pictures)
-    assert unreadable_frames(open_recording(tmp_path / "link")) == {}
+    assert checked(open_recording(tmp_path / "link")).unreadable == {}
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "/etc/passwd", "..\\..\\x.png", "C:\\x.png", "left/../../x.png"])

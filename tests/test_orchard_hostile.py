@@ -14,6 +14,7 @@ from pomona import PomonaError
 from pomona.orchard import OrchardMap, add_session, load_session, problems, remove_session
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
+from refusal import refused_of
 
 MAGIC = b"SQLite format 3\0"
 
@@ -50,16 +51,10 @@ def change(path: Path, script: str) -> None:
 def refusal(path: Path) -> str:
     """What every reader and writer says, and that the file stays as it is."""
     before = path.read_bytes()
-    said = set()
-    for use in (problems, lambda path: OrchardMap(path).fruits(), lambda path: remove_session(path, "a")):
-        with pytest.raises(PomonaError) as caught:
-            use(path)
-        said.add(str(caught.value))
-    (line,) = said
-    assert line.startswith(f"{path}: ")
-    assert "\n" not in line
+    uses = (problems, lambda path: OrchardMap(path).fruits(), lambda path: remove_session(path, "a"))
+    (line,) = {refused_of(path, use) for use in uses}
     assert path.read_bytes() == before
-    return line.removeprefix(f"{path}: ")
+    return line
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from pomona import FruitCloud, PomonaError, geopackage
 from pomona.fruit_crop import FruitCrop
 from pomona.orchard import load_session, problems, read_session, write_session
 from pomona.trajectory import Trajectory
+from refusal import refused_of
 
 
 @pytest.fixture(scope="session")
@@ -180,12 +181,7 @@ def change(path: Path, statement: str) -> None:
 
 
 def refusal(path: Path) -> str:
-    with pytest.raises(PomonaError) as caught:
-        FruitCloud.read(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    return message.removeprefix(f"{path}: ")
+    return refused_of(path, FruitCloud.read)
 
 
 def test_a_newer_format_is_refused(session_file: Path) -> None:

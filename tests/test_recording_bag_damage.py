@@ -20,7 +20,7 @@ from bag_maker import (
 from pomona import PomonaWarning
 from pomona.recording import open_recording
 from pomona.recording.bags import mcap_file
-from pomona.recording.checks.readable import unreadable_frames
+from pomona.recording.checks.readable import checked
 
 OTHER_EYE = np.uint8(64)
 """What the right pictures differ by: a pair of one picture is refused."""
@@ -34,7 +34,7 @@ def test_a_corrupt_picture_in_the_middle_is_counted_and_named(tmp_path):
             content = cv2.imencode(".jpg" if row % 2 else ".png", picture(row))[1].tobytes()
             cut = content[:-30] if side == "left" and row in (1, 2) else content
             entries.append(compressed(f"/stereo/{side}/image_rect/compressed", at, "jpeg", cut))
-    bad = unreadable_frames(open_recording(write_bag(tmp_path / "row", entries, "ros1")))
+    bad = checked(open_recording(write_bag(tmp_path / "row", entries, "ros1"))).unreadable
     assert list(bad) == [1, 2]
     assert "/stereo/left/image_rect/compressed: picture 1: the JPEG is cut off" in bad[1]
 
@@ -44,7 +44,7 @@ def test_a_picture_of_another_size_or_too_few_bytes(tmp_path):
     lefts = [entry for entry in entries if entry[0] == "/stereo/left/image_rect_color"]
     lefts[1][3].update(image("", 0, picture(1, (32, 24)), "bgr8")[3] | {"stamp_ns": lefts[1][3]["stamp_ns"]})
     lefts[2][3]["data"] = lefts[2][3]["data"][:100]
-    bad = unreadable_frames(open_recording(write_bag(tmp_path / "row", entries, "sqlite3")))
+    bad = checked(open_recording(write_bag(tmp_path / "row", entries, "sqlite3"))).unreadable
     assert list(bad) == [1, 2]
     assert "found 32x24 pixels, expected 64x48 as the first one" in bad[1]
     assert "found 100 bytes" in bad[2]
@@ -170,7 +170,7 @@ def test_a_damaged_chunk_of_a_closed_bag(tmp_path):
         frames = list(recording.frames())
     assert sum("is damaged and left out" in str(warning.message) for warning in caught) == 1
     assert 50 < len(recording) == len(frames) < 200
-    assert unreadable_frames(recording) == {}
+    assert checked(recording).unreadable == {}
 
 
 @pytest.mark.filterwarnings("ignore:.*others are left out")

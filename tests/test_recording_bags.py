@@ -21,7 +21,7 @@ from bag_maker import (
     write_bag,
 )
 from pomona.recording import open_recording, selected
-from pomona.recording.checks.readable import unreadable_frames
+from pomona.recording.checks.readable import checked
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -36,7 +36,7 @@ def test_a_pair_comes_out_to_the_bit(tmp_path, form):
     assert (recording.name, recording.date) == ("2024-08-09_row", "2024-08-09")
     assert recording.calibration.baseline_m == pytest.approx(0.12)
     assert recording.calibration.cx == SIZE[0] / 2
-    assert unreadable_frames(recording) == {}
+    assert checked(recording).unreadable == {}
 
 
 @pytest.mark.parametrize("form", FORMATS)

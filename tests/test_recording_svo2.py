@@ -12,7 +12,7 @@ from mcap.writer import Writer
 
 from pomona import PomonaError, PomonaWarning
 from pomona.recording import open_recording, selected
-from pomona.recording.checks.readable import unreadable_frames
+from pomona.recording.checks.readable import checked
 
 SIZE = (672, 376)
 SERIAL = 38486288
@@ -164,7 +164,7 @@ def test_times_that_go_back_are_refused(row):
 def test_a_picture_that_is_cut_off_costs_what_is_built_on_it(row):
     svo2 = write_svo2(row / "row.svo2", change=lambda number, body: body[:30] if number == 15 else body)
     recording = open_recording(svo2)
-    bad = unreadable_frames(recording)
+    bad = checked(recording).unreadable
     assert 15 in bad
     assert set(bad) <= set(range(15, 20))
     assert "row.svo2: frame 15 at" in bad[15]
@@ -177,7 +177,7 @@ def test_an_svo2_that_was_cut_off_is_used_as_far_as_it_goes(row):
     with pytest.warns(PomonaWarning, match=r"row\.svo2: cut off"):
         recording = open_recording(svo2)
     assert 10 < len(recording) < 50
-    assert unreadable_frames(recording) == {}
+    assert checked(recording).unreadable == {}
 
 
 def test_the_calibration_is_that_of_the_serial_number(row):
