@@ -5,15 +5,20 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from command_line import Pomona, Run
+from growth_maker import HARVEST, GrownRow, grow_row
+from page_maker import chromium
 from pomona import FruitCloud, Views
 from pomona.cli import main
+from pomona.growth.season_growth import SeasonGrowth, grow_season
 from pomona.orchard import add_session, load_session, write_session
 from pomona.synth.clouds import scene_pair
 from recording_maker import make_recording
@@ -96,3 +101,22 @@ def here(season: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = Path(shutil.copytree(season, tmp_path / "season"))
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def grown_row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    """Four visits to three trees; nobody writes to the map."""
+    return grow_row(tmp_path_factory.mktemp("grown_row") / "orchard.gpkg")
+
+
+@pytest.fixture(scope="session")
+def row_growth(grown_row: GrownRow) -> SeasonGrowth:
+    """How its fruits grow, foretold for the harvest."""
+    return grow_season(grown_row.path, harvest=HARVEST)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """One for all tests of a file."""
+    with chromium() as running:
+        yield running

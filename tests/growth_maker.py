@@ -13,6 +13,7 @@ from pomona.orchard import Session, add_session
 from pomona.synth.living.fruit_curves import FruitCurves
 
 BLOOM = date(2024, 4, 25)
+HARVEST = BLOOM + timedelta(days=135)
 FRUITS_OF_TREE = 30
 
 

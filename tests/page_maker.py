@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from pomona.viewer.built_page import built_page, report_of
+
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox")
 """WebGL without a graphics card, and in a container."""
@@ -27,6 +29,12 @@ def served(orchard: Path, *flags: str) -> Iterator[str]:
             yield line.strip()
         finally:
             process.terminate()
+
+
+def write_page(path: Path, document: dict[str, Any]) -> str:
+    """Write a page that shows a document; give its address."""
+    path.write_text(report_of(built_page(), document), encoding="utf-8")
+    return path.as_uri()
 
 
 @contextmanager

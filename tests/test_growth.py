@@ -12,7 +12,7 @@ from benchmarks.growth_scores import scores
 from numpy.typing import NDArray
 
 from command_line import Pomona
-from growth_maker import BLOOM, GrownRow, grow_row, rows_of
+from growth_maker import BLOOM, HARVEST, GrownRow, grow_row, rows_of
 from pomona import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.blocks import Block, blocks_of
@@ -28,18 +28,6 @@ from pomona.growth.size_table import SizeTable
 from pomona.growth.straying import SPELL_DAYS, straying
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.synth.seasons import SEASONS
-
-HARVEST = BLOOM + timedelta(days=135)
-
-
-@pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
-    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
-
-
-@pytest.fixture(scope="module")
-def grown(row: GrownRow) -> SeasonGrowth:
-    return grow_season(row.path, harvest=HARVEST)
 
 
 def true_of(row: GrownRow, grown: SeasonGrowth, days: float) -> np.ndarray:
@@ -146,13 +134,13 @@ def test_slopes_are_those_of_the_curves(family) -> None:
     assert np.isfinite(family.log_size(np.array([-1e4, 1e4]))).all()
 
 
-def test_sizes_rates_and_forecasts_are_near_the_truth(row: GrownRow, grown: SeasonGrowth) -> None:
-    told = grown.foretold
-    rates = true_of(row, grown, 95.5) - true_of(row, grown, 94.5)
+def test_sizes_rates_and_forecasts_are_near_the_truth(grown_row: GrownRow, row_growth: SeasonGrowth) -> None:
+    told = row_growth.foretold
+    rates = true_of(grown_row, row_growth, 95.5) - true_of(grown_row, row_growth, 94.5)
     assert np.median(np.abs(told.rates_mm_per_day - rates)) < 0.03
-    assert np.abs(told.sizes_mm[:, 3] - true_of(row, grown, 95)).mean() < 1.5
+    assert np.abs(told.sizes_mm[:, 3] - true_of(grown_row, row_growth, 95)).mean() < 1.5
     low, high = told.lows_mm[:, -1], told.highs_mm[:, -1]
-    true = true_of(row, grown, 135)
+    true = true_of(grown_row, row_growth, 135)
     assert np.mean((low < true) & (true < high)) > 0.8
     mean = told.summaries["blocks"][:, 0, -2]
     assert np.quantile(mean, 0.05) < true.mean() < np.quantile(mean, 0.95)
@@ -169,26 +157,26 @@ def test_what_no_curve_foretells_is_in_the_interval() -> None:
     assert found["fruits_covered"] > 0.8 * found["n_fruits"]
 
 
-def test_a_forecast_is_the_wider_the_farther_ahead(grown: SeasonGrowth) -> None:
-    soon = growth_of(grown.fruits, harvest=BLOOM + timedelta(days=105)).foretold
-    logs = [np.log(told.summaries["blocks"][:, 0, -2]) for told in (soon, grown.foretold)]
+def test_a_forecast_is_the_wider_the_farther_ahead(row_growth: SeasonGrowth) -> None:
+    soon = growth_of(row_growth.fruits, harvest=BLOOM + timedelta(days=105)).foretold
+    logs = [np.log(told.summaries["blocks"][:, 0, -2]) for told in (soon, row_growth.foretold)]
     # What all visits share is as wide on every day.
     spreads = [np.sqrt(each.var() - CAMERA_SPREAD**2) for each in logs]
     assert spreads[1] > 1.4 * spreads[0]
-    assert sum(curve.weight for curve in grown.curves) == pytest.approx(1.0)
-    assert len(grown.curves) == len(FAMILIES)
+    assert sum(curve.weight for curve in row_growth.curves) == pytest.approx(1.0)
+    assert len(row_growth.curves) == len(FAMILIES)
 
 
-def test_the_error_that_a_visit_shares_is_told(grown: SeasonGrowth) -> None:
-    told = np.log(grown.foretold.scales)
+def test_the_error_that_a_visit_shares_is_told(row_growth: SeasonGrowth) -> None:
+    told = np.log(row_growth.foretold.scales)
     assert np.corrcoef(told - told.mean(), np.log([1.0, 1.02, 0.99, 1.01]))[0, 1] > 0.8
-    assert grown.curve.fitted.likeliest.noise_mm == pytest.approx(1.0, abs=0.15)
+    assert row_growth.curve.fitted.likeliest.noise_mm == pytest.approx(1.0, abs=0.15)
 
 
-def test_the_same_map_gives_the_same_growth(row: GrownRow, grown: SeasonGrowth) -> None:
-    again = grow_season(row.path, harvest=HARVEST)
-    np.testing.assert_array_equal(again.foretold.sizes_mm, grown.foretold.sizes_mm)
-    np.testing.assert_array_equal(again.foretold.summaries["counts"], grown.foretold.summaries["counts"])
+def test_the_same_map_gives_the_same_growth(grown_row: GrownRow, row_growth: SeasonGrowth) -> None:
+    again = grow_season(grown_row.path, harvest=HARVEST)
+    np.testing.assert_array_equal(again.foretold.sizes_mm, row_growth.foretold.sizes_mm)
+    np.testing.assert_array_equal(again.foretold.summaries["counts"], row_growth.foretold.summaries["counts"])
 
 
 def _exact_sizes(family: CurveFamily, rate_per_day: float, times: NDArray[np.float64]) -> SizeTable:
@@ -217,20 +205,20 @@ def test_rounding_does_not_end_the_climb(family: CurveFamily) -> None:
     assert fits[0].likeliest.rate_per_day == pytest.approx(fits[1].likeliest.rate_per_day, rel=0.01)
 
 
-def test_a_size_of_another_fruit_is_put_aside(tmp_path: Path, row: GrownRow, grown: SeasonGrowth) -> None:
-    sizes_mm = grown.fruits.diameters_mm.copy()
+def test_a_size_of_another_fruit_is_put_aside(tmp_path: Path, grown_row: GrownRow, row_growth: SeasonGrowth) -> None:
+    sizes_mm = row_growth.fruits.diameters_mm.copy()
     sizes_mm[7, 2] += 25.0
-    found = growth_of(replace(grown.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
+    found = growth_of(replace(row_growth.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
     assert found.put_aside[7, 2]
     assert found.odd[7]
     assert found.put_aside.sum() <= 2
-    assert found.foretold.sizes_mm[7, -1] == pytest.approx(grown.foretold.sizes_mm[7, -1], abs=2.0)
+    assert found.foretold.sizes_mm[7, -1] == pytest.approx(row_growth.foretold.sizes_mm[7, -1], abs=2.0)
 
 
 @pytest.mark.parametrize("n", [1, 2])
-def test_few_fruits_and_no_growth_have_curves_too(grown: SeasonGrowth, n: int) -> None:
+def test_few_fruits_and_no_growth_have_curves_too(row_growth: SeasonGrowth, n: int) -> None:
     """Priors carry what two sizes cannot; equal sizes are no division by nothing."""
-    few = grown.fruits
+    few = row_growth.fruits
     some = replace(
         few,
         cloud=few.cloud.select(np.arange(n)),
@@ -253,8 +241,8 @@ def test_a_visit_of_another_scale_is_carried_by_its_shared_error(tmp_path: Path)
     assert found.foretold.scales[0] > 1.5
 
 
-def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
-    fruits = grown.fruits
+def test_fruits_that_are_gone_count_in_no_block(row_growth: SeasonGrowth) -> None:
+    fruits = row_growth.fruits
     states = tuple("gone" if row < 40 else "seen" for row in range(90))
     cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": states})
     found = blocks_of(replace(fruits, cloud=cloud))
@@ -268,14 +256,14 @@ def test_fruits_that_are_gone_count_in_no_block(grown: SeasonGrowth) -> None:
 
 
 def test_fruits_of_no_tree_are_a_block_where_others_have_one(
-    pomona: Pomona, row: GrownRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pomona: Pomona, grown_row: GrownRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def told_otherwise(cloud: FruitCloud) -> BearingTrees:
         numbers = np.repeat([0, 1, 2], [30, 55, 5])
         return BearingTrees(("1", "tree 2", ""), numbers, cloud.positions[:, 0], ("", "", ""))
 
     monkeypatch.setattr("pomona.growth.measured.bearing_trees", told_otherwise)
-    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g")
+    code, printed, told = pomona("growth", grown_row.path, "-o", tmp_path / "g")
     assert (code, told) == (0, "")
     lines = {line[:20].strip(): int(line.split()[-3]) for line in printed.splitlines()[-4:]}
     assert lines == {"all": 90, "tree 1": 30, "tree 2": 55, "no tree": 5}
@@ -289,9 +277,9 @@ def judged(grown: SeasonGrowth, **extras: tuple[str, ...]) -> MeasuredFruits:
     return replace(grown.fruits, cloud=replace(grown.fruits.cloud, extras=extras))
 
 
-def test_each_counts_by_the_probability_that_it_is_a_fruit_and_hangs(grown: SeasonGrowth) -> None:
+def test_each_counts_by_the_probability_that_it_is_a_fruit_and_hangs(row_growth: SeasonGrowth) -> None:
     fruits = judged(
-        grown,
+        row_growth,
         state=("seen", "new", "missed", "missed", "gone", "gone") + ("seen",) * 84,
         state_probability=("0.9", "0.3", "0.1", "", "0.8", "") + ("1.0",) * 84,
         fruit_probability=("0.9", "0.3", "0.5", "0.6", "0.5", "1.0") + ("1.0",) * 84,
@@ -305,17 +293,19 @@ def test_each_counts_by_the_probability_that_it_is_a_fruit_and_hangs(grown: Seas
     assert found[1].mean_of(sizes_mm) == pytest.approx((1.95 * 10.0 + 24 * 60.0) / 25.95)
 
 
-def test_trees_on_which_half_a_fruit_is_expected_are_no_block(grown: SeasonGrowth) -> None:
+def test_trees_on_which_half_a_fruit_is_expected_are_no_block(row_growth: SeasonGrowth) -> None:
     """Two of three trees were picked: of their fruits the map says missed, and that one in a hundred hangs."""
     states, sure = ("missed",) * 60 + ("seen",) * 30, ("0.01",) * 60 + ("1.0",) * 30
-    assert [block.n_fruits for block in blocks_of(judged(grown, state=states, state_probability=sure))] == [31, 30]
-    assert [block.n_fruits for block in blocks_of(judged(grown, state=states))] == [90, 30, 30, 30]
+    assert [block.n_fruits for block in blocks_of(judged(row_growth, state=states, state_probability=sure))] == [31, 30]
+    assert [block.n_fruits for block in blocks_of(judged(row_growth, state=states))] == [90, 30, 30, 30]
 
 
-def test_counts_kilograms_and_classes_hold_the_doubt_of_what_hangs(grown: SeasonGrowth) -> None:
+def test_counts_kilograms_and_classes_hold_the_doubt_of_what_hangs(row_growth: SeasonGrowth) -> None:
     """Of 60 missed fruits one in ten hangs: 36 are expected with the spread of 60 lots, and no 90."""
-    picked = judged(grown, state=("missed",) * 60 + ("seen",) * 30, state_probability=("0.1",) * 60 + ("1.0",) * 30)
-    found, sure = growth_of(picked, harvest=HARVEST), grown.foretold.summaries
+    picked = judged(
+        row_growth, state=("missed",) * 60 + ("seen",) * 30, state_probability=("0.1",) * 60 + ("1.0",) * 30
+    )
+    found, sure = growth_of(picked, harvest=HARVEST), row_growth.foretold.summaries
     told = found.foretold.summaries
     spread = np.sqrt(60 * 0.1 * 0.9)
     n_fruits = told["n_fruits"][:, 0]
@@ -328,14 +318,14 @@ def test_counts_kilograms_and_classes_hold_the_doubt_of_what_hangs(grown: Season
     of_classes, kg, kg_of_all = told["counts"][:, :, -1], told["masses_kg"][:, :, -1], sure["masses_kg"][:, :, -1]
     assert of_classes.mean(axis=0).sum() == pytest.approx(36, abs=0.5)
     assert kg.mean(axis=0).sum() / kg_of_all.mean(axis=0).sum() == pytest.approx(36 / 90, rel=0.1)
-    np.testing.assert_array_equal(found.foretold.sizes_mm, grown.foretold.sizes_mm, "forecasts of fruits stay")
+    np.testing.assert_array_equal(found.foretold.sizes_mm, row_growth.foretold.sizes_mm, "forecasts of fruits stay")
 
 
-def test_an_error_that_all_visits_share_is_in_the_intervals(grown: SeasonGrowth) -> None:
+def test_an_error_that_all_visits_share_is_in_the_intervals(row_growth: SeasonGrowth) -> None:
     """Of one camera: all sizes 3 % too large move all that is told, and stay inside; differences hardly widen."""
-    larger = growth_of(replace(grown.fruits, diameters_mm=1.03 * grown.fruits.diameters_mm), harvest=HARVEST)
-    now = len(grown.fruits.days) - 1
-    true = grown.foretold.sizes_mm[:, now]
+    larger = growth_of(replace(row_growth.fruits, diameters_mm=1.03 * row_growth.fruits.diameters_mm), harvest=HARVEST)
+    now = len(row_growth.fruits.days) - 1
+    true = row_growth.foretold.sizes_mm[:, now]
     lows, highs = (each[:, now] for each in (larger.foretold.lows_mm, larger.foretold.highs_mm))
     assert np.mean((lows < true) & (true < highs)) > 0.95
     means = larger.foretold.summaries["blocks"][:, 0]

@@ -4,41 +4,29 @@ import json
 import re
 from contextlib import closing
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from command_line import Pomona
-from growth_maker import BLOOM, GrownRow, grow_row, rows_of
+from growth_maker import HARVEST, GrownRow, grow_row, rows_of
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.growth.curve_families import FAMILIES
 from pomona.growth.drawn_names import drawn_name
 from pomona.growth.growth_pictures import draw_curves, draw_variability
 from pomona.growth.growth_pictures import draw_sizes as draw_size_classes
-from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
+from pomona.growth.season_growth import SeasonGrowth, growth_of
 from pomona.growth.size_classes import class_counts, class_masses, parsed_classes
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.viewer.season_page import Wishes, season_document
 
-HARVEST = BLOOM + timedelta(days=135)
 
-
-@pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
-    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
-
-
-@pytest.fixture(scope="module")
-def grown(row: GrownRow) -> SeasonGrowth:
-    return grow_season(row.path, harvest=HARVEST)
-
-
-def test_what_is_gone_has_no_size_now(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+def test_what_is_gone_has_no_size_now(pomona: Pomona, grown_row: GrownRow, tmp_path: Path) -> None:
     """Its curve ends with the visit that measured it last; tables, layers and the page say the same."""
     path = tmp_path / "orchard.gpkg"
-    path.write_bytes(row.path.read_bytes())
+    path.write_bytes(grown_row.path.read_bytes())
     with closing(geopackage.connect(path)) as connection, connection:
         sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
         connection.execute("UPDATE fruits SET state = 'gone', last_session_id = ? WHERE id = 7", (sessions[1],))
@@ -47,7 +35,7 @@ def test_what_is_gone_has_no_size_now(pomona: Pomona, row: GrownRow, tmp_path: P
     gone = next(line for line in rows_of(tmp_path / "g" / "fruits.csv") if line["fruit_id"] == "7")
     assert {gone[name] for name in ("rate_mm_per_day", "rate_sigma_mm_per_day", "forecast_mm")} == {""}
     days = [line["date"] for line in rows_of(tmp_path / "g" / "curves.csv") if line["fruit_id"] == "7"]
-    assert days == [str(row.day(50)), str(row.day(65))]
+    assert days == [str(grown_row.day(50)), str(grown_row.day(65))]
     assert pomona("export", path, "-o", tmp_path / "g.csv", "--growth", "--harvest", HARVEST)[0] == 0
     exported = {line["id"]: line for line in rows_of(tmp_path / "g.csv")}
     assert {exported["7"][name] for name in ("size_mm", "rate_mm_per_day", "forecast_mm")} == {""}
@@ -55,9 +43,9 @@ def test_what_is_gone_has_no_size_now(pomona: Pomona, row: GrownRow, tmp_path: P
     assert float(exported["8"]["size_mm"]) > 40.0
 
 
-def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, grown_row: GrownRow, tmp_path: Path) -> None:
     folder = tmp_path / "growth"
-    code, printed, told = pomona("growth", row.path, "-o", folder, "--harvest", HARVEST, "--classes", "60,65,70")
+    code, printed, told = pomona("growth", grown_row.path, "-o", folder, "--harvest", HARVEST, "--classes", "60,65,70")
     assert (code, told) == (0, "")
     assert "90 fruits on 4 visits" in printed
     series, fruits, blocks, classes, curves = (
@@ -83,16 +71,16 @@ def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, row: GrownRo
     for name in ("curves", "sizes", "variability"):
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     # It is taken again, and nothing else of these names is.
-    assert pomona("growth", row.path, "-o", folder)[0] == 0
+    assert pomona("growth", grown_row.path, "-o", folder)[0] == 0
     assert rows_of(folder / "fruits.csv")[0]["forecast_mm"] == ""
     (folder / "fruits.csv").write_text("mine\n")
-    code, _, told = pomona("growth", row.path, "-o", folder)
+    code, _, told = pomona("growth", grown_row.path, "-o", folder)
     assert (code, told.count("\n")) == (2, 1)
     assert "is not a folder of growth" in told
 
 
-def test_json_says_the_same(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
-    code, printed, _ = pomona("growth", row.path, "-o", tmp_path / "g", "--harvest", HARVEST, "--json")
+def test_json_says_the_same(pomona: Pomona, grown_row: GrownRow, tmp_path: Path) -> None:
+    code, printed, _ = pomona("growth", grown_row.path, "-o", tmp_path / "g", "--harvest", HARVEST, "--json")
     found = json.loads(printed)
     assert code == 0
     assert found["curve"] in FAMILIES
@@ -117,8 +105,10 @@ def test_json_says_the_same(pomona: Pomona, row: GrownRow, tmp_path: Path) -> No
         (["--temperature", "absent.csv"], "absent.csv: not found"),
     ],
 )
-def test_what_cannot_be_is_one_line(pomona: Pomona, row: GrownRow, tmp_path: Path, flags: list[str], said: str) -> None:
-    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g", *flags)
+def test_what_cannot_be_is_one_line(
+    pomona: Pomona, grown_row: GrownRow, tmp_path: Path, flags: list[str], said: str
+) -> None:
+    code, printed, told = pomona("growth", grown_row.path, "-o", tmp_path / "g", *flags)
     assert (code, printed, told.count("\n")) == (2, "", 1)
     assert said in told
     assert not (tmp_path / "g").exists()
@@ -149,13 +139,13 @@ def test_visits_of_several_seasons_are_no_growth(
 
 
 @pytest.mark.parametrize("limits_mm", [[70.0, 60.0], [np.nan], [], [0.0, 60.0], [[60.0, 70.0]], "large"])
-def test_limits_that_do_not_rise_are_refused(grown: SeasonGrowth, limits_mm: object) -> None:
+def test_limits_that_do_not_rise_are_refused(row_growth: SeasonGrowth, limits_mm: object) -> None:
     with pytest.raises(PomonaError, match=r"limits_mm: found .*, expected rising limits in mm"):
-        growth_of(grown.fruits, limits_mm=limits_mm)
+        growth_of(row_growth.fruits, limits_mm=limits_mm)
 
 
-def test_a_harvest_is_a_day_however_it_is_said(grown: SeasonGrowth) -> None:
-    few = grown.fruits
+def test_a_harvest_is_a_day_however_it_is_said(row_growth: SeasonGrowth) -> None:
+    few = row_growth.fruits
     for told in (HARVEST, HARVEST.isoformat(), datetime.combine(HARVEST, datetime.max.time())):
         found = growth_of(few, harvest=told)
         assert found.harvest == HARVEST
@@ -172,12 +162,12 @@ def test_one_day_is_no_growth(pomona: Pomona, tmp_path: Path) -> None:
     assert "found diameters of one day, 2024-06-14, expected two or more" in told
 
 
-def test_a_session_and_sizes_that_are_none_are_refused(pomona: Pomona, here: Path, row: GrownRow) -> None:
+def test_a_session_and_sizes_that_are_none_are_refused(pomona: Pomona, here: Path, grown_row: GrownRow) -> None:
     code, _, told = pomona("growth", "session.gpkg", "-o", "g")
     assert (code, told.count("\n")) == (2, 1)
     assert "found a session, expected a map" in told
     for size in (0.0, -0.05):
-        (here / "bad.gpkg").write_bytes(row.path.read_bytes())
+        (here / "bad.gpkg").write_bytes(grown_row.path.read_bytes())
         with closing(geopackage.connect(here / "bad.gpkg")) as connection:
             connection.execute("UPDATE observations SET diameter_m = ? WHERE id = 5", (size,))
         code, _, told = pomona("growth", "bad.gpkg", "-o", "g")
@@ -204,37 +194,39 @@ def test_a_visit_of_another_scale_is_named(
     assert f"sizes of {day} are likely off together" in pomona("thinning", row.path)[2]
 
 
-def test_what_visits_share_has_an_interval(pomona: Pomona, row: GrownRow, grown: SeasonGrowth, tmp_path: Path) -> None:
+def test_what_visits_share_has_an_interval(
+    pomona: Pomona, grown_row: GrownRow, row_growth: SeasonGrowth, tmp_path: Path
+) -> None:
     """Said as no bound: one visit and how far it may be off; what all share is not seen at all."""
-    told = grown.foretold
+    told = row_growth.foretold
     assert (told.scale_lows < told.scales).all()
     assert (told.scales < told.scale_highs).all()
     true = np.log([1.0, 1.02, 0.99, 1.01])
     inside = (np.log(told.scale_lows) < true) & (true < np.log(told.scale_highs))
     assert inside.all()
-    printed = pomona("growth", row.path, "-o", tmp_path / "g")[1]
+    printed = pomona("growth", grown_row.path, "-o", tmp_path / "g")[1]
     said = r"is off most, [+-]\d\.\d % \([+-]\d\.\d to [+-]\d\.\d\); what all share, some 3 %, only calipers tell"
     assert re.search(rf"scales of visits: 2024-\d\d-\d\d {said}", printed)
 
 
-def test_a_last_visit_without_sizes_is_told(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+def test_a_last_visit_without_sizes_is_told(pomona: Pomona, grown_row: GrownRow, tmp_path: Path) -> None:
     path = tmp_path / "o.gpkg"
-    path.write_bytes(row.path.read_bytes())
+    path.write_bytes(grown_row.path.read_bytes())
     cloud = FruitCloud(OrchardMap(path).fruits().positions)
-    assert add_session(path, Session("later", str(row.day(99)), "drawn", cloud)).is_added
+    assert add_session(path, Session("later", str(grown_row.day(99)), "drawn", cloud)).is_added
     code, printed, told = pomona("growth", path, "-o", tmp_path / "g")
     assert (code, told.count("\n")) == (0, 1)
-    assert f"no sizes on {row.day(99)}, growth is told of {row.day(95)}" in told
-    assert f"to {row.day(95)}" in printed
+    assert f"no sizes on {grown_row.day(99)}, growth is told of {grown_row.day(95)}" in told
+    assert f"to {grown_row.day(95)}" in printed
 
 
 @pytest.mark.parametrize("n", [90, 30, 1])
-def test_all_fruits_are_in_the_picture(grown: SeasonGrowth, n: int) -> None:
+def test_all_fruits_are_in_the_picture(row_growth: SeasonGrowth, n: int) -> None:
     """However short the row is: metres are as long in both directions, and begin at the first and the lowest."""
-    fruits = grown.fruits
+    fruits = row_growth.fruits
     hanging = tuple("seen" if row < n else "gone" for row in range(90))
     cloud = replace(fruits.cloud, extras={**fruits.cloud.extras, "state": hanging})
-    figure = draw_variability(replace(grown, fruits=replace(fruits, cloud=cloud)))
+    figure = draw_variability(replace(row_growth, fruits=replace(fruits, cloud=cloud)))
     figure.draw_without_rendering()
     above, below, bar = figure.axes
     places = np.asarray(above.collections[0].get_offsets())
@@ -250,12 +242,12 @@ def test_all_fruits_are_in_the_picture(grown: SeasonGrowth, n: int) -> None:
     assert np.ptp(bar.get_ylim()) >= 0.02 - 1e-9
 
 
-def test_legends_lie_on_nothing_that_is_drawn(grown: SeasonGrowth) -> None:
-    curves = draw_curves(grown).axes[0].get_legend()
+def test_legends_lie_on_nothing_that_is_drawn(row_growth: SeasonGrowth) -> None:
+    curves = draw_curves(row_growth).axes[0].get_legend()
     assert [text.get_text() for text in curves.get_texts()] == [
         "curves of fruits", "mean of all, with 90 %", "sizes as measured"
     ]  # fmt: skip
-    figure = draw_size_classes(grown)
+    figure = draw_size_classes(row_growth)
     figure.draw_without_rendering()
     axes = figure.axes[0]
     assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0

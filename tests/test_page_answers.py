@@ -3,7 +3,6 @@
 import contextlib
 import re
 import shutil
-from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,11 @@ import pytest
 from benchmarks.page_draw import drawn_document
 
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
-from page_maker import chromium, opened
+from page_maker import opened, write_page
 from pomona import geopackage
 from pomona.growth.bearing_trees import bearing_trees
 from pomona.orchard import OrchardMap
 from pomona.orchard.hanging import hang_chances
-from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.packed_columns import packed
 from pomona.viewer.season_page import Wishes, season_document
 from pomona.viewer.season_report import write_report
@@ -26,23 +24,12 @@ from pomona.viewer.season_report import write_report
 N = 3 * FRUITS_OF_TREE
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
-    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
-
-
-def test_the_first_look_answers_four_questions(browser: Any, row: GrownRow, tmp_path: Path) -> None:
-    write_report(row.path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 1), target=20))
+def test_the_first_look_answers_four_questions(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
+    write_report(grown_row.path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 1), target=20))
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:
         many, big, fast, to_do = page.locator(".answer").all_inner_texts()
         trees = page.locator(".trees tbody tr").all()
-    hanging = round(float(hang_chances(OrchardMap(row.path).fruits()).sum()))
+    hanging = round(float(hang_chances(OrchardMap(grown_row.path).fruits()).sum()))
     assert f"{hanging} fruits hang" in " ".join(many.split())
     assert re.search(r"\d\d\.\d mm on average", " ".join(big.split()))
     assert re.search(r"0\.\d\d mm a day", " ".join(fast.split()))
@@ -50,9 +37,9 @@ def test_the_first_look_answers_four_questions(browser: Any, row: GrownRow, tmp_
     assert len(trees) == 3
 
 
-def test_what_is_likelier_no_fruit_counts_by_its_probability(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_what_is_likelier_no_fruit_counts_by_its_probability(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     path = tmp_path / "doubted.gpkg"
-    shutil.copy(row.path, path)
+    shutil.copy(grown_row.path, path)
     with contextlib.closing(geopackage.connect(path)) as connection, connection:
         connection.execute("UPDATE fruits SET state = 'missed', fruit_probability = 0.3 WHERE id <= 5")
         connection.execute("UPDATE fruits SET state = 'missed', fruit_probability = 0.9 WHERE id BETWEEN 6 AND 8")
@@ -76,11 +63,11 @@ def test_what_is_likelier_no_fruit_counts_by_its_probability(browser: Any, row: 
     ],
 )
 def test_what_the_last_visit_missed_counts_as_far_as_it_hangs(
-    browser: Any, row: GrownRow, tmp_path: Path, sure: float, n_hang: int, said: str, lost: str
+    browser: Any, grown_row: GrownRow, tmp_path: Path, sure: float, n_hang: int, said: str, lost: str
 ) -> None:
     """A tree was picked: the map calls its 30 fruits missed, and doubts that they hang."""
     path = tmp_path / "picked.gpkg"
-    shutil.copy(row.path, path)
+    shutil.copy(grown_row.path, path)
     with contextlib.closing(geopackage.connect(path)) as connection, connection:
         connection.execute("UPDATE fruits SET state = 'missed', state_probability = ? WHERE id <= 30", (sure,))
     write_report(path, tmp_path / "report.html", Wishes())
@@ -95,8 +82,7 @@ def test_what_the_last_visit_missed_counts_as_far_as_it_hangs(
 
 def told_to_do(browser: Any, path: Path, document: dict[str, Any]) -> list[str]:
     """The lines below the fourth question."""
-    path.write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, path.as_uri()) as page:
+    with opened(browser, write_page(path, document)) as page:
         lines: list[str] = page.locator(".answer").last.locator("p").all_inner_texts()
     return lines
 
@@ -143,8 +129,8 @@ def test_what_growth_needs_is_said_once(
     assert told_to_do(browser, tmp_path / "report.html", document) == [said]
 
 
-def test_what_is_too_large_is_not_to_be_thinned(browser: Any, row: GrownRow, tmp_path: Path) -> None:
-    document = season_document(row.path, Wishes(harvest=date(2024, 9, 1), target=20))
+def test_what_is_too_large_is_not_to_be_thinned(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
+    document = season_document(grown_row.path, Wishes(harvest=date(2024, 9, 1), target=20))
     assert not document["thinning"]["are_fruitlets"]
     first, *others = told_to_do(browser, tmp_path / "late.html", document)
     assert re.fullmatch(r"Plan \d+ packs for 1\N{NO-BREAK SPACE}Sept", first)
@@ -182,14 +168,14 @@ def test_one_visit_shows_its_sizes(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
-def test_the_numbers_of_trees_stay_in_view(browser: Any, row: GrownRow, tmp_path: Path, width: int) -> None:
+def test_the_numbers_of_trees_stay_in_view(browser: Any, grown_row: GrownRow, tmp_path: Path, width: int) -> None:
     """With a harvest and a target, however long the names of trees are: they are cut, and whole in the title."""
-    document = season_document(row.path, Wishes(harvest=date(2024, 9, 30), target=20))
+    document = season_document(grown_row.path, Wishes(harvest=date(2024, 9, 30), target=20))
     names = ["12", "the old Gravenstein behind the gate, second from the left", "w" * 400]
     for number, name in enumerate(names):
         document["trees"][number]["name"] = document["growth"]["blocks"][1 + number]["name"] = name
-    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, (tmp_path / "report.html").as_uri(), viewport={"width": width, "height": 860}) as page:
+    address = write_page(tmp_path / "report.html", document)
+    with opened(browser, address, viewport={"width": width, "height": 860}) as page:
         assert page.locator(".trees thead th").all_inner_texts() == ["Tree", "Fruits", "mm", "a day", "30 Sept", "thin"]
         spans = page.locator(".trees .scroll").evaluate("box => [box.scrollWidth, box.clientWidth]")
         assert spans[0] <= spans[1]
@@ -206,8 +192,7 @@ def test_the_fruits_of_no_tree_have_no_mean_of_all(browser: Any, tmp_path: Path)
     document["fruits"]["state"] = packed(np.repeat([1, 1, 3], 100))
     document["fruits"]["state_probability"] = packed(np.ones(300), 0.001)
     document["growth"]["blocks"] = document["growth"]["blocks"][:3]
-    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+    with opened(browser, write_page(tmp_path / "report.html", document)) as page:
         lines = [line.split("\t") for line in page.locator(".trees tbody tr").all_inner_texts()]
         means = [block["mean_mm"] for block in document["growth"]["blocks"][1:]]
         assert [line[2] for line in lines[:2]] == [f"{mean[-2]:.1f}" for mean in means]

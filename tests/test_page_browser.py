@@ -16,11 +16,10 @@ import pytest
 from benchmarks.page_draw import drawn_document
 
 from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
-from page_maker import chromium, opened, served
+from page_maker import opened, served, write_page
 from pomona import FruitCloud, geopackage
 from pomona.growth.season_growth import grow_season
 from pomona.orchard import OrchardMap, Session, add_session
-from pomona.viewer.built_page import built_page, report_of
 from pomona.viewer.packed_columns import packed
 from pomona.viewer.season_page import Wishes
 from pomona.viewer.season_report import write_report
@@ -36,21 +35,10 @@ N = 3 * FRUITS_OF_TREE
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
-    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg")
-
-
-@pytest.fixture(scope="module")
-def report(row: GrownRow, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(grown_row: GrownRow, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    calipers = long_table(row, folder / "calipers.csv")
-    write_report(row.path, folder / "report.html", Wishes(harvest=date(2024, 9, 1), target=20, calipers=calipers))
+    calipers = long_table(grown_row, folder / "calipers.csv")
+    write_report(grown_row.path, folder / "report.html", Wishes(harvest=date(2024, 9, 1), target=20, calipers=calipers))
     return folder / "report.html"
 
 
@@ -95,8 +83,8 @@ def touch_a_fruit(page: Any) -> None:
     pytest.fail("no fruit anywhere in the row")
 
 
-def test_a_guessed_vertical_is_said(browser: Any, row: GrownRow, report: Path, tmp_path: Path) -> None:
-    write_report(row.path, tmp_path / "told.html", Wishes(up=np.array([0.0, 0.0, 1.0])))
+def test_a_guessed_vertical_is_said(browser: Any, grown_row: GrownRow, report: Path, tmp_path: Path) -> None:
+    write_report(grown_row.path, tmp_path / "told.html", Wishes(up=np.array([0.0, 0.0, 1.0])))
     for path, times in ((report, 1), (tmp_path / "told.html", 0)):
         with opened(browser, path.as_uri()) as page:
             assert page.locator("#panel-row").inner_text().count("Which way is up is guessed") == times
@@ -115,9 +103,9 @@ def test_the_head_of_the_table_stands_over_its_columns(browser: Any, report: Pat
         assert lefts_of(page, "cell") == lefts_of(page, "columnheader")
 
 
-def test_the_titles_of_columns_are_whole(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_the_titles_of_columns_are_whole(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     """September is the longest of months, and an arrow stands behind the title that sorts."""
-    write_report(row.path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 30), target=20))
+    write_report(grown_row.path, tmp_path / "report.html", Wishes(harvest=date(2024, 9, 30), target=20))
     right = "getBoundingClientRect().right"
     left = f"all => all.map(one => one.{right} - one.querySelector('button').{right})"
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:
@@ -147,11 +135,11 @@ def test_the_slider_goes_through_the_season(page: Any) -> None:
     page.get_by_label("Pause").click()
 
 
-def test_a_touched_fruit_shows_its_card(page: Any, row: GrownRow) -> None:
+def test_a_touched_fruit_shows_its_card(page: Any, grown_row: GrownRow) -> None:
     touch_a_fruit(page)
     card = page.locator(".fruit-card").first
     fruit_id = int(re.search(r"Fruit (\d+)", card.inner_text())[1])
-    seen = OrchardMap(row.path).observations()
+    seen = OrchardMap(grown_row.path).observations()
     sizes_mm = 1000.0 * seen.diameters_m[seen.fruit_ids == fruit_id]
     shown = [float(cell) for cell in card.locator(".sights td:nth-child(3)").all_inner_texts()]
     assert shown == pytest.approx(sizes_mm.tolist(), abs=0.11)
@@ -161,7 +149,7 @@ def test_a_touched_fruit_shows_its_card(page: Any, row: GrownRow) -> None:
     assert page.locator(".fruit-card").count() == 0
 
 
-def test_the_table_filters_sorts_and_is_saved(page: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_the_table_filters_sorts_and_is_saved(page: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     page.get_by_role("tab", name="Fruits").click()
     assert page.locator(".filter-bar output").inner_text() == f"{N} of {N} fruits"
     assert len(shown_rows(page)) < N, "only what is on the screen is in the page"
@@ -175,16 +163,16 @@ def test_the_table_filters_sorts_and_is_saved(page: Any, row: GrownRow, tmp_path
     assert float(shown_rows(page)[0][5]) == pytest.approx(largest, abs=0.06)
     lines = saved(page, tmp_path)
     assert {line["tree"] for line in lines} == {"2"}
-    fruits = OrchardMap(row.path).fruits()
+    fruits = OrchardMap(grown_row.path).fruits()
     place_of = dict(zip(fruits.ids, fruits.positions, strict=True))
     for line in lines:
         found = [float(line[axis]) for axis in "xyz"]
         assert found == pytest.approx(place_of[line["fruit_id"]].tolist(), abs=0.002)
 
 
-def test_what_is_saved_is_what_the_verbs_say(page: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_what_is_saved_is_what_the_verbs_say(page: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     """To the step in which it is told, tenths of a millimetre: nothing is moved by where a column begins."""
-    growth = grow_season(row.path, harvest=date(2024, 9, 1))
+    growth = grow_season(grown_row.path, harvest=date(2024, 9, 1))
     row_of = {str(fruit): number for number, fruit in enumerate(growth.fruits.ids.tolist())}
     page.get_by_role("tab", name="Fruits").click()
     lines = saved(page, tmp_path)
@@ -319,8 +307,7 @@ def test_names_of_trees_are_texts_in_the_page_and_in_a_spreadsheet(browser: Any,
     names = [HOSTILE, "=1+1", '@"a,b"']
     for number, name in enumerate(names):
         document["trees"][number]["name"] = document["growth"]["blocks"][1 + number]["name"] = name
-    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+    with opened(browser, write_page(tmp_path / "report.html", document)) as page:
         assert page.locator(".trees tbody th").all_text_contents() == [f"Tree {name}" for name in names]
         page.get_by_role("tab", name="Fruits").click()
         with page.expect_download() as download:
@@ -339,8 +326,7 @@ def test_fruits_and_trees_go_by_their_rows(browser: Any, tmp_path: Path) -> None
     for tree, row in zip(document["trees"], ("row 2", "row 2", "row 10", "row 10"), strict=True):
         tree["row"] = row
     document["growth"]["blocks"].append({**document["growth"]["blocks"][0], "kind": "row", "name": "row 10"})
-    (tmp_path / "report.html").write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+    with opened(browser, write_page(tmp_path / "report.html", document)) as page:
         heads = ["row 2", "Tree 0", "Tree 1", "row 10", "Tree 2", "Tree 3"]
         assert page.locator(".trees tbody th").all_text_contents() == heads
         assert page.locator(".trees .of-row td").all_inner_texts()[:1] == ["200"]
@@ -355,9 +341,9 @@ def test_fruits_and_trees_go_by_their_rows(browser: Any, tmp_path: Path) -> None
         assert {line["row"] for line in saved(page, tmp_path, "400_fruits-fruits.csv")} == {"row 2"}
 
 
-def test_what_is_gone_has_no_size_now(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_what_is_gone_has_no_size_now(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     path = tmp_path / "orchard.gpkg"
-    shutil.copy(row.path, path)
+    shutil.copy(grown_row.path, path)
     with contextlib.closing(geopackage.connect(path)) as connection, connection:
         sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
         connection.execute("UPDATE fruits SET state = 'gone', last_session_id = ? WHERE id = 7", (sessions[1],))
@@ -384,9 +370,9 @@ def assert_harmless(page: Any, hostile: GrownRow) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
-def test_a_page_from_elsewhere_learns_nothing(browser: Any, row: GrownRow, tmp_path: Path) -> None:
+def test_a_page_from_elsewhere_learns_nothing(browser: Any, grown_row: GrownRow, tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<!doctype html><title>elsewhere</title>")
-    with served(row.path) as address, elsewhere(tmp_path) as foreign:
+    with served(grown_row.path) as address, elsewhere(tmp_path) as foreign:
         context = browser.new_context()
         page = context.new_page()
         page.goto(foreign)

@@ -1,16 +1,13 @@
 """Nothing on the page is told by colour alone: who sees none of them tells states, plans and dates by shapes."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-import pytest
 from benchmarks.page_draw import VISITS, drawn_document
 
-from page_maker import chromium, opened
-from pomona.viewer.built_page import built_page, report_of
+from page_maker import opened, write_page
 from pomona.viewer.packed_columns import packed
 
 N = 24
@@ -19,12 +16,6 @@ STATES = ("new", "seen", "missed", "gone")
 SIGHTS = {"new": (LAST,), "seen": (0, LAST), "missed": (0,), "gone": (0,)}
 ALIKE = 0.001
 """Share of the pixels by which two pictures of the same shapes differ, at rims."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
 
 
 def drawn(visits: tuple[int, ...], *, state: str = "seen", probability: float = 1.0) -> dict[str, Any]:
@@ -62,8 +53,7 @@ def shapes(locator: Any) -> np.ndarray:
 
 def row_in(browser: Any, path: Path, document: dict[str, Any], colour: str) -> tuple[np.ndarray, list[str]]:
     """The shapes of the row, and of the key below it."""
-    path.write_text(report_of(built_page(), document), encoding="utf-8")
-    with opened(browser, path.as_uri()) as page:
+    with opened(browser, write_page(path, document)) as page:
         page.get_by_role("button", name=colour, exact=True).click()
         page.wait_for_timeout(300)
         return shapes(page.locator("#panel-row canvas")), keys(page.locator(".legend .swatch"))
@@ -124,10 +114,10 @@ def test_what_does_not_grow_is_told_without_colours(browser: Any, tmp_path: Path
 
 
 def test_dates_are_told_without_colours(browser: Any, tmp_path: Path) -> None:
-    pictures, path = [], tmp_path / "report.html"
+    pictures = []
     for visits, probability in (((1, 8), 1.0), ((1, 8), 0.5), ((1,), 1.0), ((8,), 1.0)):
-        path.write_text(report_of(built_page(), drawn(visits, probability=probability)), encoding="utf-8")
-        with opened(browser, path.as_uri()) as page:
+        address = write_page(tmp_path / "report.html", drawn(visits, probability=probability))
+        with opened(browser, address) as page:
             page.get_by_role("tab", name="Two dates").click()
             page.get_by_label("Date above").select_option(index=1)
             page.get_by_label("Date below").select_option(index=8)
@@ -144,9 +134,7 @@ def test_dates_are_told_without_colours(browser: Any, tmp_path: Path) -> None:
 
 
 def test_the_view_that_keys_choose_is_pressed(browser: Any, tmp_path: Path) -> None:
-    path = tmp_path / "report.html"
-    path.write_text(report_of(built_page(), drawn((0, LAST))), encoding="utf-8")
-    with opened(browser, path.as_uri()) as page:
+    with opened(browser, write_page(tmp_path / "report.html", drawn((0, LAST)))) as page:
         buttons = page.get_by_role("group", name="View").locator("button")
         canvas = page.locator("#panel-row canvas")
         for key, chosen in (("2", "Above"), ("1", "Side"), ("d", "3D"), ("1", "Side"), ("+", "Side"), ("3", "3D")):

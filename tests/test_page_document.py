@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from growth_maker import FRUITS_OF_TREE, grow_row
+from growth_maker import FRUITS_OF_TREE, GrownRow, grow_row
 from pomona import FruitCloud
 from pomona.orchard import OrchardMap, Session, add_session
 from pomona.orchard.control_points import read_control_points
@@ -34,8 +34,8 @@ def texts(column: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return grow_row(tmp_path_factory.mktemp("row") / "orchard.gpkg").path
+def row(grown_row: GrownRow) -> Path:
+    return grown_row.path
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """What is drawn of the row while it moves: all of it in time, less where that is late, all of it at rest."""
 
 import base64
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -10,8 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.page_draw import FRUITS_OF_TREE, drawn_document
 
-from page_maker import chromium, opened
-from pomona.viewer.built_page import built_page, report_of
+from page_maker import opened, write_page
 
 N = 160 * FRUITS_OF_TREE
 
@@ -65,16 +62,8 @@ FARTHER = ["-"] * 4
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> str:
-    path: Path = tmp_path_factory.mktemp("moved") / "report.html"
-    path.write_text(report_of(built_page(), drawn_document(N, with_pictures=False)), encoding="utf-8")
-    return path.as_uri()
+    return write_page(tmp_path_factory.mktemp("moved") / "report.html", drawn_document(N, with_pictures=False))
 
 
 def watched(frame_ms: int) -> str:
