@@ -12,7 +12,7 @@ from pomona.recording.alignment import alignment_of
 from pomona.recording.frame import Recording
 from pomona.recording.pictures import UnreadablePictureError
 
-__all__ = ["Checked", "checked", "is_blank", "unreadable_frames"]
+__all__ = ["Checked", "checked", "is_blank"]
 
 BLANK_SIGMA = 2.0
 """Grey levels of 255: a covered lens or a lost exposure varies less over the picture, and leaves far more."""
@@ -71,11 +71,6 @@ def checked(recording: Recording, progress: Callable[[int, int], None] | None = 
     if alignment is None or not alignment.is_off:
         return found
     return replace(found, misaligned=str(alignment), is_spoiled=not alignment.is_correctable)
-
-
-def unreadable_frames(recording: Recording, progress: Callable[[int, int], None] | None = None) -> dict[int, str]:
-    """Give the frames with a picture that cannot be read, see `checked`."""
-    return checked(recording, progress).unreadable
 
 
 def is_blank(picture: NDArray[np.uint8]) -> bool:
