@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -10,7 +11,11 @@ from pomona.arrays import checked_array
 from pomona.errors import PomonaError
 from pomona.reading import shown
 
-__all__ = ["given_flag", "given_noise", "given_pose"]
+__all__ = ["Method", "Scale", "Up", "core_vertical", "given_flag", "given_noise", "given_pose"]
+
+Method: TypeAlias = Literal["paper", "verified"]
+Scale: TypeAlias = Literal["metric", "free"]
+Up: TypeAlias = Sequence[Sequence[float]]
 
 
 def given_noise(noise_m: Any) -> float | None:
@@ -52,3 +57,20 @@ def given_pose(map_from_query: Any) -> list[list[float]]:
     """
     pose: list[list[float]] = checked_array("map_from_query", map_from_query, np.float64, (4, 4)).tolist()
     return pose
+
+
+def core_vertical(up: Up | None) -> tuple[list[float], list[float]] | None:
+    """Return the vertical in the query and in the map as the core reads it; one direction holds for both."""
+    if up is None:
+        return None
+    if np.ma.is_masked(up):
+        raise PomonaError("up: found a masked array, expected one whose values are all known")
+    try:
+        vectors = np.asarray(up, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PomonaError("up: expected one direction, (3,), or two, (2, 3)") from None
+    if vectors.shape == (3,):
+        vectors = np.stack((vectors, vectors))
+    if vectors.shape != (2, 3):
+        raise PomonaError(f"up: found an array of shape {vectors.shape}, expected (3,) or (2, 3)")
+    return vectors[0].tolist(), vectors[1].tolist()

@@ -14,7 +14,7 @@ from pomona.detect import Detector
 from pomona.errors import PomonaError
 from pomona.localize.course import Step, Way
 from pomona.localize.localizer import Localizer
-from pomona.matching import Up
+from pomona.match_arguments import Up
 from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError

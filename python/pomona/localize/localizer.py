@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pomona import _core
+from pomona.answer import Verdict
 from pomona.arrays import definite_matrices, rigid_matrices
 from pomona.cards import as_card
 from pomona.cloud import Cloud, as_cloud
+from pomona.core_clouds import core_arrays
 from pomona.core_settings import core_settings
 from pomona.core_threads import Threads, core_threads
 from pomona.errors import PomonaError
 from pomona.kept_index import out_of_index
 from pomona.localize.map_fruits import hanging_rows
-from pomona.matching import Index, Up, Verdict, core_arrays, core_vertical
+from pomona.map_index import Index
+from pomona.match_arguments import Up, core_vertical
 
 __all__ = ["Localization", "Localizer"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import Cloud
-from pomona.matching import Up, core_vertical
+from pomona.match_arguments import Up, core_vertical
 from pomona.orchard import OrchardMap
 from pomona.ros.robot_frames import levelling
 

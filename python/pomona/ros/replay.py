@@ -16,7 +16,7 @@ from pomona.detect import Detector
 from pomona.errors import PomonaError
 from pomona.localize import Localizer, Way
 from pomona.localize.following import Progress, localize
-from pomona.matching import Up
+from pomona.match_arguments import Up
 from pomona.reading import shown
 from pomona.recording import Recording
 from pomona.recording.bags.bag_recording import BagRecording

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.answer import Verdict
 from pomona.cloud import FruitCloud
 from pomona.core_settings import core_settings
 from pomona.core_threads import core_threads
 from pomona.localize import Localization, Localizer
-from pomona.matching import Verdict
 from pomona.survey.refinement import Motions
 
 __all__ = ["ConstellationLink", "Constellations", "chained", "linked", "motions_of", "once"]

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.answer import Verdict
 from pomona.cloud import FruitCloud
-from pomona.matching import Verdict
 from pomona.survey.slam.constellation_links import LEAST_FRUITS, Constellations
 
 __all__ = ["TOGETHER", "Loop", "SeenMap", "joined", "loop_at", "loops", "recognised"]
