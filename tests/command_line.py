@@ -4,7 +4,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import typer.main
+
+from pomona.cli import app
 from pomona.cloud import FruitCloud
 from pomona.synth.clouds import scene_pair
 
@@ -20,6 +24,21 @@ def run(*arguments: object, stdin: str = "", cwd: Path | None = None) -> subproc
     return subprocess.run(
         [POMONA, *map(str, arguments)], input=stdin, cwd=cwd, capture_output=True, text=True, timeout=600
     )
+
+
+def verbs(command: Any = None, path: tuple[str, ...] = ()) -> dict[tuple[str, ...], Any]:
+    """Commands of typer by their words; groups too, and `pomona` itself by none."""
+    command = typer.main.get_command(app) if command is None else command
+    found = {path: command}
+    for name, inner in getattr(command, "commands", {}).items():
+        found |= verbs(inner, (*path, name))
+    return found
+
+
+def options_of(verb: Any) -> list[set[str]]:
+    """The names of each of its options."""
+    options = [option for option in verb.params if option.param_type_name == "option" and not option.hidden]
+    return [{*option.opts, *option.secondary_opts} for option in options]
 
 
 def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:

@@ -5,16 +5,13 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import typer.main
 
-from command_line import POMONA, Run, assert_refused, run, write_visits
-from pomona.cli import app
+from command_line import POMONA, Run, assert_refused, run, verbs, write_visits
 from pomona.cloud import FruitCloud, Views
 from pomona.mirrored import mirror_image
 from pomona.orchard import write_session
@@ -34,13 +31,6 @@ def found(visits: Path) -> dict[str, object]:
     assert done.stderr == ""
     answer: dict[str, object] = json.loads(done.stdout)
     return answer
-
-
-def verbs(group: object = None, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    group = typer.main.get_command(app) if group is None else group
-    yield path
-    for name, command in getattr(group, "commands", {}).items():
-        yield from verbs(command, (*path, name))
 
 
 def test_the_module_is_the_command() -> None:

@@ -11,14 +11,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from benchmarks.__main__ import NAMES
 from benchmarks.readme import blocks
+
+from command_line import options_of, verbs
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+GUIDES = [page for page in PAGES if page.name != "CHANGELOG.md"]
+"""What is said of this version; the change log is of all."""
 page_parameter = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 # `make TARGET` in an example is checked to exist, not run: it would build what runs this test.
 MAKE_CHECKS_TARGETS = 'make() { for target in "$@"; do grep -q "^$target:" "$MAKEFILE"; done; }\n'
+
+FLAG = re.compile(r"(?<![\w-])--?[a-z][\w-]*")
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,34 @@ def test_the_guide_that_says_what_is_where_names_what_is_there() -> None:
     named = set(re.findall(r"`((?:crates|python|tests|docs|benchmarks|testdata)/[\w./-]*)`", text))
     assert named
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+
+
+def test_it_names_all_that_is_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    for folder in ("python/pomona", "crates/pomona/src", "crates/pomona-render/src", "web/src"):
+        there = [path for path in (ROOT / folder).iterdir() if path.suffix in ("", ".py", ".rs", ".ts")]
+        own = [path.name for path in there if not path.name.startswith("_") and path.name != "lib.rs"]
+        assert [name for name in sorted(own) if f"`{name}" not in text] == [], folder
+
+
+def test_every_benchmark_is_told() -> None:
+    told = re.findall(r"^\| `(\w+)` \|", (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(NAMES) - set(told) == set()
+
+
+def test_every_option_is_told() -> None:
+    told = {"--help", "--version"}.union(*(FLAG.findall(page.read_text(encoding="utf-8")) for page in GUIDES))
+    options = [(words, names) for words, verb in verbs().items() for names in options_of(verb)]
+    assert [(words, names) for words, names in options if told.isdisjoint(names)] == []
+
+
+@pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.name)
+def test_options_of_commands_exist(page: Path) -> None:
+    options = {" ".join(words): {"--help"}.union(*options_of(verb)) for words, verb in verbs().items()}
+    text = page.read_text(encoding="utf-8")
+    for command, rest in re.findall(r"\bpomona ((?:[a-z]\S* )?[a-z]\S*)([^\n`#|&;>]*)", text):
+        known = options.get(command, options.get(command.split()[0]))
+        assert known is None or set(FLAG.findall(rest)) <= known, f"pomona {command}{rest}"
 
 
 @pytest.mark.parametrize("block", blocks().items(), ids=lambda item: item[0])

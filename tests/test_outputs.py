@@ -3,16 +3,13 @@
 import hashlib
 import shutil
 import sqlite3
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-import typer.main
 
-from command_line import Pomona
-from pomona.cli import app
+from command_line import Pomona, options_of, verbs
 from pomona.likes import database_of
 
 
@@ -220,18 +217,10 @@ def test_the_demo_takes_no_other_map_for_its_own(pomona: Pomona, here: Path) -> 
         refused(pomona, here, f"demo -o .{force}", "demo")
 
 
-def verbs(group: object = None) -> Iterator[object]:
-    command = typer.main.get_command(app) if group is None else group
-    for inner in getattr(command, "commands", {}).values():
-        yield from verbs(inner)
-    if not hasattr(command, "commands"):
-        yield command
-
-
 def test_every_option_that_is_an_output_is_looked_at() -> None:
     # Whoever adds an output marks it (pomona.cli.verbs.Writes), and the verb has --force.
     named_so = {"output", "plot", "preview", "keep"}
-    options = {verb: {option.name for option in verb.params if option.param_type_name == "option"} for verb in verbs()}
-    writers = {verb.name: names for verb, names in options.items() if names & named_so}
+    options = {words: {name.lstrip("-") for name in set().union(*options_of(verb))} for words, verb in verbs().items()}
+    writers = {words: names for words, names in options.items() if names & named_so}
     assert len(writers) >= 5
     assert [verb for verb, names in writers.items() if "force" not in names] == []
