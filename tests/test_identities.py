@@ -13,7 +13,7 @@ from pomona.identity.links import links_of
 from pomona.identity.lives import SHARE_FALSE
 from pomona.identity.looks import quantile_of_rows
 from pomona.identity.near_fruits import AskedPlaces, NearFruits
-from pomona.identity.places import looked_at, towards_camera
+from pomona.identity.places import looked_at_by_cameras, towards_camera
 from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import all_sights
 from pomona.orchard.fruit_ids import Change, changes_between, ids_of_clusters
@@ -182,7 +182,9 @@ def test_cameras_tell_where_a_visit_looked_and_from_where() -> None:
     seeing = visit(0, own, cameras=cameras)
     asked = np.array([[1.5, 0.4, 1.5], [5.5, 0.4, 1.5], [1.5, -2.5, 1.5]])
     of_visit = AskedPlaces(asked, NearFruits(own), np.full(3, -1))
-    assert looked_at(seeing, of_visit, np.full(3, 0.2)).tolist() == [True, False, False]
+    by_cameras = looked_at_by_cameras(seeing, of_visit)
+    assert by_cameras is not None
+    assert by_cameras.tolist() == [True, False, False]
     towards = towards_camera(seeing, of_visit, np.eye(3))
     np.testing.assert_allclose(towards[0], (0, -1, 0), atol=1e-9)
 

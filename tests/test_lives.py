@@ -16,7 +16,8 @@ def looks_at(seen, ranks=None):
     """Looks from one side at fruits that all visits had in view; ranks where frames are counted."""
     views = seen * (0.5 if ranks is None else np.asarray(ranks))
     counted = np.full(seen.shape[1], ranks is not None)
-    return Looks(seen, np.ones(seen.shape, bool), views, np.full((*seen.shape, 3), np.nan), counted)
+    no_side, emptied = np.full((*seen.shape, 3), np.nan), np.zeros(seen.shape)
+    return Looks(seen, np.ones(seen.shape, bool), views, no_side, counted, emptied)
 
 
 def lives(seen, ranks=None):
@@ -81,7 +82,9 @@ def test_a_visit_to_a_part_of_the_row_says_nothing_of_the_others():
     in_view[::2, -1] = False
     half = looks_at(seen & in_view)
     kept = half.seen.any(axis=1)
-    half = Looks(half.seen[kept], in_view[kept], half.views[kept], half.towards[kept], half.is_counted)
+    half = Looks(
+        half.seen[kept], in_view[kept], half.views[kept], half.towards[kept], half.is_counted, half.emptied[kept]
+    )
     found = lives_of(histories_of(half)).false
     once = half.seen.sum(axis=1) == 1
     assert found[once].mean() == pytest.approx(1.0 - is_fruit[kept][once].mean(), abs=0.1)
@@ -133,7 +136,8 @@ def test_looks_that_all_missed_a_fruit_are_counted_from_its_side():
     assert classes.tolist() == unseen.tolist() == [[*range(MISSES + 1), MISSES]]
     towards = np.tile([[0.0, 1.0, 0.0]], (1, MISSES + 2, 1))
     towards[0, 1::2] *= -1.0
-    classes, _ = visibility_classes(Looks(seen, ~np.zeros_like(seen), 0.5 * seen, towards, np.zeros(MISSES + 2, bool)))
+    looks = Looks(seen, ~np.zeros_like(seen), 0.5 * seen, towards, np.zeros(MISSES + 2, bool), np.zeros(seen.shape))
+    classes, _ = visibility_classes(looks)
     assert classes.tolist() == [[0, 0, 1, 1, 2, 2, 3]]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, looks_of
+from pomona.identity.stretches import LIKELY
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
 
 __all__ = ["Conclusion", "conclude"]
@@ -80,7 +81,10 @@ def conclude(
     )
     before = _sights_before(labels)
     looks = looks_of(visits, sights, labels, positions, frames)
-    lives = lives_of(histories_of(looks))
+    # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
+    # says how much leaves hide, or how many go elsewhere.
+    lives = lives_of(histories_of(looks)).with_emptied(looks.emptied)
+    looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
     states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(
         sights=sights,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.identity.histories import Histories, HistoryOdds
+from pomona.identity.stretches import LIKELY
 
 __all__ = ["SHARE_FALSE", "Lives", "lives_of", "states_of"]
 
@@ -52,6 +53,11 @@ class Lives:
 
     gone: NDArray[np.float64]
     false: NDArray[np.float64]
+
+    def with_emptied(self, emptied: NDArray[np.float64]) -> Lives:
+        """Return it with what hung where stretches were emptied, (K, V) as `Looks.emptied`, taken likelier than not."""
+        taken = emptied.max(axis=1, initial=0.0)
+        return Lives(np.where(taken > LIKELY, np.maximum(self.gone, taken), self.gone), self.false)
 
 
 def lives_of(histories: Histories) -> Lives:

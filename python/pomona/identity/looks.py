@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.identity.near_fruits import AskedPlaces, NearFruits
-from pomona.identity.places import looked_at, surroundings_of, towards_camera
+from pomona.identity.places import (
+    has_fruits_near,
+    looked_at_by_cameras,
+    reaches_m,
+    surroundings_of,
+    towards_camera,
+)
+from pomona.identity.stretches import FoundAround, emptied_stretches
 from pomona.identity.visits import SeenVisit, Sights
 
 __all__ = ["Looks", "looks_of", "quantile_of_rows", "visibility_classes"]
@@ -49,6 +56,8 @@ class Looks:
         From the fruit to the camera; NaN where unknown.
     is_counted : (V,) bool
         Whether the visit counts the frames that saw each fruit.
+    emptied : (K, V) float64
+        Probability that the visit came by, and what hung about the fruit had been taken.
     """
 
     seen: NDArray[np.bool_]
@@ -56,6 +65,7 @@ class Looks:
     views: NDArray[np.float64]
     towards: NDArray[np.float64]
     is_counted: NDArray[np.bool_]
+    emptied: NDArray[np.float64]
 
 
 def looks_of(
@@ -72,19 +82,26 @@ def looks_of(
     seen = np.zeros(places.shape[:2], bool)
     seen[labels, sights.visits] = True
     in_view, views, towards = seen.copy(), np.zeros(seen.shape), np.full(places.shape, np.nan)
+    found = []
     for number, visit in enumerate(visits):
         own = np.flatnonzero(sights.visits == number)
+        reach_m = reaches_m(fruits[number], around.spacings_m[:, number])
         if not len(own):
+            found.append(FoundAround(fruits[number].positions, places[:, number], reach_m, seen[:, number], False))
             continue
         rows = np.full(len(places), -1)
         rows[labels[own]] = np.arange(len(own))
         asked = AskedPlaces(places[:, number], fruits[number], rows)
         scale = np.cbrt(np.linalg.det(frames[number, :3, :3]))
         in_map = _with_cameras_in_map(visit, frames[number], scale)
-        in_view[:, number] |= looked_at(in_map, asked, around.spacings_m[:, number])
+        is_near = has_fruits_near(asked, reach_m)
+        by_cameras = looked_at_by_cameras(in_map, asked)
+        found.append(FoundAround(fruits[number].positions, places[:, number], reach_m, is_near, by_cameras is None))
+        in_view[:, number] |= is_near if by_cameras is None else by_cameras
         towards[:, number] = towards_camera(in_map, asked, frames[number, :3, :3] / scale)
         views[labels[own], number] = _shares_of_views(visit.n_views, fruits[number])
-    return Looks(seen, in_view, views, towards, np.array([visit.n_views is not None for visit in visits], bool))
+    is_counted = np.array([visit.n_views is not None for visit in visits], bool)
+    return Looks(seen, in_view, views, towards, is_counted, emptied_stretches(found, seen, sights.days))
 
 
 def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], scale: float) -> SeenVisit:

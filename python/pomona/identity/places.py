@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.visits import SeenVisit, Sights
 
-__all__ = ["Surroundings", "looked_at", "on_days", "surroundings_of", "towards_camera"]
+__all__ = [
+    "Surroundings",
+    "has_fruits_near",
+    "looked_at_by_cameras",
+    "on_days",
+    "reaches_m",
+    "surroundings_of",
+    "towards_camera",
+]
 
 NEIGHBOURS = 3
 """A visit looked where so many of its fruits are near."""
@@ -71,24 +79,36 @@ def on_days(sights: Sights, labels: NDArray[np.int64]) -> NDArray[np.int64]:
     return told
 
 
-def looked_at(visit: SeenVisit, asked: AskedPlaces, spacings_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell at which places, (K,), a visit looked.
+def looked_at_by_cameras(visit: SeenVisit, asked: AskedPlaces) -> NDArray[np.bool_] | None:
+    """Tell before which places, (K,), a camera came as straight, and as near, as before most fruits of the visit.
 
-    By its cameras where it has them and they explain its own fruits: one came as straight before the place as before
-    most of the fruits that it saw, and as near. Else by its fruits around the place, which are as near as they ever
-    were, (K,), or as the visit's fruits are to one another.
+    None where the visit has no cameras, or they do not explain its own fruits.
     """
-    own, places = asked.fruits, asked.places
-    if visit.cameras is not None and len(visit.cameras):
-        straightest = _straightest(visit.cameras, own.positions)
-        widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in straightest)
-        if np.isfinite(widest):
-            tangents, depths_m = _straightest(visit.cameras, places)
-            return np.asarray((tangents <= widest) & (depths_m <= farthest_m))
+    if visit.cameras is None or not len(visit.cameras):
+        return None
+    straightest = _straightest(visit.cameras, asked.fruits.positions)
+    widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in straightest)
+    if not np.isfinite(widest):
+        return None
+    tangents, depths_m = _straightest(visit.cameras, asked.places)
+    return np.asarray((tangents <= widest) & (depths_m <= farthest_m))
+
+
+def reaches_m(own: NearFruits, spacings_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how near to each place, (K,), a visit that looked there has some of its fruits.
+
+    As near as fruits were when that at the place was seen, (K,), or as the visit's fruits are to one another.
+    """
     if len(own) <= NEIGHBOURS:
-        return np.zeros(len(places), bool)
-    usual_m = np.quantile(own.spacings_m(NEIGHBOURS + 1), AS_MOST)
-    return np.asarray(asked.nearest[0][:, NEIGHBOURS - 1] <= np.maximum(usual_m, NEAR * spacings_m))
+        return np.zeros(len(spacings_m))
+    return np.maximum(np.quantile(own.spacings_m(NEIGHBOURS + 1), AS_MOST), NEAR * spacings_m)
+
+
+def has_fruits_near(asked: AskedPlaces, reach_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell around which places, (K,), a visit has its fruits so near: there it looked, whatever is known of cameras."""
+    if len(asked.fruits) <= NEIGHBOURS:
+        return np.zeros(len(reach_m), bool)
+    return np.asarray(asked.nearest[0][:, NEIGHBOURS - 1] <= reach_m)
 
 
 def _straightest(
