@@ -76,6 +76,30 @@ def test_sizes_that_grew_as_all_did_speak_for_one_fruit() -> None:
     assert np.median(log_odds[2:]) > 1.0
 
 
+@pytest.mark.parametrize("share", [0.1, 0.33])
+def test_fruitlets_that_will_drop_are_the_same_though_they_hardly_grow(share: float) -> None:
+    """Sizes are not to part what grows slower than the others, where some do; what shrank is still no fruit of them."""
+    rng = np.random.default_rng(2)
+    slow = np.arange(200) < 200 * share
+    sizes = rng.normal(np.log(0.02), 0.1, 200)
+    later = sizes + np.where(slow, rng.uniform(0.0, 0.2, 200), 0.4) + rng.normal(0, 0.02, 200)
+    later[-1] = sizes[-1] - 0.2
+    log_odds = size_log_odds((sizes, later), (sizes, later), np.full(200, SURE))
+    assert log_odds[slow].mean() > -1.5
+    assert np.median(log_odds[~slow]) > 1.0
+    assert log_odds[-1] == -4.0
+
+
+def test_where_all_grow_alike_a_slow_one_is_none_of_them() -> None:
+    rng = np.random.default_rng(2)
+    sizes = rng.normal(np.log(0.02), 0.1, 200)
+    later = sizes + 0.4 + rng.normal(0, 0.02, 200)
+    later[0] = sizes[0] + 0.1
+    assert size_log_odds((sizes, later), (sizes, later), np.full(200, SURE))[0] < -3.0
+    # Sizes in another unit, by mistake, are no growth of any.
+    assert np.isfinite(size_log_odds((sizes, later), (sizes, later + np.eye(200)[0] * 6.9), np.full(200, SURE))).all()
+
+
 def test_an_id_goes_with_most_of_its_sights_and_none_is_given_twice() -> None:
     labels = np.array([0, 0, 1, 2, 2, 3])
     before = np.array([5, 5, 5, 7, 8, 0])

@@ -20,8 +20,12 @@ def looks_at(seen, ranks=None):
     return Looks(seen, np.ones(seen.shape, bool), views, no_side, counted, emptied)
 
 
-def lives(seen, ranks=None):
-    return lives_of(histories_of(looks_at(seen, ranks)))
+def fortnights(n_visits):
+    return 14.0 * np.arange(n_visits)
+
+
+def lives(seen, ranks=None, days=None):
+    return lives_of(histories_of(looks_at(seen, ranks), fortnights(seen.shape[1]) if days is None else np.array(days)))
 
 
 def row(rng, *, n_visits, hidden, false, persistent=False, n_fruits=600):
@@ -85,7 +89,7 @@ def test_a_visit_to_a_part_of_the_row_says_nothing_of_the_others():
     half = Looks(
         half.seen[kept], in_view[kept], half.views[kept], half.towards[kept], half.is_counted, half.emptied[kept]
     )
-    found = lives_of(histories_of(half)).false
+    found = lives_of(histories_of(half, fortnights(6))).false
     once = half.seen.sum(axis=1) == 1
     assert found[once].mean() == pytest.approx(1.0 - is_fruit[kept][once].mean(), abs=0.1)
 
@@ -109,6 +113,19 @@ def test_a_fruit_that_hung_free_is_gone_sooner_than_one_that_hid():
     assert free > 0.5 > hidden
 
 
+def test_nothing_goes_between_two_visits_of_one_date():
+    """Only what a later date misses, too, may have gone, and overnight few do."""
+    seen = np.array([[True, False]] * 30 + [[True, True]] * 70)
+    assert not lives(seen, days=(3.4, 3.5)).gone.any()
+    assert lives(seen, days=(3.0, 17.0)).gone[:30].mean() > 0.05
+    thrice = np.column_stack([np.ones(100, bool), seen])
+    assert lives(thrice, days=(3.4, 3.5, 18.0)).gone[:30].mean() > 0.2
+    assert lives(thrice, days=(3.0, 18.4, 18.5)).gone[:30].max() < 0.02
+    few = np.array([[True, False]] * 3 + [[True, True]] * 97)
+    overnight, fortnight = (lives(few, days=(3.0, last)).gone[:3].mean() for last in (4.0, 17.0))
+    assert overnight < 0.5 * fortnight
+
+
 def test_a_fruit_seen_late_and_well_is_rather_a_false_point_than_one_seen_late_and_hardly():
     """What looks missed before hides, and is seen by few frames when it is seen."""
     rng = np.random.default_rng(5)
@@ -124,7 +141,7 @@ def test_a_fruit_seen_late_and_well_is_rather_a_false_point_than_one_seen_late_a
 def test_the_gradient_of_the_posterior_is_that_of_its_value():
     rng = np.random.default_rng(9)
     seen, _ = row(rng, n_visits=4, hidden=0.3, false=0.1, n_fruits=60)
-    odds = HistoryOdds(histories_of(looks_at(seen, rng.random((len(seen), 1)))))
+    odds = HistoryOdds(histories_of(looks_at(seen, rng.random((len(seen), 1))), np.array([3.0, 3.1, 5.0, 30.0])))
     told = odds.start() + rng.normal(0.0, 0.3, len(odds.start()))
     assert check_grad(lambda x: odds(x, 0.1)[0], lambda x: odds(x, 0.1)[1], told, epsilon=1e-6) < 1e-3
 

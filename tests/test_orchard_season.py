@@ -234,3 +234,26 @@ def test_gone_is_what_was_thinned(row: FruitCloud, tmp_path: Path) -> None:
     gone = set(np.flatnonzero(thinned).tolist()) & hung
     assert len(said & gone) > 0.92 * len(gone)
     assert len(said - gone) < 0.02 * len(hung - gone)
+
+
+def test_fruitlets_that_will_drop_keep_their_identity(row: FruitCloud, tmp_path: Path) -> None:
+    """One in ten all but stands still, as those of which thinning is told."""
+    rng = np.random.default_rng(6)
+    slow = rng.random(len(row)) < 0.1
+    at_first_m = 0.018 * np.exp(rng.normal(0.0, 0.12, len(row)))
+    visits = []
+    for number, days in enumerate((0, 10)):
+        seen = np.flatnonzero(rng.random(len(row)) < 0.9)
+        sizes_m = at_first_m + days * np.where(slow, 0.0002, 0.0008) + rng.normal(0.0, 0.0005, len(row))
+        places = row.positions[seen] + rng.normal(0.0, 0.006, (len(seen), 3))
+        cloud = FruitCloud(places, ids=tuple(map(str, seen)), diameters_m=sizes_m[seen])
+        visits.append(Session(DATES[number], DATES[number], "test", cloud))
+    orchard = OrchardMap(grown(tmp_path / "orchard.gpkg", visits))
+    seen = orchard.observations()
+    sights: dict[int, list[int]] = {}
+    for fruit, label in zip(seen.labels, seen.fruit_ids.tolist(), strict=True):
+        sights.setdefault(int(str(fruit)), []).append(label)
+    twice = {fruit: ids for fruit, ids in sights.items() if len(ids) == 2}
+    kept = [np.mean([ids[0] == ids[1] for fruit, ids in twice.items() if slow[fruit] == which]) for which in (1, 0)]
+    assert kept[0] > 0.9
+    assert kept[1] > 0.97

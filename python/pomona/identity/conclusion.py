@@ -83,7 +83,7 @@ def conclude(
     looks = looks_of(visits, sights, labels, positions, frames)
     # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
     # says how much leaves hide, or how many go elsewhere.
-    lives = lives_of(histories_of(looks)).with_emptied(looks.emptied)
+    lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)
     looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
     states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(

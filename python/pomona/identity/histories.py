@@ -36,7 +36,10 @@ LATENESS, LATENESS_SPREAD = 3.0, 3.0
 """By how much fruits that were missed at first are seen worse than others: the rate of their first sights in ranks."""
 
 SHARE_GONE = 0.02
-"""Of the fruits that go between two visits, before the season says its own."""
+"""Of the fruits that go between two visits a week apart or more, before the season says its own."""
+
+WEEK = 7.0
+"""Days; between visits that are nearer in time as much fewer go, and none between two of one date."""
 
 BELIEF_GONE = 25.0
 """Fruits that this belief is worth: few against the hundreds of a row, so that thinning shows."""
@@ -62,6 +65,7 @@ class Histories:
         `visibility_classes`.
     unseen : (K, V) int64
         The same for a fruit at that place that no visit has seen.
+    days : (V,) float64
     late_ranks : (K,) float64
         How well its first sight saw a fruit that looks before had missed, as `Looks.views`; NaN of all others, and
         where nobody counted.
@@ -71,16 +75,17 @@ class Histories:
     in_view: NDArray[np.bool_]
     classes: NDArray[np.int64]
     unseen: NDArray[np.int64]
+    days: NDArray[np.float64]
     late_ranks: NDArray[np.float64]
 
 
-def histories_of(looks: Looks) -> Histories:
-    """Return what the looks say of each fruit."""
+def histories_of(looks: Looks, days: NDArray[np.float64]) -> Histories:
+    """Return what the looks say of each fruit; `days`, (V,), of the visits."""
     classes, unseen = visibility_classes(looks)
     rows, first = np.arange(len(looks.seen)), looks.seen.argmax(axis=1)
     is_late = looks.is_counted[first] & (unseen[rows, first] > 0)
     ranks = np.where(is_late, looks.views[rows, first].round(RANK_DIGITS), np.nan)
-    return Histories(looks.seen, looks.in_view, classes, unseen, ranks)
+    return Histories(looks.seen, looks.in_view, classes, unseen, days, ranks)
 
 
 class HistoryOdds:
@@ -116,13 +121,15 @@ class HistoryOdds:
         places, self.n_at = np.unique(np.concatenate([one.in_view, one.unseen], axis=1), axis=0, return_counts=True)
         self.place_in_view, self.place_classes = places[:, : self.n_visits] > 0, places[:, self.n_visits :]
         self.n_looks = self.place_in_view.sum(axis=1)
+        self.goes = np.diff(np.floor(one.days)) > 0
+        self.share_gone = np.where(self.goes, SHARE_GONE * np.minimum(np.diff(one.days) / WEEK, 1.0), 0.0)
         logits = np.log(CHANCES_OF_SEEING / (1.0 - CHANCES_OF_SEEING))
         self.told = logits - logits[0]
 
     def start(self) -> NDArray[np.float64]:
         """Return what is believed beforehand: level, slope, lateness, the classes' own, logits of what goes."""
-        believed = np.log(SHARE_GONE / (1.0 - SHARE_GONE))
-        return np.concatenate([np.zeros(3 + len(self.told)), np.full(self.n_visits - 1, believed)])
+        believed = np.where(self.goes, self.share_gone, SHARE_GONE)
+        return np.concatenate([np.zeros(3 + len(self.told)), np.log(believed / (1.0 - believed))])
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
@@ -131,6 +138,8 @@ class HistoryOdds:
 
     def __call__(self, told: NDArray[np.float64], share_false: float) -> tuple[float, NDArray[np.float64]]:
         """Return minus the log posterior and its gradient."""
+        from scipy.special import xlogy
+
         n_own = 3 + len(self.told)
         chances, leaving = self._chances(told), self._leaving(told)
         density = 1.0 - chances / MOST_SEEING
@@ -160,11 +169,11 @@ class HistoryOdds:
         value += self.closed_late[0] * _log_rate(lateness) - lateness * self.closed_late[1]
         of_lateness = n_late * (1.0 / lateness - 1.0 / np.expm1(lateness)) - ranks
         slopes = [LEVEL_SPREAD * of_logit.sum(), SLOPE_SPREAD * of_logit @ self.told, LATENESS_SPREAD * of_lateness]
-        went_before, stayed_before = BELIEF_GONE * SHARE_GONE, BELIEF_GONE * (1.0 - SHARE_GONE)
+        went_before, stayed_before = BELIEF_GONE * self.share_gone, BELIEF_GONE * (1.0 - self.share_gone)
         went, stayed, goes = went[1:] + went_before, stayed[1:] + stayed_before, leaving[1:]
-        value += (went_before * np.log(goes) + stayed_before * np.log1p(-goes)).sum()
+        value += (xlogy(went_before, goes) + stayed_before * np.log1p(-goes)).sum()
         value -= 0.5 * told[:n_own] @ told[:n_own]
-        gradient = np.concatenate([slopes, OWN_SPREAD * of_logit, went * (1.0 - goes) - stayed * goes])
+        gradient = np.concatenate([slopes, OWN_SPREAD * of_logit, self.goes * (went * (1.0 - goes) - stayed * goes)])
         gradient[:n_own] -= told[:n_own]
         return -value, -gradient
 
@@ -196,8 +205,8 @@ class HistoryOdds:
         return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - OWN_SPREAD * told[3 : 3 + len(self.told)])))
 
     def _leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the share that goes before each visit, (V,); none before the first."""
-        return np.concatenate([[0.0], 1.0 / (1.0 + np.exp(-told[3 + len(self.told) :]))])
+        """Return the share that goes before each visit, (V,); none before the first, nor between two of one date."""
+        return np.concatenate([[0.0], self.goes / (1.0 + np.exp(-told[3 + len(self.told) :]))])
 
     @staticmethod
     def _lateness(told: NDArray[np.float64]) -> float:

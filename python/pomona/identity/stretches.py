@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.links import GOES_IN_DAYS
-
 __all__ = ["LIKELY", "FoundAround", "emptied_stretches"]
 
 AT_EACH_END = 3
@@ -90,7 +88,7 @@ def emptied_stretches(
 
     against that each visit since left out this very stretch, or that leaves hide all of it, with $m$ the share of
     other fruits that the visit misses. Fruits do not come back: of the visits before one that has three fruits there
-    nothing is said, nor of one on the same day. Of what was not asked it is 0.
+    nothing is said, nor of one on the same date. Of what was not asked it is 0.
 
     Parameters
     ----------
@@ -101,12 +99,13 @@ def emptied_stretches(
     """
     is_near = seen | np.stack([visit.is_near for visit in visits], axis=1)
     rows = [_along_row(visit.fruits) if visit.is_asked else None for visit in visits]
+    dates = np.floor(days)
     missed = _shares_missed(seen, is_near)
     last = len(visits) - 1 - is_near[:, ::-1].argmax(axis=1)
     share, left_out, hidden = np.zeros(len(seen)), np.ones(len(seen)), np.ones(len(seen))
     gaps: list[list[_Gap]] = []
     for number, (visit, along) in enumerate(zip(visits, rows, strict=True)):
-        since = (last < number) & (days[number] - days[last] >= GOES_IN_DAYS)
+        since = (last < number) & (dates[number] > dates[last])
         gaps.append([] if along is None else list(_gaps(visit, along, since)))
         for gap in gaps[-1]:
             n_inside = np.count_nonzero(gap.holds & seen[:, last[gap.place]])
@@ -123,7 +122,7 @@ def emptied_stretches(
         if along is None or not (told[:, number] > LIKELY).any():
             continue
         # At the ends of the gap the fruits of the next tree are near, and what was missed there may be one of them.
-        beside = is_near[:, number] & (last_seen < number) & (days[number] - days[last_seen] >= GOES_IN_DAYS)
+        beside = is_near[:, number] & (last_seen < number) & (dates[number] > dates[last_seen])
         inner_chances = told[:, number].copy()
         for gap in _gaps(visit, along, beside):
             told[gap.place, number] = inner_chances[gap.holds].max(initial=0.0) / (1.0 + missed[number])
