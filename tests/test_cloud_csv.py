@@ -112,6 +112,10 @@ def test_a_blank_diameter_is_unknown(tmp_path: Path) -> None:
             "line 2 (row 0), column diameter_m: found '-1', expected a positive number or nothing",
         ),
         (
+            "x,y,z,diameter_m\n1,2,3,0.066\n4,5,6,66\n",
+            "line 3 (row 1), column diameter_m: found '66', expected at most 1 m or nothing",
+        ),
+        (
             "cxx,x,y,z,cyy,czz,cxy,cxz,cyz\n1,1,2,3,1,1,0,0,0\n\n1,1,2,3,1,1,2,0,0\n",
             "line 4 (row 1), columns cxx,cyy,czz,cxy,cxz,cyz: found a matrix that is not positive semi-definite, "
             "expected a covariance",

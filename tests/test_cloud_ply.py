@@ -115,8 +115,12 @@ def test_no_vertices_is_a_cloud_without_fruits(tmp_path: Path) -> None:
             "comments name id of 1 fruits, expected 2, one a fruit",
         ),
         (
+            ascii_ply(1, "1 2 3 66\n", "property float diameter_m\n"),
+            "row 0, property diameter_m: found 66.0, expected a positive number or nan, at most 1 m",
+        ),
+        (
             ascii_ply(1, "1 2 3 0\n", "property float diameter_m\n"),
-            "row 0, property diameter_m: found 0.0, expected a positive number or nan",
+            "row 0, property diameter_m: found 0.0, expected a positive number or nan, at most 1 m",
         ),
     ],
 )

@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BLANKABLE",
+    "LARGEST_DIAMETER_M",
     "MOST_WHOLE",
     "NUMBERS",
     "WHOLE",
+    "are_diameters",
     "assemble",
     "check_names",
     "columns_for_file",
@@ -44,6 +46,9 @@ WHOLE = frozenset({"n_views"})
 
 BLANKABLE = frozenset({"diameter_m"})
 """Columns in which an empty cell means unknown."""
+
+LARGEST_DIAMETER_M = 1.0
+"""Metres; no tree bears larger fruits. Beyond it the column is in another unit."""
 
 MOST_COLUMNS = 1000
 """Of a file; each costs time in every row, and a table of measurements has some ten."""
@@ -90,7 +95,14 @@ def number(name: str, cell: str) -> float:
         raise ValueError("expected a whole number")
     if name == "diameter_m" and value <= 0:
         raise ValueError("expected a positive number or nothing")
+    if name == "diameter_m" and value > LARGEST_DIAMETER_M:
+        raise ValueError(f"expected at most {LARGEST_DIAMETER_M:g} m or nothing")
     return value
+
+
+def are_diameters(metres: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which of a column, (N,), a fruit may have, or are unknown."""
+    return np.asarray(np.isnan(metres) | ((metres > 0) & (metres <= LARGEST_DIAMETER_M)))
 
 
 def covariances_of(columns: Mapping[str, Any]) -> NDArray[np.float64] | None:

@@ -20,6 +20,7 @@ from pomona.cloud.columns import (
     MOST_WHOLE,
     NUMBERS,
     WHOLE,
+    are_diameters,
     assemble,
     check_names,
     columns_for_file,
@@ -117,9 +118,9 @@ def _read_table(file: IO[str], names: list[str], header_lines: int) -> dict[str,
     columns = {name: table[f"f{i}"] for i, name in enumerate(names)}
     for name in NUMBERS & columns.keys():
         finite = np.isfinite(columns[name]) | (np.isnan(columns[name]) if name in BLANKABLE else False)
-        positive = (columns[name] > 0) | np.isnan(columns[name]) if name == "diameter_m" else np.True_
+        possible = are_diameters(columns[name]) if name == "diameter_m" else np.True_
         whole = _whole(columns[name]) if name in WHOLE else np.True_
-        if not np.all(finite & positive & whole):
+        if not np.all(finite & possible & whole):
             return None
     if "id" in columns and not _names_each_once(columns["id"]):
         return None

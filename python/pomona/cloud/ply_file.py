@@ -16,7 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.atomic import whole_file
-from pomona.cloud.columns import MOST_WHOLE, NUMBERS, WHOLE, assemble, check_names, columns_for_file, number
+from pomona.cloud.columns import (
+    LARGEST_DIAMETER_M,
+    MOST_WHOLE,
+    NUMBERS,
+    WHOLE,
+    are_diameters,
+    assemble,
+    check_names,
+    columns_for_file,
+    number,
+)
 from pomona.cloud.typed import as_floats, as_whole
 from pomona.errors import PomonaError
 from pomona.likes import PLY_MARK
@@ -249,7 +259,8 @@ def _require_good(path: Path, name: str, values: NDArray[Any]) -> None:
     if name not in NUMBERS:
         return
     if name == "diameter_m":
-        wrong, wanted = (values <= 0) | np.isinf(values), "a positive number or nan"
+        wrong = ~are_diameters(values)
+        wanted = f"a positive number or nan, at most {LARGEST_DIAMETER_M:g} m"
     elif name in WHOLE:
         wrong, wanted = (values != np.rint(values)) | (np.abs(values) > MOST_WHOLE), "a whole number"
     else:

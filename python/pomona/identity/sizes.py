@@ -71,10 +71,10 @@ def _share_slow(off: NDArray[np.float64], spread: float, among_all: float, growt
     """Return the share of pairs that grew less, beside those that grew as all do and those that are no pairs."""
     grown, wrong = np.exp(_log_normal(off, spread)), np.exp(_log_normal(off, among_all))
     densities = np.stack([_slow(off, spread, growth), wrong + np.finfo(float).tiny, grown])
-    shares = np.array([0.1, 0.1, 0.8])
+    shares, beside = np.array([0.1, 0.1, 0.8]), np.array([0.0, 0.0, NOT_SLOW])
     for _ in range(ROUNDS):
         of_each = shares[:, None] * densities
-        shares = (of_each / of_each.sum(axis=0)).sum(axis=1) + [0.0, 0.0, NOT_SLOW]
+        shares = (of_each / of_each.sum(axis=0)).sum(axis=1) + beside
         shares /= shares.sum()
     return float(shares[0] / (1.0 - shares[1]))
 
