@@ -12,7 +12,7 @@ __all__ = ["Chance", "evenly_spread"]
 
 _SEED = 22
 
-Shared = Literal["visits", "straying", "errors", "camera"]
+Shared = Literal["visits", "straying", "errors", "camera", "hanging"]
 Single = Literal["fruits", "trees", "later", "hanging"]
 
 Numbers = NDArray[np.float64]
@@ -56,7 +56,7 @@ class Chance:
     def __init__(self, name: str, count: int, n_shapes: int, n_visits: int) -> None:
         # With the mean, and with the day after the last visit.
         shared: dict[Shared, int] = {"visits": n_visits + 1, "straying": n_visits + 1, "errors": n_visits}
-        shared["camera"] = 1
+        shared["camera"] = shared["hanging"] = 1
         self._name = name
         # All in one: two sets of points that are spread evenly each are not so together.
         even = evenly_spread(name, count, n_shapes + sum(shared.values()))
