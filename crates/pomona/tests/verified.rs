@@ -172,6 +172,47 @@ fn two_equal_trees_are_ambiguous() {
     assert!((shift - 4.0).abs() < 0.05, "the two answers lie {shift} m apart");
 }
 
+/// The camera lost its way in the middle of the row: what lies behind is off by a metre and turned.
+fn torn_apart(scene: &Scene) -> [Vec<bool>; 2] {
+    let along = |p: &Point3<f64>| scene.map_from_query.apply(p).x;
+    let mut places: Vec<f64> = scene.query.positions.iter().map(along).collect();
+    places.sort_by(f64::total_cmp);
+    let behind: Vec<bool> = scene.query.positions.iter().map(|p| along(p) > places[places.len() / 2]).collect();
+    [behind.iter().map(|behind| !behind).collect(), behind]
+}
+
+#[test]
+fn a_row_that_is_torn_apart_is_one_answer_of_two_parts() {
+    for seed in 0..3 {
+        let mut scene = visits(seed, 6, 0.2, 0.02);
+        let parts = torn_apart(&scene);
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.17);
+        let moved = Similarity::rigid(turn, Vector3::new(1.0, 0.2, 0.0));
+        let of_behind = scene.map_from_query.inverse().compose(&moved).compose(&scene.map_from_query);
+        for (p, _) in scene.query.positions.iter_mut().zip(&parts[1]).filter(|(_, behind)| **behind) {
+            *p = of_behind.apply(p);
+        }
+        let found = default_search(&scene.query, &scene.map);
+        assert_eq!(found.verdict, Verdict::Found, "seed {seed}");
+        let (right, reported, _) = score(&scene, &found);
+        assert!(right as f64 > 0.93 * reported as f64, "seed {seed}: {right} of {reported} are right");
+        let share_found = |part: &[bool]| {
+            let due = (0..part.len()).filter(|&i| part[i] && scene.partner[i].is_some()).count();
+            found.pairs.iter().filter(|pair| part[pair.query]).count() as f64 / due as f64
+        };
+        let shares = [&parts[0], &parts[1]].map(|part| share_found(part));
+        assert!(shares.iter().all(|&share| share > 0.85), "seed {seed}: {shares:?}");
+        // The pose is that of a part, and none between the two.
+        let of_part = |part: usize, truth: &Similarity| {
+            let fruits = (0..scene.query.len()).filter(|&i| parts[part][i]).collect::<Vec<_>>();
+            apart(&scene.query.select(&fruits), &pose(&found), truth)
+        };
+        let before = of_part(0, &scene.map_from_query);
+        let behind = of_part(1, &scene.map_from_query.compose(&of_behind.inverse()));
+        assert!(before.min(behind) < 0.08 && before.max(behind) > 0.5, "seed {seed}: {before} {behind}");
+    }
+}
+
 #[test]
 fn a_known_vertical_refuses_what_stands_on_its_head() {
     let scene = visits(11, 3, 0.3, 0.02);

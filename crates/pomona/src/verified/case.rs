@@ -1,6 +1,7 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
 use super::acceptance::{KEPT, VerifiedConfig, WORTH_IT, poses, reached};
+use super::doubts::Rated;
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
 use super::landscape::Landscape;
@@ -90,9 +91,9 @@ impl Finding<'_> {
         self.settled.as_ref().map_or(f64::NEG_INFINITY, |settled| settled.evidence)
     }
 
-    /// Evidence as it grew or as it stands in the end, nats, whichever is more.
-    pub(super) fn most_evidence(&self) -> f64 {
-        self.overlap.log_odds.max(self.evidence())
+    /// What it explains, with its evidence as it grew or as it stands in the end, whichever is more.
+    pub(super) fn rated(&self) -> Rated<'_> {
+        Rated { overlap: &self.overlap, nats: self.overlap.log_odds.max(self.evidence()) }
     }
 
     /// Share of the fruits of the query that are found, of those that the map can show in their depths all along the row.
@@ -115,7 +116,7 @@ pub(super) struct Search<'a> {
     pub(super) prepared: &'a VerifiedMap,
     pub(super) model: Model,
     pub(super) config: VerifiedConfig,
-    noise_m: Option<f64>,
+    pub(super) noise_m: Option<f64>,
 }
 
 /// What the search did.

@@ -2,14 +2,16 @@
 
 use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Log, Search};
+use super::doubts::Rated;
 use super::overlap::Overlap;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
 
-impl Search<'_> {
+impl<'a> Search<'a> {
     /// The answer to what was found.
-    pub(super) fn answer_of(&self, mut findings: Findings) -> Match {
+    pub(super) fn answer_of(&self, mut findings: Findings<'a>) -> Match {
+        self.join(&mut findings.accepted);
         let mut stages = self.stages(&findings);
         if let Some(doubt) = findings.accepted.first().and_then(|best| self.doubt_of(best, &findings.log)) {
             stages.push((doubt, 1.0));
@@ -37,16 +39,17 @@ impl Search<'_> {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
         let overlap = Overlap { log_odds, ..settled.overlap };
-        let most = log_odds.max(settled.evidence);
-        let rivals = |other: &Finding| self.rivals((&overlap, most), (&other.overlap, other.most_evidence()), pattern);
+        let best = Rated { overlap: &overlap, nats: log_odds.max(settled.evidence) };
         let pairs = self.pairs(&settled.beliefs, &overlap);
-        let outdone = others.iter().any(rivals);
+        let outdone = others.iter().any(|other| self.outdoes(best, other.rated(), pattern));
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
-        let rivals: Vec<Registration> =
-            accepted.filter(rivals).map(|finding| self.registration(&finding.overlap)).collect();
+        let rivals: Vec<Registration> = accepted
+            .filter(|other| self.excludes(best, other.rated(), pattern))
+            .map(|finding| self.registration(&finding.overlap))
+            .collect();
         Match {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),

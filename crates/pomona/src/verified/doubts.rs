@@ -13,7 +13,7 @@ use super::search::REACH;
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::moments::Moments;
-use crate::neighbours::tree::single;
+use crate::neighbours::tree::{Tree, single};
 use nalgebra::{Point3, Vector3};
 
 /// Candidates that are refined in search of a rival once a pose is accepted.
@@ -30,6 +30,13 @@ const MIRRORED: f64 = 1.3;
 
 /// Turn about each axis that a polish tries either way, radians: 7 degrees.
 const POLISH_TURN_RAD: f64 = 0.13;
+
+/// An overlap and its evidence, nats.
+#[derive(Clone, Copy)]
+pub(super) struct Rated<'a> {
+    pub(super) overlap: &'a Overlap,
+    pub(super) nats: f64,
+}
 
 impl<'a> Search<'a> {
     /// Grows what the candidates that no finding explains propose: a second tree that looks the same has seeds too, but
@@ -121,13 +128,39 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether another optimum has nearly as much evidence, nats, elsewhere.
+    /// Whether another optimum has nearly as much evidence, nats, elsewhere, of which it puts this share of its fruits.
     ///
     /// What it puts where the best has it speaks for the best, so its evidence counts by the share that it puts elsewhere: of the
     /// best's fruits, and of its own, for a pose that is found on one tree says little of where another stands.
-    pub(super) fn rivals(&self, (best, most): (&Overlap, f64), (other, nats): (&Overlap, f64), pattern: f64) -> bool {
-        let elsewhere = self.elsewhere(best, other).min(self.unexplained(best, other));
-        is_most(elsewhere) && elsewhere * nats > pattern.max(RIVAL * most)
+    fn rivals(&self, best: Rated, other: Rated, share: f64, pattern: f64) -> bool {
+        let elsewhere = self.elsewhere(best.overlap, other.overlap).min(share);
+        is_most(elsewhere) && elsewhere * other.nats > pattern.max(RIVAL * best.nats)
+    }
+
+    /// Whether an optimum that was not accepted shows that wrong poses reach nearly as much on this planting, wherever it lies.
+    pub(super) fn outdoes(&self, best: Rated, other: Rated, pattern: f64) -> bool {
+        self.rivals(best, other, self.unexplained(best.overlap, other.overlap), pattern)
+    }
+
+    /// Whether both cannot be true: a row that is torn apart has a pose before and one behind, and neither doubts the other.
+    pub(super) fn excludes(&self, best: Rated, other: Rated, pattern: f64) -> bool {
+        self.rivals(best, other, self.contradicted(best.overlap, other.overlap), pattern)
+    }
+
+    /// Share of the fruits of another optimum's overlap that the best puts elsewhere, or where it puts others.
+    pub(super) fn contradicted(&self, best: &Overlap, other: &Overlap) -> f64 {
+        let landings: Vec<_> = best.predictions.iter().flatten().map(|at| single(&at.place)).collect();
+        let (taken, reach) = (Tree::new(&landings), 0.5 * self.map.spacing);
+        let mut nearest = Vec::new();
+        let both = best.predictions.iter().zip(&other.predictions);
+        share(both.filter_map(|(best, other)| {
+            let there = other.as_ref()?.place;
+            if let Some(at) = best {
+                return Some((at.place - there).norm() > reach);
+            }
+            taken.nearest(&single(&there), 1, &mut nearest);
+            Some(nearest.first().is_some_and(|&(_, d2)| f64::from(d2) < reach * reach))
+        }))
     }
 
     /// Whether another optimum puts most fruits of the overlap elsewhere.

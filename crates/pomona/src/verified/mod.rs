@@ -45,6 +45,7 @@ mod offsets;
 mod outlier;
 mod overlap;
 mod pairing;
+mod parts;
 mod patches;
 mod proposal;
 mod scatter;
