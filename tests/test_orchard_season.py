@@ -248,7 +248,7 @@ def test_fruitlets_that_will_drop_keep_their_identity(row: FruitCloud, tmp_path:
         places = row.positions[seen] + rng.normal(0.0, 0.006, (len(seen), 3))
         cloud = FruitCloud(places, ids=tuple(map(str, seen)), diameters_m=sizes_m[seen])
         visits.append(Session(DATES[number], DATES[number], "test", cloud))
-    orchard = OrchardMap(grown(tmp_path / "orchard.gpkg", visits))
+    orchard = OrchardMap(grow_map(tmp_path / "orchard.gpkg", visits))
     seen = orchard.observations()
     sights: dict[int, list[int]] = {}
     for fruit, label in zip(seen.labels, seen.fruit_ids.tolist(), strict=True):

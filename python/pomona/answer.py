@@ -44,8 +44,8 @@ class Match:
     probabilities
         (M,), probability that the two are one fruit.
     distances_m
-        (M,), how far the partner lies from where the fruit is expected, metres of the map. Rows bend and branches sag, so that is
-        not where `map_from_query` puts it.
+        (M,), how far the partner lies from where the fruit is expected, metres of the map. Rows bend and branches
+        sag, so that is not where `map_from_query` puts it.
     support
         (M,), what speaks for the pair: votes (paper) or nats (verified).
     alternatives
