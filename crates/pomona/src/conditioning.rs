@@ -19,7 +19,6 @@ use crate::cloud::{FruitCloud, Views};
 use crate::error::{Error, Result};
 use crate::geometry::{Scale, Similarity};
 use crate::neighbours::cells::{CellKey, CellMap};
-use crate::principal::Principal;
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
@@ -96,7 +95,7 @@ impl Conditioned {
     /// Turned into its principal axes.
     #[must_use]
     pub(crate) fn turned(mut self) -> Self {
-        self.axes = own_axes(&self.cloud.positions);
+        self.axes = principal_axes(&self.cloud.positions);
         for p in &mut self.cloud.positions {
             *p = self.axes.inverse_transform_point(p);
         }
@@ -334,16 +333,20 @@ fn middle(positions: &[Point3<f64>], rows: &[usize]) -> Vector3<f64> {
     origin.coords + sum / rows.len() as f64
 }
 
-/// Principal axes about the origin, the first two pointing where the third moment is above zero, which no turn of the frame
-/// changes.
-fn own_axes(positions: &[Point3<f64>]) -> Rotation3<f64> {
-    let places: Vec<Vector3<f64>> = positions.iter().map(|p| p.coords).collect();
-    let Some(principal) = Principal::of(places.iter()) else { return Rotation3::identity() };
-    let [along, up, _] = principal.ways().map(|axis| {
-        let third: f64 = places.iter().map(|p| axis.dot(p).powi(3)).sum();
+/// The principal axes of places about their mean as a proper rotation, the longest first. The first two point where the third
+/// moment is above zero, which no turn of the frame changes.
+fn principal_axes(positions: &[Point3<f64>]) -> Rotation3<f64> {
+    let scatter: Matrix3<f64> = positions.iter().map(|p| p.coords * p.coords.transpose()).sum();
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let [along, up] = [order[0], order[1]].map(|i| {
+        let axis = eigen.eigenvectors.column(i).into_owned();
+        let third: f64 = positions.iter().map(|p| axis.dot(&p.coords).powi(3)).sum();
         if third < 0.0 { -axis } else { axis }
     });
-    Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[along, up, along.cross(&up)]))
+    let axes = Matrix3::from_columns(&[along, up, along.cross(&up)]);
+    if axes.iter().all(|x| x.is_finite()) { Rotation3::from_matrix_unchecked(axes) } else { Rotation3::identity() }
 }
 
 fn moved(cloud: &FruitCloud, rows: &[usize], first_of: &[usize], middle: &Vector3<f64>, unit: f64) -> FruitCloud {
