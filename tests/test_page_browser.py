@@ -56,12 +56,20 @@ def shown_rows(page: Any) -> list[list[str]]:
 
 
 def lefts_of(page: Any, role: str) -> list[float]:
-    """Where the first cells of that role begin, one for each column, read in one go."""
-    n_columns = page.locator("[role=columnheader]").count()
-    cells = page.locator(f"[role=table] [role={role}]")
-    cells.first.wait_for()
-    lefts: list[float] = cells.evaluate_all("cells => cells.map(cell => Math.round(cell.getBoundingClientRect().x))")
-    return lefts[:n_columns]
+    """Where the first cells of that role begin, one for each column, read in one go.
+
+    In one go, for a table that was just scrolled draws its rows anew: cells found first and
+    measured afterwards may be off the page by then.
+    """
+    page.locator(f"[role=table] [role={role}]").first.wait_for()
+    lefts: list[float] = page.evaluate(
+        """role => {
+            const found = document.querySelectorAll(`[role=table] [role=${role}]`);
+            return [...found].map(cell => Math.round(cell.getBoundingClientRect().x));
+        }""",
+        role,
+    )
+    return lefts[: page.locator("[role=columnheader]").count()]
 
 
 def wait_for(locator: Any, text: str) -> None:
