@@ -10,9 +10,10 @@ from command_line import assert_refused
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.synth.clouds import CELLS, ScenePair, scene_pair
-from pomona.synth.disturbances import bent, left_after_thinning, merged, split
+from pomona.synth.disturbances import bent, left_after_thinning, merged, split, torn
 from pomona.synth.named_cells import ROWS
 from pomona.synth.planting import RowShape, grow_row
+from pomona.synth.scenes import draw_scene
 
 
 def common(pair: ScenePair) -> tuple[np.ndarray, np.ndarray]:
@@ -247,6 +248,29 @@ def test_thinning_takes_whole_clusters_of_the_second_visit(name: str, left: floa
     _, cluster = np.unique(place, axis=1, return_inverse=True)
     of_each = [set(kept[cluster.ravel() == number]) for number in range(cluster.max() + 1)]
     assert all(len(fates) == 1 for fates in of_each)
+
+
+@pytest.mark.parametrize(("name", "stands"), [("replanted50", 0.5), ("replanted80", 0.2)])
+def test_trees_give_way_to_others_whole(name: str, stands: float) -> None:
+    standing = []
+    for seed in range(20):
+        truth = draw_scene(np.random.default_rng(seed), CELLS[name])
+        old = [truth.in_query[truth.in_map & (truth.row.tree == tree)] for tree in range(10)]
+        new = [np.count_nonzero(truth.in_query & ~truth.in_map & (truth.row.tree == tree)) for tree in range(10)]
+        assert all(left.all() != (left.sum() == 0) for left in old)
+        assert [left.all() for left in old] == [others == 0 for others in new]
+        assert any(left.all() for left in old)
+        standing += [left.all() for left in old]
+    assert np.mean(standing) == pytest.approx(stands, abs=0.1)
+
+
+def test_a_row_is_torn_in_its_last_third() -> None:
+    row = np.linspace([0.0, 0.0, 1.0], [9.0, 0.0, 1.0], 10)
+    moved = torn(np.random.default_rng(0), row, 1.0) - row
+    np.testing.assert_allclose(moved[:7], 0.0)
+    steps = np.diff(moved[7:], axis=0)
+    assert np.all(np.abs(np.linalg.norm(moved[7:], axis=1) - 1.0) < 0.6)
+    np.testing.assert_allclose(np.linalg.norm(steps, axis=1), 2.0 * np.sin(np.radians(5.0)), rtol=1e-6)
 
 
 @pytest.mark.parametrize(("name", "drift"), [("drift1", 0.01), ("drift3", 0.03)])

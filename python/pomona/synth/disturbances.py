@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
     from pomona.synth.planting import Row
 
-__all__ = ["bent", "in_frame", "in_sight", "left_after_thinning", "merged", "sagged", "split"]
+__all__ = ["bent", "in_frame", "in_sight", "left_after_thinning", "merged", "sagged", "split", "torn"]
 
 _MERGED_WITHIN_M = 0.10
 _SPLIT_M = (0.03, 0.05)
+_TORN_TURN_RAD = np.radians(10.0)
 
 
 def sagged(rng: np.random.Generator, row: Row, sag_m: float) -> NDArray[np.float64]:
@@ -41,6 +42,21 @@ def bent(rng: np.random.Generator, positions: NDArray[np.float64], drift: float)
     signs = rng.choice([-1.0, 1.0], 3)
     shift = np.stack([along, along**2, along**2], axis=1)
     return np.asarray(positions + drift * half * signs * shift)
+
+
+def torn(rng: np.random.Generator, positions: NDArray[np.float64], tear_m: float) -> NDArray[np.float64]:
+    """Move and turn the last third of a row: `tear_m` in a random direction, 10 degrees about the vertical."""
+    if tear_m == 0.0:
+        return positions
+    low, high = positions[:, 0].min(), positions[:, 0].max()
+    cut = low + (high - low) * 2.0 / 3.0
+    behind = positions[:, 0] > cut
+    turn = np.copysign(_TORN_TURN_RAD, rng.random() - 0.5)
+    rotation = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
+    moved = positions.copy()
+    moved[behind] = (positions[behind] - [cut, 0.0, 0.0]) @ rotation.T + [cut, 0.0, 0.0]
+    moved[behind] += tear_m * unit_vectors(rng, ())
+    return moved
 
 
 def left_after_thinning(rng: np.random.Generator, row: Row, share: float) -> NDArray[np.bool_]:

@@ -43,6 +43,10 @@ class Cell:
         Share of its length by which the second visit is stretched and bent.
     thinned
         Probability that a cluster is gone on the second visit.
+    replanted
+        Probability that a tree has given way to another before the second visit; one at least stands.
+    tear_m
+        How far the second visit is off in the last third of the row, where its camera lost the way; 0: nowhere.
     fade_m
         Depth over which sight fades, the visits looking from opposite sides; 0: both see alike.
     depth_noise
@@ -76,6 +80,8 @@ class Cell:
     growth: tuple[float, float] | None = None
     drift: float = 0.0
     thinned: float = 0.0
+    replanted: float = 0.0
+    tear_m: float = 0.0
     fade_m: float = 0.0
     depth_noise: float = 1.0
     doubled: float = 0.0
@@ -290,6 +296,7 @@ _OPPOSITE = replace(_BASE, name="opposite25", hidden=0.1, fade_m=0.1, depth_nois
 _OPPOSITE8 = replace(_OPPOSITE, name="opposite8", fade_m=0.03)
 _OPPOSITE8FINE = replace(_OPPOSITE8, name="opposite8fine", noise_m=0.01, depth_noise=2.5)
 _SAG = replace(_BASE, name="sag5", sag_m=0.05)
+_TEN_TREES = Cell("ten", seen=10, shared=10)
 _GROWN = replace(_O45S4, name="grown175", sizes=True, growth=(1.75, 1.75), seeded_as="o45s4")
 
 CHANGE_CELLS = (
@@ -309,10 +316,14 @@ CHANGE_CELLS = (
     replace(_BASE, name="drift1", drift=0.01),
     replace(_BASE, name="drift3", drift=0.03),
     replace(_BASE, name="doubled10", doubled=0.10),
+    replace(_TEN_TREES, name="replanted50", replanted=0.5),
+    replace(_TEN_TREES, name="replanted80", replanted=0.8),
+    replace(_TEN_TREES, name="replanted80-sparse20", replanted=0.8, row=ROWS["sparse20"]),
+    replace(_TEN_TREES, name="torn", tear_m=1.0),
     _GROWN,
     replace(_GROWN, name="grownmixed", growth=(1.5, 2.0)),
 )
-"""What changes between two visits: sides, thinning, sag, drift, doubles and growth."""
+"""What changes between two visits: sides, thinning, sag, drift, doubles, trees, growth; and a row torn apart."""
 
 _CLEAN = Cell("clean", hidden=0.0, false_rate=0.0, noise_m=0.01)
 

@@ -49,7 +49,24 @@ def _row(rng: np.random.Generator, cell: Cell) -> SceneTruth:
         row = replace(row, positions=row.positions * [1.0, 0.0, 1.0])
     first = row.tree < cell.seen
     second = row.tree >= cell.seen - cell.shared
-    return SceneTruth(row, first, second) if rng.random() < 0.5 else SceneTruth(row, second, first)
+    truth = SceneTruth(row, first, second) if rng.random() < 0.5 else SceneTruth(row, second, first)
+    return _replanted(rng, truth, cell) if cell.replanted > 0.0 else truth
+
+
+def _replanted(rng: np.random.Generator, truth: SceneTruth, cell: Cell) -> SceneTruth:
+    """Before the second visit, the query, other trees were planted in the place of some."""
+    n_trees = int(truth.row.tree.max()) + 1
+    gone = rng.random(n_trees) < cell.replanted
+    gone[rng.integers(n_trees)] = False
+    new = grow_row(rng, n_trees, cell.row)
+    new = _take(new, gone[new.tree])
+    seen = np.zeros(n_trees, bool)
+    seen[truth.row.tree[truth.in_query]] = True
+    return SceneTruth(
+        _together(truth.row, new),
+        np.concatenate([truth.in_query & ~gone[truth.row.tree], seen[new.tree]]),
+        np.concatenate([truth.in_map, np.zeros(len(new), bool)]),
+    )
 
 
 def _seen_by_both(row: Row) -> SceneTruth:
@@ -66,12 +83,17 @@ def _with_twin(row: Row, *, original: int, copy: int, spacing_m: float) -> Row:
     others = _take(row, row.tree != copy)
     twin = _take(row, row.tree == original)
     shift = np.array([(copy - original) * spacing_m, 0.0, 0.0])
+    return _together(others, replace(twin, positions=twin.positions + shift, tree=np.full(len(twin), copy)))
+
+
+def _together(one: Row, other: Row) -> Row:
+    """Put the fruits of two rows into one."""
     return Row(
-        np.concatenate([others.positions, twin.positions + shift]),
-        np.concatenate([others.tree, np.full(len(twin), copy)]),
-        np.concatenate([others.branch, twin.branch]),
-        np.concatenate([others.along_branch, twin.along_branch]),
-        row.height_m,
+        np.concatenate([one.positions, other.positions]),
+        np.concatenate([one.tree, other.tree]),
+        np.concatenate([one.branch, other.branch + one.branch.max(initial=-1) + 1]),
+        np.concatenate([one.along_branch, other.along_branch]),
+        one.height_m,
     )
 
 

@@ -20,7 +20,7 @@ use nalgebra::{Point3, Vector3};
 pub(super) const RIVAL_CANDIDATES: usize = 24;
 
 /// No other pose may have this share of the best evidence.
-const RIVAL: f64 = 0.5;
+pub(super) const RIVAL: f64 = 0.5;
 
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
 pub(super) const BENT: f64 = 0.05;

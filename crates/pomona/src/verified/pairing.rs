@@ -26,11 +26,11 @@ impl Beliefs {
     ///
     /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
     /// `p / (1 - p) N(d) / new density` against leaving both alone.
-    pub(super) fn of(laid: &Patchwork, share: f64, size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
+    pub(super) fn of(laid: &Patchwork, shares: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
         let Patchwork { query, map, .. } = *laid;
         let edge = |meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
-            let seen = share * support;
+            let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
             // As many others as the two visits laid on each other have, where the map shows as much as it does here.
             let others = laid.companions(distance) * crowding * laid.strangers * support;

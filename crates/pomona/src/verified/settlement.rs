@@ -21,6 +21,7 @@ use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::overlap::Overlap;
 use super::patches::{ALL, Landing, NEXT, Patchwork};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, Scatter, scatter};
+use super::shares::of_places;
 use super::size::Cue;
 use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
@@ -52,6 +53,8 @@ struct Settlement<'a> {
     expected: KnownNoise,
     /// Probability that a fruit which the map could have shown is there, as the pairs show it.
     share: f64,
+    /// The same of every fruit of the query, as the pairs around it show it.
+    shares: Vec<f64>,
     /// Pairs that hold the patches to their surroundings, and these to the common pose.
     holds: [f64; 2],
 }
@@ -77,7 +80,8 @@ fn settle_under(growth: &Growth, noise_m: Option<f64>, direction: Direction) -> 
         None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
     };
     let patches = Patchwork { direction, ..growth.patches.clone() };
-    let mut settlement = Settlement { patches, expected, share: DETECTION, holds: [HOLD; 2] };
+    let shares = vec![DETECTION; patches.query.len()];
+    let mut settlement = Settlement { patches, expected, share: DETECTION, shares, holds: [HOLD; 2] };
     let mut beliefs = settlement.paired(None);
     for _ in 0..TURNS {
         let cue = Cue::new([growth.patches.query, growth.patches.map], beliefs.links());
@@ -133,10 +137,11 @@ impl Settlement<'_> {
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
     fn recount(&mut self, beliefs: &Beliefs) {
-        let shown = |(row, at): (usize, &Option<Landing>)| Some(self.patches.shown(row, &(*at)?.place));
-        let due: f64 = self.patches.predictions.iter().enumerate().filter_map(shown).sum();
+        let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| self.patches.shown(row, &at.place));
+        let due: Vec<f64> = self.patches.predictions.iter().enumerate().map(shown).collect();
         let found: f64 = beliefs.probabilities.iter().sum();
-        self.share = ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1);
+        self.share = ((found + 1.0) / (due.iter().sum::<f64>() + 2.0)).clamp(SHARES.0, SHARES.1);
+        self.shares = of_places(&self.patches, beliefs, self.share, &due);
     }
 
     /// Predictions, noise and pairs under the poses as they are fitted now.
@@ -144,7 +149,7 @@ impl Settlement<'_> {
         self.predict();
         self.measure();
         let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
-        Beliefs::of(&self.patches, self.share, &size)
+        Beliefs::of(&self.patches, &self.shares, &size)
     }
 
     /// Common pose, surroundings and patches from the mean partners.
