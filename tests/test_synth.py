@@ -10,7 +10,7 @@ from command_line import assert_refused
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.synth.clouds import CELLS, ScenePair, scene_pair
-from pomona.synth.disturbances import bent, left_after_thinning, merged, split, torn
+from pomona.synth.disturbances import bent, left_after_picking, left_after_thinning, merged, split, torn
 from pomona.synth.named_cells import ROWS
 from pomona.synth.planting import RowShape, grow_row
 from pomona.synth.scenes import draw_scene
@@ -248,6 +248,16 @@ def test_thinning_takes_whole_clusters_of_the_second_visit(name: str, left: floa
     _, cluster = np.unique(place, axis=1, return_inverse=True)
     of_each = [set(kept[cluster.ravel() == number]) for number in range(cluster.max() + 1)]
     assert all(len(fates) == 1 for fates in of_each)
+
+
+def test_picking_takes_single_fruits_of_the_second_visit() -> None:
+    pairs = [scene_pair("picked80", seed) for seed in range(6)]
+    assert sum(len(pair.query) for pair in pairs) / sum(len(pair.map) for pair in pairs) == pytest.approx(0.2, abs=0.03)
+    row = grow_row(np.random.default_rng(2), 3)
+    kept = left_after_picking(np.random.default_rng(3), row, 0.5)
+    _, cluster = np.unique(np.stack([row.branch, row.along_branch]), axis=1, return_inverse=True)
+    whole = [kept[cluster.ravel() == number].mean() in (0.0, 1.0) for number in range(cluster.max() + 1)]
+    assert np.mean(whole) < 0.8
 
 
 @pytest.mark.parametrize(("name", "stands"), [("replanted50", 0.5), ("replanted80", 0.2)])

@@ -24,8 +24,8 @@ Readings where the description of the cells is open:
 - A tree that gave way to another stood at the same place of the row, of the same statistics.
 - A row torn apart is moved and turned by 10 degrees about the vertical in the last third of its length. The pose is
   that of the rest.
-- Thinning takes whole clusters before the second visit. A frame holds the fruits nearest to one of those that the
-  second visit sees.
+- Thinning takes whole clusters before the second visit, picking single fruits. A frame holds the fruits nearest to one
+  of those that the second visit sees.
 - Of the fruits seen the share `doubled` is there twice, 3-5 cm apart, and as many are tried to be one with their
   nearest.
 """
@@ -40,7 +40,17 @@ import numpy as np
 
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
-from pomona.synth.disturbances import bent, in_frame, in_sight, left_after_thinning, merged, sagged, split, torn
+from pomona.synth.disturbances import (
+    bent,
+    in_frame,
+    in_sight,
+    left_after_picking,
+    left_after_thinning,
+    merged,
+    sagged,
+    split,
+    torn,
+)
 from pomona.synth.false_points import false_points
 from pomona.synth.named_cells import CELLS, Cell
 from pomona.synth.rotations import uniform_rotation
@@ -119,7 +129,11 @@ def scene_pair(cell: str | Cell, seed: int) -> ScenePair:
     scene = draw_scene(rng, cell)
     labels = rng.permutation(len(scene.row))
     second = torn(rng, bent(rng, sagged(rng, scene.row, cell.sag_m), cell.drift), cell.tear_m)
-    left = scene.in_query & left_after_thinning(rng, scene.row, cell.thinned)
+    left = (
+        scene.in_query
+        & left_after_thinning(rng, scene.row, cell.thinned)
+        & left_after_picking(rng, scene.row, cell.picked)
+    )
     low, high = cell.scale_range or (1.0, 1.0)
     scale = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     map_visit = _visit(rng, cell, scene.row.positions, scene.in_map, labels, "m", 1.0)

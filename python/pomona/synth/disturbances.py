@@ -16,7 +16,17 @@ if TYPE_CHECKING:
 
     from pomona.synth.planting import Row
 
-__all__ = ["bent", "in_frame", "in_sight", "left_after_thinning", "merged", "sagged", "split", "torn"]
+__all__ = [
+    "bent",
+    "in_frame",
+    "in_sight",
+    "left_after_picking",
+    "left_after_thinning",
+    "merged",
+    "sagged",
+    "split",
+    "torn",
+]
 
 _MERGED_WITHIN_M = 0.10
 _SPLIT_M = (0.03, 0.05)
@@ -67,6 +77,11 @@ def left_after_thinning(rng: np.random.Generator, row: Row, share: float) -> NDA
     _, cluster = np.unique(np.stack([row.branch, row.along_branch]), axis=1, return_inverse=True)
     gone = rng.random(cluster.max(initial=-1) + 1) < share
     return np.asarray(~gone[cluster.ravel()])
+
+
+def left_after_picking(rng: np.random.Generator, row: Row, share: float) -> NDArray[np.bool_]:
+    """Tell which fruits (N,) are left when each goes with probability `share`."""
+    return np.ones(len(row), bool) if share == 0.0 else rng.random(len(row)) >= share
 
 
 def in_sight(rng: np.random.Generator, positions: NDArray[np.float64], fade_m: float, side: int) -> NDArray[np.bool_]:

@@ -43,6 +43,8 @@ class Cell:
         Share of its length by which the second visit is stretched and bent.
     thinned
         Probability that a cluster is gone on the second visit.
+    picked
+        Probability that a fruit is gone on the second visit, each for itself.
     replanted
         Probability that a tree has given way to another before the second visit; one at least stands.
     tear_m
@@ -80,6 +82,7 @@ class Cell:
     growth: tuple[float, float] | None = None
     drift: float = 0.0
     thinned: float = 0.0
+    picked: float = 0.0
     replanted: float = 0.0
     tear_m: float = 0.0
     fade_m: float = 0.0
@@ -310,6 +313,8 @@ CHANGE_CELLS = (
     replace(_OPPOSITE8FINE, name="opposite8fineup", upright=True, seeded_as="opposite8fine"),
     replace(_BASE, name="thinned30", thinned=0.3),
     replace(_BASE, name="thinned70", thinned=0.7),
+    replace(_BASE, name="picked70", picked=0.7),
+    replace(_BASE, name="picked80", picked=0.8),
     _SAG,
     replace(_SAG, name="sag10", sag_m=0.10),
     replace(_SAG, name="sag20", sag_m=0.20),
@@ -323,7 +328,7 @@ CHANGE_CELLS = (
     _GROWN,
     replace(_GROWN, name="grownmixed", growth=(1.5, 2.0)),
 )
-"""What changes between two visits: sides, thinning, sag, drift, doubles, trees, growth; and a row torn apart."""
+"""What changes between two visits: sides, thinning, picking, sag, drift, doubles, trees, growth; rows torn apart."""
 
 _CLEAN = Cell("clean", hidden=0.0, false_rate=0.0, noise_m=0.01)
 

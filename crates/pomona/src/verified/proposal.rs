@@ -240,7 +240,7 @@ mod tests {
         for (model, scale) in [(model(Scale::Metric), 1.0), (model(Scale::Free), 1.3)] {
             let moved = |p: &Point3<f64>| Point3::from(turn * p.coords * scale + Vector3::new(3.0, -1.0, 2.0));
             let map = Landscape::new(&FruitCloud::from_positions(cloud.positions.iter().map(moved).collect()));
-            for (quad, _) in longest(&query, 50) {
+            for (quad, _) in longest(&query, 50, f32::INFINITY) {
                 let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
                 let (pose, residual) =
                     proposer.fit(quad.map(|row| map.points[shown(&query, &map, row) as usize])).expect("nor its image");
@@ -261,7 +261,7 @@ mod tests {
         let model = model(Scale::Metric);
         let truth = Similarity { translation: query.centre - map.centre, ..Similarity::identity() };
         let mut looks = Vec::new();
-        for (quad, _) in longest(&query, 200) {
+        for (quad, _) in longest(&query, 200, f32::INFINITY) {
             let proposer = Proposer::new(&query, &map, &model, quad).expect("no seed is degenerate");
             for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                 let turned = truth.turned(&proposer.centroid, &Rotation3::new(axis * 0.5));

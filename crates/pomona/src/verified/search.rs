@@ -5,7 +5,7 @@ use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::{Hypothesis, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
-use super::seeds::{COMPANIONS, SHORTEST, Seed, WITHIN, canonical, longest as longest_seeds, near_ties, without_scale};
+use super::seeds::{COMPANIONS, SHORTEST, Seed, WITHIN, canonical, longest, near_ties, without_scale};
 use crate::geometry::Scale;
 use crate::random::shuffled;
 use rayon::prelude::*;
@@ -47,23 +47,29 @@ impl Search<'_> {
     /// The rounds of a search, each made when it is asked for: their seeds, and how many of their candidates are
     /// refined.
     pub(super) fn rounds(&self) -> impl Iterator<Item = (Vec<Seed>, usize)> {
-        let mut longest = Vec::new();
-        (0..).zip(ROUNDS).map(move |(round, keep)| (self.seeds_of(round, &mut longest), keep))
+        let mut long = Vec::new();
+        (0..).zip(ROUNDS).map(move |(round, keep)| (self.seeds_of(round, &mut long), keep))
     }
 
     /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
-    fn seeds_of(&self, round: usize, longest: &mut Vec<Seed>) -> Vec<Seed> {
+    fn seeds_of(&self, round: usize, long: &mut Vec<Seed>) -> Vec<Seed> {
         match round {
             0 => of_some_fruits(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
             1 => of_some_fruits(self.query, 1, 1..2),
             2 => {
                 let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
                 let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
-                *longest = longest_seeds(self.query, usize::try_from(count).unwrap_or(usize::MAX));
-                longest.split_off(longest.len() - longest.len() / THIRD_ROUND)
+                *long = self.longest_seeds(usize::try_from(count).unwrap_or(usize::MAX));
+                long.split_off(long.len() - long.len() / THIRD_ROUND)
             }
-            _ => std::mem::take(longest),
+            _ => std::mem::take(long),
         }
+    }
+
+    /// The longest seeds of the query that the map can have: what is longer than nearly all of its own, as where fruits were picked
+    /// before the query, has others between its fruits there.
+    fn longest_seeds(&self, count: usize) -> Vec<Seed> {
+        longest(self.query, count, self.prepared.seeds.longest)
     }
 
     /// Candidates of all seeds: the best `keep` of them refined, and the others in order.

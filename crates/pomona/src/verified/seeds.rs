@@ -23,6 +23,9 @@ const MIN_FLATNESS: f64 = 0.15;
 /// Seeds shorter than this, in standard deviations of the noise, fix no pose.
 pub(crate) const SHORTEST: f64 = 6.0;
 
+/// Share of the seeds of a map that are longer than any that is asked for among the longest of a query.
+const FEW: f64 = 0.05;
+
 /// Standard deviations of one axis within which noise moves what a seed shows: the numbers of its code, the longer of two
 /// lengths, and how its pose leans.
 ///
@@ -132,11 +135,12 @@ pub(crate) fn enumerate(landscape: &Landscape, companions: usize, shortest: f64)
         .collect()
 }
 
-/// The `count` seeds with the longest |AB|, in a fixed order.
+/// The `count` seeds with the longest |AB|, of those that are no longer than `most` metres, in a fixed order.
 ///
 /// Long seeds fix their pose best and have the fewest lookalikes.
-pub(crate) fn longest(landscape: &Landscape, count: usize) -> Vec<Seed> {
+pub(crate) fn longest(landscape: &Landscape, count: usize, most: f32) -> Vec<Seed> {
     let mut seeds = enumerate(landscape, COMPANIONS, 0.0);
+    seeds.retain(|(_, code)| code[0] <= most);
     if count < seeds.len() {
         seeds.select_nth_unstable_by(count, |a, b| b.1[0].total_cmp(&a.1[0]).then(a.0.cmp(&b.0)));
         seeds.truncate(count);
@@ -183,29 +187,41 @@ pub(super) fn sets_of<'a>(neighbours: &impl Fn(usize) -> &'a [u32], most: usize,
     sets
 }
 
+/// The length that [`FEW`] of these exceed.
+fn exceeded_by_few(mut lengths: Vec<f32>) -> f32 {
+    let at = (lengths.len() as f64 * (1.0 - FEW)) as usize;
+    if at < lengths.len() { *lengths.select_nth_unstable_by(at, f32::total_cmp).1 } else { f32::INFINITY }
+}
+
 /// The seeds of the map, searchable by code.
 #[derive(Debug, Clone)]
 pub(crate) struct SeedIndex {
     /// In the order of the grid.
     pub(crate) quads: Vec<Quad>,
     pub(crate) codes: CodeGrid,
+    /// Length that few of the seeds exceed, metres of the query; none where the scale is free.
+    pub(super) longest: f32,
 }
 
 impl SeedIndex {
     pub(crate) fn new(landscape: &Landscape, scale: Scale, shortest: f64) -> Self {
         let seeds = enumerate(landscape, COMPANIONS, shortest);
+        let longest = match scale {
+            Scale::Metric => exceeded_by_few(seeds.iter().map(|(_, code)| code[0]).collect()),
+            Scale::Free => f32::INFINITY,
+        };
         let code = |(_, code): &(Quad, Code)| match scale {
             Scale::Metric => *code,
             Scale::Free => without_scale(code),
         };
         let (codes, order) = CodeGrid::new(seeds.len(), |row| code(&seeds[row]));
         let quads = order.par_iter().map(|&row| seeds[row as usize].0).collect();
-        Self { quads, codes }
+        Self { quads, codes, longest }
     }
 
     /// Of no seeds.
     pub(super) fn empty() -> Self {
-        Self { quads: Vec::new(), codes: CodeGrid::new(0, |_| Code::default()).0 }
+        Self { quads: Vec::new(), codes: CodeGrid::new(0, |_| Code::default()).0, longest: f32::INFINITY }
     }
 }
 

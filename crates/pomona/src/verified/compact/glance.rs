@@ -119,7 +119,7 @@ mod tests {
         let shift = query.centre - map.centre;
         let partner = |row: u32| map.nearest(&(query.points[row as usize] + shift), 0.05).map(|(row, _)| row);
         let (mut tried, mut passed, mut dropped) = (0, 0, 0);
-        for (quad, _) in longest(&query, 20_000) {
+        for (quad, _) in longest(&query, 20_000, f32::INFINITY) {
             let [Some(a), Some(b), Some(c), Some(d)] = quad.map(partner) else { continue };
             let there = [a, b, c, d];
             let elsewhere = (a + map.len() as u32 / 2) % map.len() as u32;
