@@ -61,6 +61,39 @@ impl Beliefs {
         }
     }
 
+    /// The same of several lists of edges: of all one-to-one sets of all of them, by lists.
+    pub(crate) fn together(lists: &[Vec<Edge>], n_query: usize, n_map: usize) -> Vec<Self> {
+        let counts: Vec<usize> = lists.iter().map(Vec::len).collect();
+        let Self { mut edges, mut probabilities, log_sum } = Self::new(lists.concat(), n_query, n_map);
+        let of_list = |count: &usize| {
+            let rest = (edges.split_off(*count), probabilities.split_off(*count));
+            let (edges, probabilities) =
+                (std::mem::replace(&mut edges, rest.0), std::mem::replace(&mut probabilities, rest.1));
+            Self { edges, probabilities, log_sum }
+        };
+        counts.iter().map(of_list).collect()
+    }
+
+    /// Lists that belong together in one: an edge that several have is as probable as all of them say.
+    pub(crate) fn of_lists<'a>(lists: impl Iterator<Item = &'a Self>) -> Self {
+        let mut links: Vec<(Edge, f64)> = Vec::new();
+        let mut log_sum = 0.0;
+        for list in lists {
+            links.extend(list.links().map(|(edge, probability)| (*edge, probability)));
+            log_sum = list.log_sum;
+        }
+        links.sort_by_key(|(edge, _)| (edge.query, edge.map));
+        links.dedup_by(|next, first| {
+            let same = (next.0.query, next.0.map) == (first.0.query, first.0.map);
+            if same {
+                first.1 += next.1;
+            }
+            same
+        });
+        let (edges, probabilities) = links.into_iter().unzip();
+        Self { edges, probabilities, log_sum }
+    }
+
     /// The one-to-one edges that gain most expected right answers, by rows of the query, with their probabilities: a
     /// wrong one costs as much as one of `least` is worth.
     pub(crate) fn chosen(&self, n_query: usize, n_map: usize, least: f64) -> Vec<(Edge, f64)> {
@@ -119,6 +152,20 @@ mod tests {
             assert!((found - truth).abs() < within, "{found} {truth}");
         }
         assert!((found.log_sum - sum).abs() < 3.0 * within, "{} {sum}", found.log_sum);
+    }
+
+    #[test]
+    fn lists_share_the_fruits_and_an_edge_of_two_lists_is_as_probable_as_both_say() {
+        let edge = |query, map, ratio| Edge { query, map, ratio };
+        let lists = [vec![edge(0, 0, 5.0), edge(1, 1, 3.0)], vec![edge(0, 0, 2.0), edge(0, 1, 0.7)]];
+        let [one, other] = Beliefs::together(&lists, 2, 2).try_into().expect("two lists");
+        let all = Beliefs::new(lists.concat(), 2, 2);
+        assert_eq!([one.probabilities.clone(), other.probabilities.clone()].concat(), all.probabilities);
+        let merged = Beliefs::of_lists([&one, &other].into_iter());
+        let pairs: Vec<(u32, u32)> = merged.edges.iter().map(|edge| (edge.query, edge.map)).collect();
+        assert_eq!(pairs, [(0, 0), (0, 1), (1, 1)]);
+        let said = one.probabilities[0] + other.probabilities[0];
+        assert!((merged.probabilities[0] - said).abs() < 1e-12);
     }
 
     #[test]

@@ -195,34 +195,40 @@ fn torn_apart(scene: &Scene) -> [Vec<bool>; 2] {
     [behind.iter().map(|behind| !behind).collect(), behind]
 }
 
+/// Moves what lies behind the middle of the row by `moved`, in the map; returns the truth of both parts.
+fn tear(scene: &mut Scene, parts: &[Vec<bool>; 2], moved: &Similarity) -> [Similarity; 2] {
+    let of_behind = scene.map_from_query.inverse().compose(moved).compose(&scene.map_from_query);
+    for (p, _) in scene.query.positions.iter_mut().zip(&parts[1]).filter(|(_, behind)| **behind) {
+        *p = of_behind.apply(p);
+    }
+    [scene.map_from_query, scene.map_from_query.compose(&of_behind.inverse())]
+}
+
 #[test]
 fn a_row_that_is_torn_apart_is_one_answer_of_two_parts() {
-    for seed in 0..3 {
+    // Off by a metre and turned; and laid over what lies before, as by a camera that begins anew.
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.17);
+    let off = Similarity::rigid(turn, Vector3::new(1.0, 0.2, 0.0));
+    let over = Similarity::rigid(Rotation3::identity(), Vector3::new(-3.6, 0.05, 0.0));
+    for (seed, moved, least) in (0..3).flat_map(|seed| [(seed, off, 0.95), (seed, over, 0.75)]) {
         let mut scene = visits(seed, 6, 0.2, 0.02);
         let parts = torn_apart(&scene);
-        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.17);
-        let moved = Similarity::rigid(turn, Vector3::new(1.0, 0.2, 0.0));
-        let of_behind = scene.map_from_query.inverse().compose(&moved).compose(&scene.map_from_query);
-        for (p, _) in scene.query.positions.iter_mut().zip(&parts[1]).filter(|(_, behind)| **behind) {
-            *p = of_behind.apply(p);
-        }
+        let truths = tear(&mut scene, &parts, &moved);
         let found = default_search(&scene.query, &scene.map);
         assert_eq!(found.verdict, Verdict::Found, "seed {seed}");
         let (right, reported, _) = score(&scene, &found);
-        assert!(right as f64 > 0.93 * reported as f64, "seed {seed}: {right} of {reported} are right");
+        assert!(right as f64 > 0.9 * reported as f64, "seed {seed}: {right} of {reported} are right");
         let share_found = |part: &[bool]| {
             let due = (0..part.len()).filter(|&i| part[i] && scene.partner[i].is_some()).count();
             found.pairs.iter().filter(|pair| part[pair.query]).count() as f64 / due as f64
         };
         let shares = [&parts[0], &parts[1]].map(|part| share_found(part));
-        assert!(shares.iter().all(|&share| share > 0.93), "seed {seed}: {shares:?}");
+        assert!(shares.iter().all(|&share| share > least), "seed {seed}: {shares:?}");
         // The pose is that of a part, and none between the two.
-        let of_part = |part: usize, truth: &Similarity| {
+        let [before, behind] = [0, 1].map(|part: usize| {
             let fruits = (0..scene.query.len()).filter(|&i| parts[part][i]).collect::<Vec<_>>();
-            apart(&scene.query.select(&fruits), &pose(&found), truth)
-        };
-        let before = of_part(0, &scene.map_from_query);
-        let behind = of_part(1, &scene.map_from_query.compose(&of_behind.inverse()));
+            apart(&scene.query.select(&fruits), &pose(&found), &truths[part])
+        });
         assert!(before.min(behind) < 0.08 && before.max(behind) > 0.5, "seed {seed}: {before} {behind}");
     }
 }

@@ -10,6 +10,7 @@ use super::proposal::Effort;
 use super::seeds::{SHORTEST, STARS, SeedIndex};
 use super::settlement::{Settled, settle};
 use super::vertical::Vertical;
+use crate::beliefs::Edge;
 use crate::cloud::FruitCloud;
 use crate::geometry::Scale;
 use crate::matching::Request;
@@ -68,6 +69,8 @@ pub(super) struct Finding<'a> {
     pub(super) seed: Hypothesis,
     /// As it stands in the end, once it was looked at closely.
     pub(super) settled: Option<Settled>,
+    /// Further parts of a row that is torn apart.
+    pub(super) further: Vec<Settled>,
 }
 
 /// What a search has found, and what it did for it.
@@ -81,14 +84,24 @@ pub(super) struct Findings<'a> {
 
 impl<'a> Finding<'a> {
     pub(super) fn new(growth: Growth<'a>, seed: Hypothesis) -> Self {
-        Self { overlap: growth.overlap(), growth, seed, settled: None }
+        Self { overlap: growth.overlap(), growth, seed, settled: None, further: Vec::new() }
     }
 }
 
 impl Finding<'_> {
-    /// Evidence of what is settled, nats; none where nothing is.
+    /// Evidence of what is settled, of all parts, nats; none where nothing is.
     pub(super) fn evidence(&self) -> f64 {
-        self.settled.as_ref().map_or(f64::NEG_INFINITY, |settled| settled.evidence)
+        self.of_all_parts().map(|settled| settled.evidence).reduce(|all, part| all + part).unwrap_or(f64::NEG_INFINITY)
+    }
+
+    /// As it stands in the end, with its further parts.
+    pub(super) fn of_all_parts(&self) -> impl Iterator<Item = &Settled> {
+        self.settled.iter().chain(&self.further)
+    }
+
+    /// Its pairs with their probabilities, once it is settled.
+    pub(super) fn links(&self) -> impl Iterator<Item = (&Edge, f64)> {
+        self.of_all_parts().flat_map(|settled| settled.beliefs.links())
     }
 
     /// What it explains, with its evidence as it grew or as it stands in the end, whichever is more.

@@ -4,6 +4,7 @@ use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Log, Search};
 use super::doubts::Rated;
 use super::overlap::Overlap;
+use super::settlement::Settled;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
@@ -35,19 +36,21 @@ impl<'a> Search<'a> {
         let Findings { accepted, others, log } = findings;
         let pattern = self.reached(PATTERN, log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
-        let Some(Finding { overlap: Overlap { log_odds, .. }, settled: Some(settled), .. }) = accepted.next() else {
+        let best = accepted.next();
+        let Some((found, settled)) = best.as_ref().and_then(|found| Some((found, found.settled.as_ref()?))) else {
             return Match::without_answer(Verdict::NoMatch, stages);
         };
-        let overlap = Overlap { log_odds, ..settled.overlap };
-        let best = Rated { overlap: &overlap, nats: log_odds.max(settled.evidence) };
-        let pairs = self.pairs(&settled.beliefs, &overlap);
-        let outdone = others.iter().any(|other| self.outdoes(best, other.rated(), pattern));
+        let overlap = Overlap { log_odds: found.overlap.log_odds, ..settled.overlap.clone() };
+        let best = Rated { overlap: &overlap, nats: found.overlap.log_odds.max(found.evidence()) };
+        let pairs = self.pairs(found);
+        let is_new = |other: &Finding| found.further.iter().all(|part| !self.shows(&part.overlap, &other.overlap));
+        let outdone = others.iter().any(|other| is_new(other) && self.outdoes(best, other.rated(), pattern));
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
         let rivals: Vec<Registration> = accepted
-            .filter(|other| self.excludes(best, other.rated(), pattern))
+            .filter(|other| is_new(other) && self.excludes(best, other.rated(), pattern))
             .map(|finding| self.registration(&finding.overlap))
             .collect();
         Match {
@@ -60,20 +63,24 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// One-to-one pairs in the rows of the clouds, in the order of the query.
-    fn pairs(&self, beliefs: &Beliefs, overlap: &Overlap) -> Vec<Pair> {
+    /// One-to-one pairs of all parts in the rows of the clouds, in the order of the query.
+    fn pairs(&self, found: &Finding) -> Vec<Pair> {
         let (query, map) = (self.query, self.map);
         let pair = |(edge, probability): (Edge, f64)| {
-            let at = overlap.predictions[edge.query as usize]?.place;
+            let off = |settled: &Settled| {
+                let at = settled.overlap.predictions[edge.query as usize]?.place;
+                Some((map.points[edge.map as usize] - at).norm())
+            };
             Some(Pair {
                 query: query.rows[edge.query as usize] as usize,
                 map: map.rows[edge.map as usize] as usize,
                 probability,
-                distance_m: (map.points[edge.map as usize] - at).norm(),
+                distance_m: found.of_all_parts().filter_map(off).reduce(f64::min)?,
                 support: edge.ratio.ln(),
             })
         };
-        let chosen = beliefs.chosen(query.len(), map.len(), self.config.min_probability);
+        let all = Beliefs::of_lists(found.of_all_parts().map(|settled| &settled.beliefs));
+        let chosen = all.chosen(query.len(), map.len(), self.config.min_probability);
         let mut pairs: Vec<Pair> = chosen.into_iter().filter_map(pair).collect();
         pairs.sort_unstable_by_key(|pair| pair.query);
         pairs
@@ -95,6 +102,7 @@ impl<'a> Search<'a> {
             ("settled_threshold_nats", log.settled_threshold),
             ("settled_nats", log.settled),
             ("verified", accepted.len() as f64),
+            ("parts", accepted.first().map_or(0, |best| best.of_all_parts().count()) as f64),
         ]
     }
 

@@ -19,8 +19,6 @@ pub(crate) struct Cell {
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
     pub(super) pose: Similarity,
-    /// Of the parts of a row that is torn apart, the one that it belongs to.
-    pub(super) part: usize,
     /// Whether growth has come here.
     pub(super) reached: bool,
 }
@@ -71,7 +69,6 @@ impl Cut {
                 around: neighbours(keys[i]).map(|other| (other as u32, closeness(i, other))).collect(),
                 moments: Moments::default(),
                 pose: Similarity::identity(),
-                part: 0,
                 reached: false,
             })
             .collect();

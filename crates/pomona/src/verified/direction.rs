@@ -39,6 +39,11 @@ impl Direction {
         Self { expected: axes * lengths * axes.transpose(), ..Self::default() }
     }
 
+    /// What was expected, before any pair.
+    pub(super) fn as_expected(&self) -> Self {
+        Self { expected: self.expected, ..Self::default() }
+    }
+
     /// As it was expected, and as pairs show it by their probabilities.
     pub(super) fn seen(&self, laid: &Patchwork, beliefs: &Beliefs) -> Self {
         let own = vec![Seen::default(); laid.query.len()];

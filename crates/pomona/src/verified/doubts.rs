@@ -20,7 +20,7 @@ use nalgebra::{Point3, Vector3};
 pub(super) const RIVAL_CANDIDATES: usize = 24;
 
 /// No other pose may have this share of the best evidence.
-pub(super) const RIVAL: f64 = 0.5;
+const RIVAL: f64 = 0.5;
 
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
 pub(super) const BENT: f64 = 0.05;
@@ -175,6 +175,11 @@ impl<'a> Search<'a> {
             at.map(|at| (other.pose.image(p) - at.place).norm() > 0.5 * self.map.spacing + bent)
         };
         share(self.query.points.iter().zip(&best.predictions).filter_map(apart))
+    }
+
+    /// Whether one puts most of the fruits of another optimum's overlap where that puts them.
+    pub(super) fn shows(&self, one: &Overlap, other: &Overlap) -> bool {
+        !is_most(self.unexplained(one, other))
     }
 
     /// Share of the fruits of another optimum's overlap that the best does not put where that puts them.

@@ -186,13 +186,8 @@ impl<'a> Growth<'a> {
 
     /// Whether a reached cell and its neighbours together have evidence for the pose.
     pub(super) fn convincing(&self, i: usize) -> bool {
-        self.whole || self.says(i) > CONVINCING
-    }
-
-    /// Evidence of a reached cell and its neighbours, nats; none of another.
-    pub(super) fn says(&self, i: usize) -> f64 {
         let cell = &self.patches.cells[i];
         let around = || cell.around.iter().map(|&(other, closeness)| closeness * self.log_odds[other as usize]);
-        if cell.reached { around().sum() } else { 0.0 }
+        self.whole || cell.reached && around().sum::<f64>() > CONVINCING
     }
 }

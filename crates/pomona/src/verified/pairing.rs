@@ -2,7 +2,7 @@
 
 use super::direction::longest;
 use super::patches::{Landing, Patchwork};
-use crate::beliefs::{Beliefs, Edge};
+use crate::beliefs::Edge;
 use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{Cholesky, Matrix3, U3, Vector3};
 use rayon::prelude::*;
@@ -20,24 +20,23 @@ const LOOSE: (f64, f64) = (0.01, 3.0);
 /// Pairs less likely than this against both being alone are left out.
 const LEAST_RATIO: f64 = 1e-3;
 
-impl Beliefs {
-    /// Beliefs about an overlap where a fruit of the map is seen again with the probability `share`, `size` the likelihood ratio of two
-    /// diameters.
+impl Patchwork<'_> {
+    /// Pairs with their likelihood ratios, where each fruit of the query is seen again with the probability that `shares` says, `size`
+    /// the likelihood ratio of two diameters.
     ///
     /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
     /// `p / (1 - p) N(d) / new density` against leaving both alone.
-    pub(super) fn of(laid: &Patchwork, shares: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Self {
-        let Patchwork { query, map, .. } = *laid;
-        let edge = |meeting: &Meeting| {
+    pub(super) fn edges(&self, shares: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
+        let Self { query, map, .. } = *self;
+        self.meetings(|meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
             // As many others as the two visits laid on each other have, where the map shows as much as it does here.
-            let others = laid.companions(distance) * crowding * laid.strangers * support;
+            let others = self.companions(distance) * crowding * self.strangers * support;
             let new = (1.0 - seen) * others.max(map.floor);
             meeting.edge(seen / (1.0 - seen) * density / new * size(row, partner))
-        };
-        Self::new(laid.meetings(edge), query.len(), map.len())
+        })
     }
 }
 

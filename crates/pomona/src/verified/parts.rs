@@ -1,70 +1,69 @@
 //! A row that is torn apart: where the camera lost its way for a moment, what lies before has one pose and what lies behind another.
 //!
-//! Each pose is found on its own, has enough evidence, and says nothing of the fruits of the other. So they are no rivals but parts
-//! of one answer: the pairs are those of all parts, the pose is that of the part with most evidence.
+//! Each pose is found on its own, has enough evidence, and pairs other fruits. So they are no rivals but parts of one answer: the
+//! pairs are those of all parts, the pose is that of the part with most evidence.
 
 use super::case::{Finding, Search};
-use super::doubts::{RIVAL, is_most};
-use super::growth::{CONVINCING, Growth};
-use super::overlap::Overlap;
-use super::settlement::settle;
+use super::doubts::is_most;
+use super::settlement::{Settled, settle_together};
+use crate::beliefs::Beliefs;
+use std::collections::HashMap;
 
-impl<'a> Search<'a> {
-    /// Gives the cells of which another finding says far more than the best to that one, where the two do not contradict each other
-    /// else, and settles all of that once more, where that says more than the best alone.
-    pub(super) fn join(&self, accepted: &mut [Finding<'a>]) {
-        let Some((best, others)) = accepted.split_first_mut() else { return };
-        let mut joined = best.growth.clone();
-        for other in others.iter() {
-            let (left, there) = (joined.left_by(&other.growth), other.growth.overlap());
-            if !is_most(self.contradicted(&left, &there)) {
-                joined.give_to(&other.growth);
+impl Search<'_> {
+    /// Joins the best finding with those that do not contradict it, and these with each other; the others stay behind it.
+    ///
+    /// They are settled together: a fruit has one partner at most, and which part it belongs to is told by how many around it find
+    /// partners there. That is kept where more pairs are expected than of the best alone.
+    pub(super) fn join(&self, accepted: &mut Vec<Finding>) {
+        let mut parts: Vec<Finding> = Vec::new();
+        let mut others = Vec::new();
+        for finding in accepted.drain(..) {
+            let is_part = parts.is_empty() || !is_most(contradicted(&finding, &parts));
+            (if is_part { &mut parts } else { &mut others }).push(finding);
+        }
+        let together = self.settled_together(&parts);
+        let mut parts = parts.into_iter();
+        if let Some(mut best) = parts.next() {
+            match together {
+                Some((settled, further)) => (best.settled, best.further) = (Some(settled), further),
+                None => others.splice(..0, parts).for_each(drop),
             }
+            accepted.push(best);
         }
-        if joined.patches.torn_off.is_empty() {
-            return;
+        accepted.append(&mut others);
+    }
+
+    /// The first part and the further ones, where all of them together expect more pairs than the first alone.
+    fn settled_together(&self, parts: &[Finding]) -> Option<(Settled, Vec<Settled>)> {
+        let settled: Vec<&Settled> = parts.iter().filter_map(|part| part.settled.as_ref()).collect();
+        if settled.len() < 2 {
+            return None;
         }
-        joined.go_on();
-        let all = settle(&joined, self.noise_m);
-        if all.evidence > best.evidence() {
-            (best.growth, best.settled) = (joined, Some(all));
-        }
+        let growths: Vec<_> =
+            parts.iter().zip(&settled).map(|(part, settled)| (&part.growth, settled.direction.as_expected())).collect();
+        let mut together = settle_together(&growths, self.noise_m);
+        let expected = |beliefs: &Beliefs| beliefs.probabilities.iter().sum::<f64>();
+        let all: f64 = together.iter().map(|part| expected(&part.beliefs)).sum();
+        let further = together.split_off(1);
+        together.pop().filter(|_| all > expected(&settled[0].beliefs)).map(|first| (first, further))
     }
 }
 
-impl Growth<'_> {
-    /// Whether another growth says so much more of a cell that this one is no rival there.
-    fn gives_way(&self, cell: usize, other: &Self) -> bool {
-        let there = other.says(cell);
-        there > CONVINCING && RIVAL * there > self.says(cell)
+/// Share of the pairs of a finding that those of others exclude: they have one of the two fruits with another.
+fn contradicted(finding: &Finding, others: &[Finding]) -> f64 {
+    let (mut of_query, mut of_map, mut of_both) = (HashMap::new(), HashMap::new(), HashMap::new());
+    for (edge, probability) in others.iter().flat_map(Finding::links) {
+        *of_query.entry(edge.query).or_insert(0.0) += probability;
+        *of_map.entry(edge.map).or_insert(0.0) += probability;
+        *of_both.entry((edge.query, edge.map)).or_insert(0.0) += probability;
     }
-
-    /// Cells that this leaves to another.
-    fn given_to(&self, other: &Self) -> Vec<usize> {
-        (0..self.patches.cells.len()).filter(|&cell| self.gives_way(cell, other)).collect()
+    let told = |told: Option<&f64>| told.copied().unwrap_or(0.0);
+    let (mut excluded, mut all) = (0.0, 0.0);
+    for (edge, probability) in finding.links() {
+        let either = told(of_query.get(&edge.query)).max(told(of_map.get(&edge.map)));
+        let same = told(of_both.get(&(edge.query, edge.map)));
+        excluded += probability * (either - same).clamp(0.0, 1.0);
+        all += probability;
     }
-
-    /// What this explains but where it gives way.
-    fn left_by(&self, other: &Self) -> Overlap {
-        let mut left = self.overlap();
-        for cell in self.given_to(other) {
-            self.patches.cells[cell].rows.iter().for_each(|&row| left.predictions[row as usize] = None);
-        }
-        left
-    }
-
-    /// Makes the cells that this leaves to another a part of its own, as that one puts them.
-    fn give_to(&mut self, other: &Self) {
-        let given = self.given_to(other);
-        if given.is_empty() {
-            return;
-        }
-        self.patches.torn_off.push(other.patches.pose);
-        let part = self.patches.torn_off.len();
-        for i in given {
-            let cell = &mut self.patches.cells[i];
-            (cell.reached, cell.pose, cell.part) = (true, other.patches.cells[i].pose, part);
-        }
-        self.meet(1.0);
-    }
+    if all > 0.0 { excluded / all } else { 1.0 }
 }

@@ -47,10 +47,8 @@ pub(crate) struct Patchwork<'a> {
     pub(super) cut: &'a Cut,
     pub(super) model: Model,
     pub(super) cells: Vec<Cell>,
-    /// The common pose; of a row that is torn apart that of its first part.
+    /// The common pose.
     pub(super) pose: Similarity,
-    /// Common poses of the further parts.
-    pub(super) torn_off: Vec<Similarity>,
     /// Noise of a pair under a pose that is known exactly, metres of the map.
     pub(super) sigma: f64,
     pub(super) direction: Direction,
@@ -78,7 +76,6 @@ impl<'a> Patchwork<'a> {
             model: *model,
             cells,
             pose,
-            torn_off: Vec::new(),
             sigma,
             direction: Direction::default(),
             strangers: 1.0,
@@ -153,31 +150,25 @@ impl<'a> Patchwork<'a> {
         Moments::total(self.cells.iter().filter(|cell| cell.reached).map(|cell| (&cell.moments, 1.0)))
     }
 
-    /// Sums over the pairs in a cell and in those around, of the same part, whose weight exceeds `least`.
+    /// Sums over the pairs in a cell and in those around whose weight exceeds `least`.
     fn pairs_around(&self, cell: &Cell, least: f64) -> Moments {
-        let with = |other: u32| self.cells[other as usize].part == cell.part;
-        let near = cell.around.iter().filter(|&&(other, weight)| weight > least && with(other));
+        let near = cell.around.iter().filter(|(_, weight)| *weight > least);
         Moments::total(near.map(|&(other, weight)| (&self.cells[other as usize].moments, weight)))
     }
 
-    /// The common pose from the pairs, of each part; `false` where they are too few.
+    /// The common pose from the pairs, for all cells; `false` where they are too few.
     pub(super) fn fit_as_one(&mut self) -> bool {
-        let fitted = |part: usize, pose: &Similarity| {
-            let cells = self.cells.iter().filter(|cell| cell.reached && cell.part == part);
-            let all = Moments::total(cells.map(|cell| (&cell.moments, 1.0)));
-            (all.weight >= FIXING).then(|| self.model.step(&all, pose, self.sigma).unwrap_or(*pose))
-        };
-        let Some(first) = fitted(0, &self.pose) else { return false };
-        let further = |(i, pose): (usize, &Similarity)| fitted(i + 1, pose).unwrap_or(*pose);
-        (self.pose, self.torn_off) = (first, self.torn_off.iter().enumerate().map(further).collect());
+        let all = self.all_pairs();
+        if all.weight < FIXING {
+            return false;
+        }
+        self.pose = self.model.step(&all, &self.pose, self.sigma).unwrap_or(self.pose);
         true
     }
 
-    /// The common pose for every cell of its part.
+    /// The common pose for every cell.
     pub(super) fn stiffen(&mut self) {
-        for cell in &mut self.cells {
-            cell.pose = if cell.part == 0 { self.pose } else { self.torn_off[cell.part - 1] };
-        }
+        self.cells.iter_mut().for_each(|cell| cell.pose = self.pose);
     }
 
     /// Surroundings and patches from the pairs, each held to the pose that it has by as many pairs as `hold` says. Returns
@@ -240,13 +231,11 @@ impl<'a> Patchwork<'a> {
 
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.
     pub(super) fn looked_at(&self, row: usize) -> f64 {
-        let seen = |(part, pose): (usize, &Similarity)| {
-            let place = pose.preimage(&self.map.points[row]);
-            let cell = &self.cells[*self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge))?];
-            (cell.reached && cell.part == part).then(|| self.query.support.at(&place))
-        };
-        let poses = std::iter::once(&self.pose).chain(&self.torn_off);
-        let most = poses.enumerate().filter_map(seen).fold(0.0, f64::max);
-        self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row]) * most
+        let place = self.pose.preimage(&self.map.points[row]);
+        let cell = self.cut.index.get(&cell_of(&place, 1.0 / self.cut.edge));
+        if !cell.is_some_and(|&cell| self.cells[cell].reached) {
+            return 0.0;
+        }
+        self.sight.as_ref().map_or(1.0, |sight| sight.shares[1][row]) * self.query.support.at(&place)
     }
 }

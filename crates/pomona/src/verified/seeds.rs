@@ -304,9 +304,11 @@ mod tests {
         };
         let all = lengths(enumerate(&landscape, COMPANIONS, 0.0));
         for count in [0, 1, 1000, all.len()] {
-            assert_eq!(lengths(longest(&landscape, count)), all[..count]);
+            assert_eq!(lengths(longest(&landscape, count, f32::INFINITY)), all[..count]);
+            let rest: Vec<f32> = all.iter().copied().filter(|length| *length <= all[40]).take(count).collect();
+            assert_eq!(lengths(longest(&landscape, count, all[40])), rest);
         }
-        assert_eq!(longest(&landscape, all.len() + 1).len(), all.len());
+        assert_eq!(longest(&landscape, all.len() + 1, f32::INFINITY).len(), all.len());
     }
 
     #[test]
@@ -317,7 +319,7 @@ mod tests {
         let [here, there] = [cloud, permuted].map(|cloud| {
             let landscape = Landscape::new(&cloud);
             let fruit = |row: u32| cloud.positions[landscape.rows[row as usize] as usize];
-            longest(&landscape, 1000).iter().map(|seed| seed.0.map(fruit)).collect::<Vec<_>>()
+            longest(&landscape, 1000, f32::INFINITY).iter().map(|seed| seed.0.map(fruit)).collect::<Vec<_>>()
         });
         assert_eq!(here, there);
     }

@@ -65,37 +65,67 @@ struct Settlement<'a> {
 /// constellations find the row, that is asked only if pairs lie off more in depth than else.
 pub(crate) fn settle(growth: &Growth, noise_m: Option<f64>) -> Settled {
     let laid = growth.patches.model.row;
-    let sphere = settle_under(growth, noise_m, Direction::default());
-    let long = |axes| settle_under(growth, noise_m, Direction::long_in_depth(&axes));
+    let under = |direction: Direction| settle_together(&[(growth, direction)], noise_m).swap_remove(0);
+    let sphere = under(Direction::default());
     let least = sphere.evidence + if laid.is_some() { 0.0 } else { SELDOM };
     let row = laid.or_else(|| row_axes(growth.patches.map).filter(|axes| sphere.direction.in_depth(axes) > TOLD));
-    row.map(long).filter(|long| long.evidence > least).unwrap_or(sphere)
+    let long = row.map(|axes| under(Direction::long_in_depth(&axes)));
+    long.filter(|long| long.evidence > least).unwrap_or(sphere)
 }
 
-/// Settles under noise of an expected direction.
-fn settle_under(growth: &Growth, noise_m: Option<f64>, direction: Direction) -> Settled {
-    let expected = match noise_m {
-        Some(sigma) => KnownNoise { sigma, width: GIVEN },
-        None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
-        None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
-    };
-    let patches = Patchwork { direction, ..growth.patches.clone() };
-    let shares = vec![DETECTION; patches.query.len()];
-    let mut settlement = Settlement { patches, expected, share: DETECTION, shares, holds: [HOLD; 2] };
-    let mut beliefs = settlement.paired(None);
+/// Settles parts of one row, each under noise of an expected direction: a fruit has one partner at most in all of them.
+pub(super) fn settle_together(parts: &[(&Growth, Direction)], noise_m: Option<f64>) -> Vec<Settled> {
+    let mut settling: Vec<Settlement> =
+        parts.iter().map(|(growth, direction)| Settlement::new(growth, noise_m, direction)).collect();
+    let mut beliefs = paired(&mut settling, None);
     for _ in 0..TURNS {
-        let cue = Cue::new([growth.patches.query, growth.patches.map], beliefs.links());
-        settlement.recount(&beliefs);
-        settlement.patches.direction = settlement.patches.direction.seen(&settlement.patches, &beliefs);
-        settlement.refit(&beliefs);
-        beliefs = settlement.paired(cue.as_ref());
+        let clouds = [settling[0].patches.query, settling[0].patches.map];
+        let cue = Cue::new(clouds, beliefs.iter().flat_map(Beliefs::links));
+        for (part, beliefs) in settling.iter_mut().zip(&beliefs) {
+            part.turn(beliefs);
+        }
+        beliefs = paired(&mut settling, cue.as_ref());
     }
-    let evidence = evidence(&settlement.patches);
-    let Patchwork { pose, sigma, predictions, direction, .. } = settlement.patches;
-    Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence, direction }
+    let settled = |((part, beliefs), (growth, _)): ((Settlement, Beliefs), &(&Growth, Direction))| {
+        let evidence = evidence(&part.patches);
+        let Patchwork { pose, sigma, predictions, direction, .. } = part.patches;
+        Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence, direction }
+    };
+    settling.into_iter().zip(beliefs).zip(parts).map(settled).collect()
 }
 
-impl Settlement<'_> {
+/// Predictions, noise and pairs of all parts under the poses as they are fitted now.
+fn paired(parts: &mut [Settlement], cue: Option<&Cue>) -> Vec<Beliefs> {
+    let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
+    let edges = |part: &mut Settlement| {
+        part.predict();
+        part.measure();
+        part.patches.edges(&part.shares, &size)
+    };
+    let lists: Vec<_> = parts.iter_mut().map(edges).collect();
+    let Patchwork { query, map, .. } = parts[0].patches;
+    Beliefs::together(&lists, query.len(), map.len())
+}
+
+impl<'a> Settlement<'a> {
+    fn new(growth: &Growth<'a>, noise_m: Option<f64>, direction: &Direction) -> Self {
+        let expected = match noise_m {
+            Some(sigma) => KnownNoise { sigma, width: GIVEN },
+            None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
+            None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
+        };
+        let patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
+        let shares = vec![DETECTION; patches.query.len()];
+        Self { patches, expected, share: DETECTION, shares, holds: [HOLD; 2] }
+    }
+
+    /// What the pairs say of shares, noise and patches.
+    fn turn(&mut self, beliefs: &Beliefs) {
+        self.recount(beliefs);
+        self.patches.direction = self.patches.direction.seen(&self.patches, beliefs);
+        self.refit(beliefs);
+    }
+
     /// Where each fruit should lie by all partners but its own, and how surely.
     fn predict(&mut self) {
         let [hold, hold_around] = self.holds;
@@ -142,14 +172,6 @@ impl Settlement<'_> {
         let found: f64 = beliefs.probabilities.iter().sum();
         self.share = ((found + 1.0) / (due.iter().sum::<f64>() + 2.0)).clamp(SHARES.0, SHARES.1);
         self.shares = of_places(&self.patches, beliefs, self.share, &due);
-    }
-
-    /// Predictions, noise and pairs under the poses as they are fitted now.
-    fn paired(&mut self, cue: Option<&Cue>) -> Beliefs {
-        self.predict();
-        self.measure();
-        let size = |query: u32, map: u32| cue.map_or(1.0, |cue| cue.ratio(query, map));
-        Beliefs::of(&self.patches, &self.shares, &size)
     }
 
     /// Common pose, surroundings and patches from the mean partners.
@@ -200,7 +222,7 @@ mod tests {
         let mut growth = grow(&query, &map, &seed, &model);
         growth.reach_all();
         let [sphere, long] = [Direction::default(), Direction::long_in_depth(&axes)]
-            .map(|direction| settle_under(&growth, None, direction).evidence);
+            .map(|direction| settle_together(&[(&growth, direction)], None)[0].evidence);
         let Settled { evidence, overlap, .. } = settle(&growth, None);
         [long - sphere, evidence - sphere, overlap.sigma]
     }
