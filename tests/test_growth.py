@@ -20,8 +20,9 @@ from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.blocks import Block, blocks_of
 from pomona.growth.chance import Chance
 from pomona.growth.curve_families import FAMILIES, CurveFamily, FamilyName
+from pomona.growth.drawn_fruits import CAMERA_SPREAD
 from pomona.growth.fitting import fit_shape
-from pomona.growth.foretelling import CAMERA_SPREAD, NINETY
+from pomona.growth.foretelling import NINETY
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.measured import MeasuredFruits
 from pomona.growth.mixed_quantiles import mixed_quantile

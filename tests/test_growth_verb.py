@@ -56,7 +56,7 @@ def test_tables_have_their_columns_and_their_fruits(pomona: Pomona, grown_row: G
     assert list(fruits[0]) == [
         "fruit_id", "tree", "n_dates", "rate_mm_per_day", "rate_sigma_mm_per_day", "rate_relative_per_day",
         "forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier",
-        "hangs_probability",
+        "hangs_probability", "stopped_probability",
     ]  # fmt: skip
     assert [int(line["fruit_id"]) for line in fruits] == list(range(1, 91))
     assert {line["tree"] for line in fruits} == {"1", "2", "3"}

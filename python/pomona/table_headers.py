@@ -20,7 +20,7 @@ GROWN_HEADERS = {
     "curves.csv": "fruit_id,date,diameter_mm,low_mm,high_mm",
     "fruits.csv": (
         "fruit_id,tree,n_dates,rate_mm_per_day,rate_sigma_mm_per_day,rate_relative_per_day,"
-        "forecast_mm,forecast_low_mm,forecast_high_mm,outlier,hangs_probability"
+        "forecast_mm,forecast_low_mm,forecast_high_mm,outlier,hangs_probability,stopped_probability"
     ),
     "blocks.csv": (
         "block,name,n_fruits,x,y,z,date,mean_mm,mean_low_mm,mean_high_mm,spread_mm,"

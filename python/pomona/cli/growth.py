@@ -95,7 +95,7 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
 
 
 def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
-    from pomona.growth.foretelling import CAMERA_SPREAD
+    from pomona.growth.drawn_fruits import CAMERA_SPREAD
 
     found = _summary(grown)
     lines = [

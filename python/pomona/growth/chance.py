@@ -13,7 +13,7 @@ __all__ = ["Chance", "evenly_spread"]
 _SEED = 22
 
 Shared = Literal["visits", "straying", "errors", "camera", "hanging"]
-Single = Literal["fruits", "trees", "later", "hanging"]
+Single = Literal["fruits", "trees", "later", "hanging", "stopping", "own"]
 
 Numbers = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -10,40 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from pomona.growth.chance import Chance, evenly_spread
-from pomona.growth.fitting import N_NUMBERS
-from pomona.growth.hierarchy import Hierarchy
+from pomona.growth.drawn_fruits import drawn_fruits
 from pomona.growth.mixed_quantiles import mixed_quantile
 from pomona.growth.shares import equal_shares
+from pomona.growth.trust import Trust
 from pomona.growth.weighing import WeighedCurve
 
-__all__ = ["CAMERA_SPREAD", "NINETY", "Foretold", "Summary", "foretell"]
+__all__ = ["NINETY", "Foretold", "Summary", "foretell"]
 
 Numbers = NDArray[np.float64]
-
-_SHARED_DOUBT = 0.4
-"""Of the variance of the lots by which fruits hang, what all share: the chances of seeing and of going that a map
-believes in are off for all of its fruits together.
-With 0.4 the counts of nine in ten of 42 drawn rows are in their intervals; with none, of four in ten."""
 
 NINETY = (0.05, 0.95)
 """Quantiles of the 90 % intervals."""
 
-_DRAWS, _LEAST_DRAWS, _SHARES = 512, 128, 300
-"""Of a curve that is sure, and of each, by weight; and into how many equal shares all are put together."""
+_SHARES = 300
+"""Into how many equal shares all draws are put together."""
 
-_LEAST_BELIEF, _LEAST_WEIGHT = 0.01, 1e-6
-"""Of a curve, and of a draw: what is believed less adds nothing but time."""
+_LEAST_BELIEF = 0.01
+"""Of a curve: what is believed less adds nothing but time."""
 
 _FINEST = 1e-9
 """Standard deviation of a logarithm, at least."""
-
-CAMERA_SPREAD = 0.03
-"""Standard deviation of the logarithm of the scale that all visits share, as they share their camera: with nominal
-intrinsics apples of `kinect_apples` were 8 % too large, with calibrated ones 2 %. The visits cannot tell it."""
-
-_A_DAY = 1.0
-"""Over which the rate of the last visit is taken."""
 
 Summary = Callable[[Numbers, Numbers, Numbers], Numbers]
 """Takes the (N, Q) sizes in mm and the (N,) rates of one draw and how far each hangs, (N,), 0 or 1 in a draw; gives an
@@ -83,6 +70,7 @@ def foretell(
     moments: Sequence[datetime],
     *,
     n_visits: int,
+    trust: Trust,
     rows: NDArray[np.int64],
     hang_chances: Numbers,
     summaries: Mapping[str, Summary],
@@ -97,6 +85,8 @@ def foretell(
     moments : sequence of Q datetime
         The visits, then later ones.
     n_visits : int
+    trust : Trust
+        In the rows of the tables of the curves.
     rows : (N,) int64
         Of each fruit that is told of, the row in the tables of the curves.
     hang_chances : (N,) float64
@@ -112,17 +102,22 @@ def foretell(
     logs: list[_Moments] = []
     least = ndtri(1.0 - hang_chances)
     for curve, belief in zip(curves, beliefs.tolist(), strict=True):
-        logs += [_Moments()] if belief else []
-        for weight, own_logs, own_rates, visits, lots in _draws(curve, belief, moments):
-            log_sizes, relative_rates = own_logs[rows], own_rates[rows]
+        # What grows and what has stopped are two heaps of draws, of which one Gaussian would say little.
+        grown, stood = _Moments(), _Moments()
+        logs += [grown, stood] if belief else []
+        for one in drawn_fruits(curve, belief, trust, moments):
+            log_sizes, relative_rates = one.log_sizes[rows], one.relative_rates[rows]
+            stopped = one.stopped[rows, None].astype(np.float64)
             sizes_mm = np.exp(log_sizes)
             rates_mm = relative_rates * sizes_mm[:, n_visits - 1]
-            for kept, drawn in ((logs[-1], log_sizes), (rates, rates_mm), (relative, relative_rates), (scales, visits)):
-                kept.add(drawn, weight)
-            hangs = (lots[rows] > least).astype(np.float64)
+            grown.add(log_sizes, one.weight * (1.0 - stopped))
+            stood.add(log_sizes, one.weight * stopped)
+            for kept, drawn in ((rates, rates_mm), (relative, relative_rates), (scales, one.errors)):
+                kept.add(drawn, one.weight)
+            hangs = (one.lots[rows] > least).astype(np.float64)
             for name, summary in summaries.items():
                 told[name].append(summary(sizes_mm, rates_mm, hangs))
-            weights.append(weight)
+            weights.append(one.weight)
     low, middle, high = (np.exp(_quantile(level, logs)) for level in (NINETY[0], 0.5, NINETY[1]))
     return Foretold(
         sizes_mm=middle,
@@ -143,64 +138,29 @@ def _quantile(level: float, logs: Sequence[_Moments]) -> Numbers:
     return mixed_quantile(level, [one.weight for one in logs], means, sigmas)
 
 
-def _count(belief: float) -> int:
-    """Part the draws by belief, in powers of two."""
-    return max(_LEAST_DRAWS, 1 << int(np.ceil(np.log2(max(_DRAWS * belief, 1.0)))))
-
-
-def _draws(
-    curve: WeighedCurve, belief: float, moments: Sequence[datetime]
-) -> Iterator[tuple[float, Numbers, Numbers, Numbers, Numbers]]:
-    """Give weight, log sizes (N, Q), relative rates a day (N,) at the last visit, errors of visits (S,), lots (N,).
-
-    Draw by draw; a lot is a standard normal number that says whether a fruit hangs. The sum of the weights is the
-    belief in the curve.
-    """
-    table, family = curve.table, curve.fitted.family
-    times, n_visits = curve.clock.times(moments), len(table.times)
-    per_day = curve.clock.per_day(moments[n_visits - 1])
-    with_next_day = np.insert(times, n_visits, table.times[-1] + _A_DAY)
-    chance = Chance(curve.name, _count(belief), N_NUMBERS + 1, n_visits)
-    first = evenly_spread(f"{curve.name}: first", _DRAWS, N_NUMBERS + 1)
-    shapes, weights = curve.fitted.weighed(first, chance.shapes) if belief else ((), np.empty(0))
-    for shape, weight in zip(shapes, belief * weights, strict=True):
-        chance.next_draw()
-        if weight < _LEAST_WEIGHT:
-            continue
-        model = Hierarchy(table, family, shape)
-        effects = model.draw(chance)
-        # Of one camera all sizes are too large alike. The mean takes that up: its prior is wide, so nothing else moves.
-        camera = CAMERA_SPREAD * chance.shared("camera")[0]
-        own = effects.mean - camera + effects.trees[table.trees] + effects.sizes
-        # The onset moves the curve itself here, not its tangent.
-        later = times - effects.onsets_days[:, None]
-        x = shape.rate_per_day * (table.times[-1] - effects.onsets_days - shape.onset_day)
-        strayed = model.draw_stray(effects, with_next_day, chance)
-        strays_by = (strayed[n_visits] - strayed[n_visits - 1]) / _A_DAY
-        yield (
-            float(weight),
-            own[:, None] + model.log_size(later) + np.delete(strayed, n_visits),
-            per_day * (shape.rate_per_day * family.slope(x) + strays_by),
-            effects.visits - strayed[:n_visits],
-            np.sqrt(_SHARED_DOUBT) * chance.shared("hanging")[0]
-            + np.sqrt(1.0 - _SHARED_DOUBT) * chance.single("hanging", len(own)),
-        )
-
-
 class _Moments:
-    """Mean and standard deviation of weighted arrays that come one by one (West 1979)."""
+    """Mean and standard deviation of weighted arrays that come one by one (West 1979); NaN where none has a weight.
+
+    A weight is a number, or an array that goes with the values.
+    """
 
     def __init__(self) -> None:
-        self.weight = 0.0
-        self.mean: Numbers = np.zeros(())
+        self.weight: Numbers = np.zeros(())
+        self._mean: Numbers = np.zeros(())
         self._squares: Numbers = np.zeros(())
 
-    def add(self, values: Numbers, weight: float) -> None:
-        self.weight += weight
-        away = values - self.mean
-        self.mean = self.mean + away * (weight / self.weight)
-        self._squares = self._squares + weight * away * (values - self.mean)
+    def add(self, values: Numbers, weight: float | Numbers) -> None:
+        self.weight = self.weight + weight
+        away = values - self._mean
+        step = np.divide(weight, self.weight, out=np.zeros(self.weight.shape), where=self.weight > 0.0)
+        self._mean = self._mean + away * step
+        self._squares = self._squares + weight * away * (values - self._mean)
+
+    @property
+    def mean(self) -> Numbers:
+        return np.where(self.weight > 0.0, self._mean, np.nan)
 
     @property
     def sigma(self) -> Numbers:
-        return np.asarray(np.sqrt(self._squares / self.weight))
+        none = np.full(np.broadcast_shapes(self.weight.shape, self._squares.shape), np.nan)
+        return np.asarray(np.sqrt(np.divide(self._squares, self.weight, out=none, where=self.weight > 0.0)))

@@ -32,7 +32,7 @@ SERIES_COLUMNS = ("fruit_id", "date", "diameter_mm", "sigma_mm")
 CURVE_COLUMNS = ("fruit_id", "date", "diameter_mm", "low_mm", "high_mm")
 FRUIT_COLUMNS = (
     *("fruit_id", "tree", "n_dates", "rate_mm_per_day", "rate_sigma_mm_per_day", "rate_relative_per_day"),
-    *("forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier", "hangs_probability"),
+    *("forecast_mm", "forecast_low_mm", "forecast_high_mm", "outlier", "hangs_probability", "stopped_probability"),
 )
 BLOCK_COLUMNS = (
     *("block", "name", "n_fruits", "x", "y", "z", "date", "mean_mm", "mean_low_mm", "mean_high_mm", "spread_mm"),
@@ -114,7 +114,7 @@ def _fruits(growth: SeasonGrowth) -> Iterator[Line]:
         forecast = (sizes[row, -1] if is_foretold else None for sizes in (told.sizes_mm, told.lows_mm, told.highs_mm))
         rates = told.rates_mm_per_day, told.rate_sigmas_mm_per_day, told.relative_rates_per_day
         about = fruits.ids[row], trees[row], n_days[row], *(rate[row] if is_growing[row] else None for rate in rates)
-        yield *about, *forecast, int(growth.odd[row]), chances[row]
+        yield *about, *forecast, int(growth.odd[row]), chances[row], growth.stopped[row]
 
 
 def _blocks(growth: SeasonGrowth) -> Iterator[Line]:

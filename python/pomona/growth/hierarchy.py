@@ -32,9 +32,6 @@ Numbers = NDArray[np.float64]
 _FINEST_MM = 0.01
 """Nothing measures a fruit to less; sizes that agree to the last digit were copied, and say no more than that."""
 
-_LEAST_PRECISION = 1e-9
-"""Of a logarithm that is foretold: of a size that is all but unknown, where rounding leaves less than nothing."""
-
 _SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.2
 """A fruit's usual diameter at the onset, give or take a fifth: of apples and their like, whatever the family."""
 
@@ -101,11 +98,11 @@ class Hierarchy:
     def __init__(self, table: SizeTable, family: CurveFamily, shape: Shape) -> None:
         self.table, self.family, self.shape = table, family, shape
         self._starts = table.tree_starts
-        self._curve = self.log_size(table.times)
-        self._slopes = -shape.rate_per_day * family.slope(self._x(table.times))
-        self._residuals = np.where(table.seen, table.logs - self._curve, 0.0)
-        self._whole = table.seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
-        self._own = self._own_numbers(table.trust * self._whole)
+        self.curve = self.log_size(table.times)
+        self.slopes = -shape.rate_per_day * family.slope(self._x(table.times))
+        self._residuals = np.where(table.seen, table.logs - self.curve, 0.0)
+        self.whole = table.seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
+        self._own = OwnNumbers.of(table.trust * self.whole, self.slopes, (shape.fruit_spread, shape.onset_spread_days))
         self._of_trees()
         self._of_visits()
 
@@ -116,9 +113,6 @@ class Hierarchy:
 
     def _x(self, times: Numbers) -> Numbers:
         return np.asarray(self.shape.rate_per_day * (times - self.shape.onset_day))
-
-    def _own_numbers(self, weights: Numbers) -> OwnNumbers:
-        return OwnNumbers.of(weights, self._slopes, (self.shape.fruit_spread, self.shape.onset_spread_days))
 
     def _of_trees(self) -> None:
         """Sum over the fruits of each tree: precision (T, S, S) and information (T, S) about its visits."""
@@ -162,7 +156,7 @@ class Hierarchy:
         A density that is trusted by a share counts to the power of it, so what is not trusted says nothing.
         """
         shape, table, n_fruits = self.shape, self.table, len(self.table.logs)
-        of_noise = -(table.trust[table.seen] * np.log(self._whole[table.seen] / (2.0 * np.pi))).sum() + self._fit
+        of_noise = -(table.trust[table.seen] * np.log(self.whole[table.seen] / (2.0 * np.pi))).sum() + self._fit
         of_fruits = np.log(self._own.determinants).sum()
         of_fruits += 2.0 * n_fruits * np.log(shape.fruit_spread * shape.onset_spread_days)
         of_trees = np.log(self._tree_precision * shape.tree_spread**2).sum()
@@ -207,7 +201,7 @@ class Hierarchy:
         if chance is not None:
             trees = trees + chance.single("trees", len(trees)) / np.sqrt(self._tree_precision)
         left = own.weights * (self._residuals - visits - mean - trees[table.trees][:, None])
-        b1, b2 = left.sum(axis=1), left @ self._slopes
+        b1, b2 = left.sum(axis=1), left @ self.slopes
         first, second = self._of_fruits(chance)
         onsets = (own.p11 * b2 - own.p12 * b1) / own.determinants + second * np.sqrt(own.p11 / own.determinants)
         sizes = (b1 - own.p12 * onsets) / own.p11 + first / np.sqrt(own.p11)
@@ -219,14 +213,13 @@ class Hierarchy:
             return np.zeros((2, len(self.table.logs)))
         return chance.single("fruits", 2 * len(self.table.logs)).reshape(2, -1)[:, self.table.ranks]
 
-    def surprise(self) -> tuple[Numbers, Numbers]:
-        """Return by how many standard deviations each size is off, and these of its logarithm, (N, S); NaN for none.
-
-        Each is foretold by the other sizes of its fruit, all trusted, and by what its visit and its tree are expected
-        to be.
-        """
-        effects, seen, own = self.expected(), self.table.seen, self._own_numbers(self._whole)
+    def against(self, effects: Effects) -> Numbers:
+        """Return how far each size is from the curve and from what its fruit shares with others, (N, S); 0 for none."""
         around = effects.mean + effects.visits + effects.trees[self.table.trees][:, None]
-        said = own.said_by(np.where(seen, self._residuals - around, 0.0))[0]
-        roots = np.sqrt(np.maximum(own.precisions(), _LEAST_PRECISION))
-        return np.where(seen, said / roots, np.nan), np.where(seen, 1.0 / roots, np.nan)
+        return np.where(self.table.seen, self._residuals - around, 0.0)
+
+    def expected_stray(self, effects: Effects) -> Numbers:
+        """Return how far growth is expected to have strayed by each visit, (S,), given what the visits share."""
+        return np.asarray(
+            self.shape.stray_per_day**2 * self.table.straying @ np.linalg.solve(self._shared, effects.visits)
+        )

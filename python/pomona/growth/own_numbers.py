@@ -61,7 +61,3 @@ class OwnNumbers:
         told = np.einsum("nks,ns->nk", self.rows, residuals)
         said = self.weights * residuals - np.einsum("nks,nk->ns", self.rows, told)
         return said, (self.weights * residuals**2).sum(axis=1) - (told**2).sum(axis=1)
-
-    def precisions(self) -> Numbers:
-        """Return the diagonal of M, (N, S): of each measurement as foretold by the others of its fruit."""
-        return np.asarray(self.weights - np.einsum("nks,nks->ns", self.rows, self.rows))

@@ -20,7 +20,7 @@ from pomona.growth.oddities import odd_fruits
 from pomona.growth.season_clock import CALENDAR, DegreeDays, SeasonClock, read_temperatures
 from pomona.growth.size_classes import FIVE_MM, class_counts, class_masses, rising_limits
 from pomona.growth.size_table import SizeTable
-from pomona.growth.trust import put_aside, trust_in_sizes
+from pomona.growth.trust import trust_in_sizes
 from pomona.growth.weighing import WeighedCurve, weighed_curves
 
 __all__ = ["SeasonGrowth", "grow_season", "growth_of"]
@@ -50,6 +50,8 @@ class SeasonGrowth:
         Fruits with a size that likelier does not belong to them, or that grow like no other.
     put_aside : (N, S) bool
         Those sizes.
+    stopped : (N,) float64
+        Probability of each fruit that it has stopped growing and hangs on.
     odd_visits : sequence of OddVisit
         Visits whose sizes are likely off together, none as a rule.
     """
@@ -63,6 +65,7 @@ class SeasonGrowth:
     harvest: date | None
     odd: NDArray[np.bool_]
     put_aside: NDArray[np.bool_]
+    stopped: NDArray[np.float64]
     odd_visits: Sequence[OddVisit]
 
     @property
@@ -127,8 +130,8 @@ def growth_of(
     order, trees = reckoned_order(fruits)
     rows, sizes_mm, moments = np.argsort(order), fruits.diameters_mm[order], fruits.moments
     trust = trust_in_sizes(SizeTable.of(sizes_mm, trees, CALENDAR.times(moments)))
-    curves = weighed_curves(sizes_mm, trees, trust, moments, clocks)
-    aside = put_aside(trust)
+    curves = weighed_curves(sizes_mm, trees, trust.in_curve, moments, clocks)
+    aside = trust.put_aside
     odd = aside.any(axis=1) | odd_fruits(curves[0].table, curves[0].fitted)
     wanted = [*moments, *([max(moments[-1], datetime.combine(day, time()))] if day else [])]
     blocks = blocks_of(fruits)
@@ -136,6 +139,7 @@ def growth_of(
         curves,
         wanted,
         n_visits=len(moments),
+        trust=trust,
         rows=rows,
         hang_chances=fruits.hang_chances,
         summaries={
@@ -147,7 +151,9 @@ def growth_of(
     )
     days = tuple(moment.date() for moment in wanted)
     off = odd_visits(curves[0].fitted, len(moments))
-    return SeasonGrowth(fruits, curves, blocks, limits, foretold, days, day, odd[rows], aside[rows], off)
+    return SeasonGrowth(
+        fruits, curves, blocks, limits, foretold, days, day, odd[rows], aside[rows], trust.stopped[rows], off
+    )
 
 
 def _clocks(fruits: MeasuredFruits, temperature: str | Path | None) -> tuple[SeasonClock, ...]:

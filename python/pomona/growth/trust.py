@@ -1,18 +1,24 @@
-r"""How far each size is believed to be its fruit's own: a probability, by which it counts.
+r"""How far each size is believed to be one of the row's curve: a probability, by which it counts.
 
-Some sizes are not: of half a fruit behind a leaf, of another fruit, of none at all. A verdict on each would let one
-fruit at the border move the growth of all, so each size counts by its probability. Beforehand one size in a hundred is
-off, its logarithm by a Gaussian error of standard deviation $B$. Of a fruit none is off, or one: with $z_s$ the
-surprise at a size, given the fruit's others, in standard deviations $\sigma_s$, the odds that this one is off against
-none are
+Some sizes are none of their fruit: of half a fruit behind a leaf, of another fruit, of none at all. And some fruits
+have stopped growing, and hang on: their sizes are their own, but none of the row's curve any more. A verdict on each
+would let one fruit at the border move the growth of all, so each size counts by its probability.
+
+Beforehand a fruit has stopped after $z$ of the $S$ visits (see `stopped_fruits`) with the probability $\pi_z$, on each
+day as likely, and grows with $1 - \pi$. Whether it does or not, one size in a hundred is off, its logarithm by a
+Gaussian error of standard deviation $B$: of a fruit none is off, or one. With $z_s$ the surprise at a size, given the
+fruit's others, in standard deviations $\sigma_s$, the odds that this one is off against none are
 
 $$ \frac{p}{1-p} \frac{1}{\sqrt{1 + q_s}} \exp\frac{z_s^2 q_s}{2 (1 + q_s)}, \qquad q_s = (B / \sigma_s)^2 $$
 
-The shape is fitted with the sizes so trusted, and the sizes are judged by the shape, in turn until neither moves
-(expectation-maximisation): fitted to all of them, it would believe the worst.
+The shape and the share $\pi$ are fitted with the sizes so trusted, and fruits and sizes are judged by them, in turn
+until none moves (expectation-maximisation): fitted to all of them, the shape would believe the worst. The share is that
+of fruits that were measured twice or more: one size shows no growth, and is more often that of no fruit.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +28,9 @@ from pomona.growth.curve_families import FAMILIES
 from pomona.growth.fitting import likeliest_shape
 from pomona.growth.hierarchy import Hierarchy
 from pomona.growth.size_table import SizeTable
+from pomona.growth.stopped_fruits import three_numbers
 
-__all__ = ["OFF_BY", "put_aside", "trust_in_sizes"]
+__all__ = ["OFF_BY", "Trust", "trust_in_sizes"]
 
 Numbers = NDArray[np.float64]
 
@@ -33,39 +40,99 @@ _OFF = 0.01
 OFF_BY = 0.5
 """B, the standard deviation of the logarithm of such a size: half to twice of what it should be."""
 
+_STOPPED, _LOOKED_AT = 1.0, 100.0
+"""What is known of the share of fruits that have stopped before any is measured: of a hundred one had."""
+
+_BEFORE_DAYS = 10.0
+"""From which day before the first visit on a fruit may have stopped: the onset of growth."""
+
+_LEAST_PRECISION = 1e-9
+"""Of a logarithm that is foretold: of a size that is all but unknown, where rounding leaves less than nothing."""
+
 _ROUNDS, _CLOSE = 30, 0.01
 """Of turns at most, and by how much the trust in a size may move in the last of them."""
 
 
-def trust_in_sizes(table: SizeTable) -> Numbers:
-    """Return the probability of each size to be its fruit's own, (N, S), 1 where there is none.
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """In the sizes of N fruits on S visits, and in that they grow.
+
+    Attributes
+    ----------
+    stops : (N, S + 1) float64
+        Probability that the fruit stopped growing after so many visits; the last is that it still grows.
+    in_size : (N, S + 1, S) float64
+        Probability that a size is its fruit's own, where that stopped so; 1 where there is none.
+    """
+
+    stops: Numbers
+    in_size: Numbers
+
+    @property
+    def in_curve(self) -> Numbers:
+        """Probability of each size to be its fruit's own, and on the row's curve, (N, S)."""
+        grew = np.arange(self.stops.shape[1])[:, None] > np.arange(self.in_size.shape[2])
+        return np.asarray(np.einsum("nz,zs,nzs->ns", self.stops, grew.astype(np.float64), self.in_size))
+
+    @property
+    def stopped(self) -> Numbers:
+        """Probability of each fruit that it has stopped growing, (N,)."""
+        return np.asarray(self.stops[:, :-1].sum(axis=1))
+
+    @property
+    def put_aside(self) -> NDArray[np.bool_]:
+        """The worst size of each fruit that likelier has one of another than not, (N, S)."""
+        off = 1.0 - np.einsum("nz,nzs->ns", self.stops, self.in_size)
+        return np.asarray((off.sum(axis=1, keepdims=True) > 0.5) & (off == off.max(axis=1, keepdims=True)))
+
+
+def trust_in_sizes(table: SizeTable) -> Trust:
+    """Return how far sizes and fruits are trusted.
 
     Parameters
     ----------
     table : SizeTable
         Its own trust is not asked.
     """
-    trust, start = np.ones(table.logs.shape), None
+    shows_growth = table.seen.sum(axis=1) > 1
+    in_curve, start, share = np.ones(table.logs.shape), None, _STOPPED / _LOOKED_AT
     for _ in range(_ROUNDS):
-        before, table = trust, table.trusted(trust)
+        before, table = in_curve, table.trusted(in_curve)
         shape, start = likeliest_shape(table, FAMILIES["expolinear"], start)
-        trust = _judged(*Hierarchy(table, FAMILIES["expolinear"], shape).surprise())
-        if np.abs(trust - before).max() < _CLOSE:
+        trust = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), share)
+        share = float((trust.stopped[shows_growth].sum() + _STOPPED) / (shows_growth.sum() + _LOOKED_AT))
+        in_curve = np.where(table.seen, trust.in_curve, 1.0)
+        if np.abs(in_curve - before).max() < _CLOSE:
             break
     return trust
 
 
-def _judged(surprise: Numbers, sigmas: Numbers) -> Numbers:
-    """Return the trust that surprises deserve, both (N, S) and NaN where there is no size."""
-    ratio = (OFF_BY / sigmas) ** 2
-    log_odds = np.log(_OFF / (1.0 - _OFF)) + 0.5 * (surprise**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
-    log_odds = np.where(np.isnan(surprise), -np.inf, log_odds)
-    # That none is off has the logarithm 0.
-    together = logsumexp(np.pad(log_odds, ((0, 0), (1, 0))), axis=1, keepdims=True)
-    return np.asarray(-np.expm1(log_odds - together))
+def _judged(model: Hierarchy, share: float) -> Trust:
+    """Judge fruits and sizes by a model, where such a share of all fruits has stopped."""
+    n, n_visits = model.table.logs.shape
+    effects = model.expected()
+    strayed, rows, whole = model.expected_stray(effects), np.arange(n), np.ones((n, n_visits))
+    log_odds = []
+    for stop, prior in enumerate(_log_priors(model.table.times, share).tolist()):
+        own = three_numbers(model, effects, strayed, rows, np.full(n, stop), whole)
+        off = np.where(model.table.seen, _log_odds_off(own.said, own.precisions), -np.inf)
+        log_odds.append((prior + own.log_densities)[:, None] + np.pad(off, ((0, 0), (1, 0))))
+    together = np.stack(log_odds, axis=1)
+    of_stops = logsumexp(together, axis=2)
+    stops = np.exp(of_stops - logsumexp(of_stops, axis=1, keepdims=True))
+    return Trust(stops, -np.expm1(together[:, :, 1:] - of_stops[:, :, None]))
 
 
-def put_aside(trust: Numbers) -> NDArray[np.bool_]:
-    """Tell the worst size of each fruit that likelier has one of another than not, (N, S)."""
-    off = 1.0 - trust
-    return np.asarray((off.sum(axis=1, keepdims=True) > 0.5) & (off == off.max(axis=1, keepdims=True)))
+def _log_priors(times: Numbers, share: float) -> Numbers:
+    """Return the logarithm of the probability of a stop after each number of visits, and of none, (S + 1,)."""
+    days = np.diff(times, prepend=times[0] - _BEFORE_DAYS)
+    with np.errstate(divide="ignore"):  # no fruit stops between two visits of one moment
+        return np.append(np.log(share * days / days.sum()), np.log1p(-share))
+
+
+def _log_odds_off(said: Numbers, precisions: Numbers) -> Numbers:
+    """Return the log-odds that this size of a fruit is off against none, (N, S)."""
+    precisions = np.maximum(precisions, _LEAST_PRECISION)
+    ratio = OFF_BY**2 * precisions
+    odds = np.log(_OFF / (1.0 - _OFF)) + 0.5 * (said**2 / precisions * ratio / (1.0 + ratio) - np.log1p(ratio))
+    return np.asarray(odds)

@@ -1,0 +1,117 @@
+"""Fruits that have stopped growing and hang on: told from the others, which grow as if they were not there."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from growth_maker import HARVEST, GrownRow, grow_row, rows_of
+from pomona.growth.curve_families import FAMILIES
+from pomona.growth.growth_tables import write_tables
+from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.mixed_quantiles import mixed_quantile
+from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
+from pomona.growth.size_table import SizeTable
+from pomona.growth.stopped_fruits import fates, stopped_growth, three_numbers
+
+STOPPED = np.arange(3, 90, 10)
+STOPPED_ON = 72.0
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    return grow_row(tmp_path_factory.mktemp("grown") / "orchard.gpkg")
+
+
+@pytest.fixture(scope="module")
+def grown(row: GrownRow) -> SeasonGrowth:
+    return grow_season(row.path, harvest=HARVEST)
+
+
+@pytest.fixture(scope="module")
+def stopped(row: GrownRow, grown: SeasonGrowth) -> SeasonGrowth:
+    """The same, but every tenth fruit stays as it was on a day between the second visit and the third."""
+    sizes_mm = grown.fruits.diameters_mm.copy()
+    for visit, day in enumerate(row.days):
+        if day > STOPPED_ON:
+            lost_mm = row.sizes_mm(day) - row.sizes_mm(STOPPED_ON)
+            sizes_mm[STOPPED, visit] -= lost_mm[_numbers(grown)[STOPPED]]
+    return growth_of(replace(grown.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
+
+
+def _numbers(grown: SeasonGrowth) -> np.ndarray:
+    return np.array([int(labels[0].split()[1]) for labels in grown.fruits.labels])
+
+
+def test_who_has_stopped_is_told(grown: SeasonGrowth, stopped: SeasonGrowth) -> None:
+    assert grown.stopped.max() < 0.2
+    assert stopped.stopped[STOPPED].min() > 0.9
+    assert np.delete(stopped.stopped, STOPPED).max() < 0.2
+    assert not stopped.odd[STOPPED].any()
+
+
+def test_the_others_grow_as_if_they_were_not_there(grown: SeasonGrowth, stopped: SeasonGrowth) -> None:
+    others = np.delete(np.arange(90), STOPPED)
+    found, alone = stopped.foretold, grown.foretold
+    ratios = found.rates_mm_per_day[others] / alone.rates_mm_per_day[others]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.02)
+    # One or two are so slow that they might have stopped just now.
+    assert np.quantile(np.abs(ratios - 1.0), 0.95) < 0.06
+    assert np.quantile(np.abs(found.sizes_mm[others] - alone.sizes_mm[others]), 0.95) < 1.0
+    assert stopped.curve.name == grown.curve.name
+
+
+def test_a_stopped_fruit_keeps_its_size(row: GrownRow, stopped: SeasonGrowth) -> None:
+    true_mm, told = row.sizes_mm(STOPPED_ON)[_numbers(stopped)[STOPPED]], stopped.foretold
+    for day in (3, 4):
+        inside = (told.lows_mm[STOPPED, day] <= true_mm) & (true_mm <= told.highs_mm[STOPPED, day])
+        assert inside.mean() > 0.85
+    assert told.rates_mm_per_day[STOPPED].max() < 0.1
+    np.testing.assert_allclose(told.sizes_mm[STOPPED, 4], told.sizes_mm[STOPPED, 3], atol=0.6)
+    # Means and classes of the row hold both.
+    means = told.summaries["blocks"].mean(axis=0)[0]
+    assert means[4] == pytest.approx(told.sizes_mm[:, 4].mean(), abs=0.3)
+
+
+def test_three_numbers_are_those_of_one_gaussian() -> None:
+    times = np.array([0.0, 20.0, 45.0, 60.0])
+    logs = np.log(np.array([[40.0, 52.0, 60.0, 61.0], [38.0, np.nan, 54.0, 55.0]]))
+    table = SizeTable.of(np.exp(logs), np.array([0, 0]), times)
+    model = Hierarchy(table, FAMILIES["logistic"], Shape(0.03, -10.0, 0.07, 3.0, 0.02, 0.02, 2.0, 1e-4))
+    effects, strayed = model.expected(), np.array([0.0, 0.01, 0.015, 0.02])
+    shifts, columns = fates(model, strayed)
+    for fruit in (0, 1):
+        seen, told, true = table.seen[fruit], [], []
+        for stop in range(5):
+            trust = np.ones((1, 4))
+            found = three_numbers(model, effects, strayed, np.array([fruit]), np.array([stop]), trust)
+            told.append(found.log_densities[0])
+            own = columns[stop][seen]
+            covariance = own @ np.diag([0.07**2, 9.0, 1.0]) @ own.T + np.diag(1.0 / model.whole[fruit][seen])
+            away = (model.against(effects)[fruit] - shifts[stop])[seen]
+            true.append(multivariate_normal(cov=covariance).logpdf(away))
+        np.testing.assert_allclose(np.diff(told), np.diff(true), atol=1e-8)
+
+
+def test_growth_ends_between_two_visits() -> None:
+    growth = np.array([[0.0, 0.2, 0.3, 0.5]] * 4)
+    ended = stopped_growth(growth, np.array([0, 1, 2, 3]), np.zeros(4))
+    np.testing.assert_allclose(ended[0], 0.0)
+    np.testing.assert_allclose(ended[1], [0.0, 0.1, 0.1, 0.1])
+    np.testing.assert_allclose(ended[2], [0.0, 0.2, 0.25, 0.25])
+    np.testing.assert_allclose(ended[3], [0.0, 0.2, 0.3, 0.4])
+
+
+def test_a_quantile_asks_nothing_of_what_has_no_weight() -> None:
+    weights, means = [np.array([1.0, 0.5]), np.array([0.0, 0.5])], [np.array([3.0, 0.0]), np.array([np.nan, 10.0])]
+    sigmas = [np.ones(2), np.array([np.nan, 1.0])]
+    np.testing.assert_allclose(mixed_quantile(0.5, weights, means, sigmas), [3.0, 5.0], atol=0.01)
+
+
+def test_the_table_says_who_has_stopped(tmp_path: Path, stopped: SeasonGrowth) -> None:
+    write_tables(tmp_path, stopped, pack_kg=13.0)
+    lines = {int(line["fruit_id"]): line for line in rows_of(tmp_path / "fruits.csv")}
+    told = [float(lines[fruit]["stopped_probability"]) for fruit in stopped.fruits.ids[STOPPED].tolist()]
+    assert min(told) > 0.9
