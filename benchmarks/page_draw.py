@@ -41,7 +41,8 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
         "is_vertical_guessed": False,
         "map_from_page": np.eye(4).tolist(),
         "trees": [
-            {"name": str(tree), "row": "", "middle": [TREE_M * tree, 0.0, 1.3]} for tree in range(trees.max() + 1)
+            {"name": str(tree), "row": "", "middle": [TREE_M * tree, 0.0, 1.3], "n_hang": float((trees == tree).sum())}
+            for tree in range(trees.max() + 1)
         ],
         "fruits": {
             "ids": packed_texts([str(one) for one in range(1, n + 1)]),
@@ -69,6 +70,8 @@ def drawn_document(n: int, *, with_pictures: bool, seed: int = 0) -> dict[str, A
             **{name: packed(sizes_mm + by, 0.1) for name, by in (("median_mm", 0), ("low_mm", -2), ("high_mm", 2))},
             "rate_mm_per_day": packed(rates, 0.001),
             "rate_sigma_mm_per_day": packed(np.full(n, 0.02), 0.001),
+            "n_unmeasured": 0,
+            "stopped": packed(np.zeros(n), 0.001),
             "odd": packed(np.zeros(n)),
             "blocks": blocks,
             "pack_kg": 13.0,

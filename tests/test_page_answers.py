@@ -57,9 +57,9 @@ def test_what_is_likelier_no_fruit_counts_by_its_probability(browser: Any, grown
 @pytest.mark.parametrize(
     ("sure", "n_hang", "said", "lost"),
     [
-        (0.2, N - 24, "6 fruits hid from the last visit, 24 more have probably gone", "24 more were seen and have"),
-        (0.97, N - 1, "29 fruits hid from the last visit, 1 more has probably gone", "1 more was seen and has"),
-        (0.01, N - 30, "30 fruits not seen by the last visit have probably gone", "30 more were seen and have"),
+        (0.2, N - 24, "6 fruits hid from the last visit", "24 more were seen and have"),
+        (0.97, N - 1, "29 fruits hid from the last visit", "1 more was seen and has"),
+        (0.01, N - 30, "", "30 more were seen and have"),
     ],
 )
 def test_what_the_last_visit_missed_counts_as_far_as_it_hangs(
@@ -77,6 +77,8 @@ def test_what_the_last_visit_missed_counts_as_far_as_it_hangs(
     assert f"{n_hang} fruits hang" in many
     assert f"{lost} probably gone" in many
     assert said in to_do
+    assert ("hid from" in to_do) == bool(said)
+    assert "gone" not in to_do, "it is said once, with the count"
     assert sum(map(int, counts)) == pytest.approx(n_hang, abs=1)
 
 
@@ -188,7 +190,7 @@ def test_the_numbers_of_trees_stay_in_view(browser: Any, grown_row: GrownRow, tm
 def test_the_fruits_of_no_tree_have_no_mean_of_all(browser: Any, tmp_path: Path) -> None:
     """The block of all fruits has no name, as the one of those of no tree; of these none hangs any more."""
     document = drawn_document(300, with_pictures=False)
-    document["trees"][2]["name"] = ""
+    document["trees"][2] |= {"name": "", "n_hang": 0.0}
     document["fruits"]["state"] = packed(np.repeat([1, 1, 3], 100))
     document["fruits"]["state_probability"] = packed(np.ones(300), 0.001)
     document["growth"]["blocks"] = document["growth"]["blocks"][:3]
@@ -197,3 +199,44 @@ def test_the_fruits_of_no_tree_have_no_mean_of_all(browser: Any, tmp_path: Path)
         means = [block["mean_mm"] for block in document["growth"]["blocks"][1:]]
         assert [line[2] for line in lines[:2]] == [f"{mean[-2]:.1f}" for mean in means]
         assert lines[2] == ["No tree", "0", *["\N{EN DASH}"] * 3]
+
+
+@pytest.mark.parametrize(
+    ("measured", "big", "fast", "card"),
+    [
+        (2, "mm on average on 29 Jun", "mm a day on 29 Jun", "On 29 Jun"),
+        (1, "mm on average on 14 Jun", "sizes of one day only, 2024-06-14", "On 14 Jun"),
+        (3, "mm on average", "mm a day", "Now"),
+    ],
+)
+def test_old_sizes_have_their_day(browser: Any, tmp_path: Path, measured: int, big: str, fast: str, card: str) -> None:
+    """Only the first visits measured: nothing that the page tells of sizes is of now."""
+    path = grow_row(tmp_path / "orchard.gpkg", (50, 65, 80), n_trees=2).path
+    with contextlib.closing(geopackage.connect(path)) as connection, connection:
+        connection.execute("UPDATE observations SET diameter_m = NULL WHERE session_id > ?", (measured,))
+    warned: list[str] = []
+    write_report(path, tmp_path / "report.html", Wishes(), warned.append)
+    with opened(browser, (tmp_path / "report.html").as_uri()) as page:
+        answers = [" ".join(text.split()) for text in page.locator(".answer").all_inner_texts()]
+        page.get_by_role("tab", name="Fruits").click()
+        table = page.locator("#panel-fruits")
+        table.get_by_role("row").nth(1).click()
+        names = page.locator(".fruit-card dt").all_inner_texts()
+        heads = page.locator("#panel-fruits [role=columnheader]").all_inner_texts()
+    assert re.search(f"{big}(?! on)", answers[1])
+    assert re.search(f"{fast}(?! on)", answers[2])
+    assert card in names
+    assert ("Now" in names) == (measured == 3)
+    assert ("mm now" in " ".join(heads)) == (measured == 3)
+    assert len(warned) == (measured < 3)
+    assert all(line.startswith("no sizes on 2024-0") for line in warned)
+
+
+def test_a_fruit_that_has_stopped_says_so(browser: Any, tmp_path: Path) -> None:
+    document = drawn_document(100, with_pictures=False)
+    document["growth"]["stopped"] = packed(np.full(100, 0.9), 0.001)
+    with opened(browser, write_page(tmp_path / "report.html", document)) as page:
+        page.get_by_role("tab", name="Fruits").click()
+        page.locator("#panel-fruits").get_by_role("row").nth(1).click()
+        card = " ".join(page.locator(".fruit-card dl").last.inner_text().split())
+    assert "Stopped it has stopped growing, 90 % sure" in card

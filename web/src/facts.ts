@@ -1,6 +1,7 @@
 /** What is known of each fruit now: the same facts for the row, the table, the card and the export. */
 import type { Page } from "./page";
 import { STATES, type Season, type State } from "./told/season";
+import { day, fullDay, timeOf } from "./words";
 
 const MISSED = STATES.indexOf("missed");
 const GONE = STATES.indexOf("gone");
@@ -76,8 +77,30 @@ export function actionOf(season: Season, fruit: number, target: number | null): 
 
 /** The last diameter that a visit measured. */
 export function lastMeasured({ sights }: Season, fruit: number): number {
-  for (let row = sights.starts[fruit + 1] - 1; row >= sights.starts[fruit]; row--) {
-    if (!Number.isNaN(sights.diameterMm[row])) return sights.diameterMm[row];
-  }
-  return NaN;
+  return sights.diameterMm[lastSized({ sights }, fruit)] ?? NaN;
+}
+
+/** The sight that measured a fruit last, -1 for none. */
+function lastSized({ sights }: Pick<Season, "sights">, fruit: number): number {
+  let row = sights.starts[fruit + 1] - 1;
+  while (row >= sights.starts[fruit] && Number.isNaN(sights.diameterMm[row])) row--;
+  return row >= sights.starts[fruit] ? row : -1;
+}
+
+/** The day of which the size of a fruit is told, where that is not the last visit's; else null. */
+export function oldDayOf(season: Season, fruit: number): string | null {
+  const sight = lastSized(season, fruit);
+  if (season.growth || sight < 0) return oldDay(season);
+  return unlessLast(season, season.visits[season.sights.visit[sight]].time);
+}
+
+/** The day of which sizes and rates are told, where the last visits have none; else null. */
+export function oldDay(season: Season): string | null {
+  const { growth, classes } = season;
+  if (growth) return unlessLast(season, growth.times[growth.nVisits - 1]);
+  return classes.length === 0 ? null : unlessLast(season, timeOf(classes[0].date));
+}
+
+function unlessLast({ visits }: Season, time: number): string | null {
+  return fullDay(time) === fullDay(visits[visits.length - 1].time) ? null : day(time);
 }

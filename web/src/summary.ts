@@ -3,13 +3,19 @@ import { actionOf, hangChance, hangs, lastMeasured, orOne } from "./facts";
 import type { Page } from "./page";
 import type { Block } from "./told/document";
 import { STATES, type Season } from "./told/season";
+import { wholeFruits } from "./words";
 
 const GONE = STATES.indexOf("gone");
 
-/** How many of some fruits hang, and how many no longer do, as is expected. */
-export function expected(season: Season, rows: readonly number[]): { hang: number; gone: number } {
-  const hang = rows.reduce((sum, fruit) => sum + hangChance(season, fruit), 0);
-  return { hang, gone: rows.reduce((sum, fruit) => sum + orOne(season.fruitProbability[fruit]), 0) - hang };
+/** How many of some fruits hang, as is expected. */
+export function expected(season: Season, rows: readonly number[]): number {
+  return rows.reduce((sum, fruit) => sum + hangChance(season, fruit), 0);
+}
+
+/** How many of all hang, and how many no longer do, as is expected. */
+export function expectedOfAll({ trees, fruitProbability }: Season): { hang: number; gone: number } {
+  const hang = trees.reduce((sum, tree) => sum + tree.hang, 0);
+  return { hang, gone: fruitProbability.reduce((sum, one) => sum + orOne(one), 0) - hang };
 }
 
 export function hangingRows(season: Season): number[] {
@@ -36,8 +42,6 @@ export interface TreeSummary {
   readonly label: string;
   /** How many hang, as is expected. */
   readonly fruits: number;
-  /** Those that thinning plans with, whole: the likely ones. */
-  readonly likely: number;
   readonly gone: number;
   readonly drops: number;
   readonly thin: number;
@@ -57,29 +61,28 @@ export function meanMm({ growth }: Season, block: Block | null | undefined, tree
 }
 
 export function treeSummaries({ season, target }: Page): TreeSummary[] {
-  const counts = season.trees.map(() => ({ fruits: 0, likely: 0, gone: 0, drops: 0, thin: 0, measured: 0, measuredMm: 0, clusters: new Set<number>() }));
+  const counts = season.trees.map(() => ({ gone: 0, drops: 0, thin: 0, measured: 0, measuredMm: 0, clusters: new Set<number>() }));
   for (let fruit = 0; fruit < season.n; fruit++) {
     const count = counts[season.tree[fruit]];
     if (season.state[fruit] === GONE) count.gone++;
-    count.fruits += hangChance(season, fruit);
     if (hangs(season, fruit)) {
-      count.likely++;
       const mm = lastMeasured(season, fruit);
       if (!Number.isNaN(mm)) [count.measured, count.measuredMm] = [count.measured + 1, count.measuredMm + mm];
     }
     const action = actionOf(season, fruit, target.value);
-    if (action === "drops") count.drops++;
+    if (action === "drops") count.drops += hangChance(season, fruit);
     if (action === "thin") {
       count.thin++;
       count.clusters.add(season.thinning?.cluster[fruit] ?? 0);
     }
   }
   const blocks = season.growth?.blocks ?? [];
-  return season.trees.map(({ name, label }, tree) => {
+  return season.trees.map(({ name, label, hang }, tree) => {
     const { clusters, ...count } = counts[tree];
+    const drops = wholeFruits(count.drops);
     // Where no tree is known, the fruits of none are all.
     const kind = season.trees.length > 1 || name ? "tree" : "all";
     const block = blocks.find((one) => one.kind === kind && one.name === name) ?? null;
-    return { tree, label, ...count, clustersToThin: clusters.size, block };
+    return { tree, label, ...count, fruits: hang, drops, clustersToThin: clusters.size, block };
   });
 }

@@ -6,6 +6,8 @@ const WHOLE = new Intl.NumberFormat("en-GB", { maximumFractionDigits: 0 });
 
 export const number = (value: number, digits: number): string =>
   Number.isFinite(value) ? value.toFixed(digits).replace(/^-(0(\.0+)?)$/, "$1") : UNKNOWN;
+/** Expected fruits as whole ones, halves up, as the tables of `pomona growth` have them: sums in another order differ by less than a millionth. */
+export const wholeFruits = (expected: number): number => Math.floor(expected + 0.5 + 1e-6);
 export const whole = (value: number): string => (Number.isFinite(value) ? WHOLE.format(value) : UNKNOWN);
 export const mm = (value: number): string => (Number.isFinite(value) ? `${value.toFixed(1)} mm` : UNKNOWN);
 export const percent = (share: number): string => (Number.isFinite(share) ? `${Math.round(100 * share)}\u00a0%` : UNKNOWN);

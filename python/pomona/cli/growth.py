@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.odd_visits import called, warn_of_visits
 from pomona.cli.page_wishes import Classes, Harvest
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
+from pomona.cli.visit_warnings import warn_of_visits
 from pomona.likes import GROWN
 
 if TYPE_CHECKING:
@@ -39,10 +39,11 @@ def growth(
     from pomona.growth.harvest_day import harvest_day
     from pomona.growth.season_growth import grow_season
     from pomona.growth.size_classes import FIVE_MM, parsed_classes
+    from pomona.growth.visit_warnings import of_visits
 
     limits_mm = FIVE_MM if classes is None else parsed_classes(classes)
     grown = grow_season(orchard, harvest=harvest_day(harvest), temperature=temperature, limits_mm=limits_mm)
-    warn_of_visits(orchard, grown)
+    warn_of_visits(orchard, of_visits(grown))
     output.mkdir(parents=True, exist_ok=True)
     written = (*write_tables(output, grown, pack_kg=pack_kg), *write_pictures(output, grown))
     if json:
@@ -90,6 +91,7 @@ def _summary(grown: SeasonGrowth) -> dict[str, Any]:
         "odd_visits": {sessions[odd.visit]: asdict(odd) | {"visit": odd.visit + 1} for odd in grown.odd_visits},
         "harvest": None if grown.harvest is None else grown.harvest.isoformat(),
         "n_outliers": int(grown.odd.sum()),
+        "n_unmeasured": grown.fruits.n_unmeasured,
         "blocks": blocks,
     }
 
@@ -109,12 +111,16 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
     forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
     lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
     titles = [block.title for block in grown.blocks]
-    return lines + [_line_of_block(*each) for each in zip(titles, found["blocks"], strict=True)]
+    lines += [_line_of_block(*each) for each in zip(titles, found["blocks"], strict=True)]
+    unmeasured = grown.fruits.n_unmeasured
+    return [*lines, f"  {amount(unmeasured, 'fruit')} that no visit measured: in no table"] if unmeasured else lines
 
 
 def _most_off(grown: SeasonGrowth) -> str:
     """Say which visit is farthest from the others as far as can be told, and how far with 90 %."""
     import numpy as np
+
+    from pomona.growth.visit_warnings import called
 
     told = grown.foretold
     odd = max(grown.odd_visits, key=lambda odd: odd.probability, default=None)

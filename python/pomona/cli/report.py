@@ -27,10 +27,13 @@ def report(
     """Write the page of `pomona view` as one file: every fruit, its growth, what to decide. It needs no network."""
     from pomona.cli.page_wishes import page_wishes, tell_guess
     from pomona.cli.progress import working
+    from pomona.cli.visit_warnings import warn_of_visits
     from pomona.viewer.season_report import write_report
 
     wishes = page_wishes(harvest, temperature, calipers, classes, target, pack_kg, up)
+    warnings: list[str] = []
     with working(f"telling {orchard}"):
-        n_bytes = write_report(orchard, output, wishes)
+        n_bytes = write_report(orchard, output, wishes, warnings.append)
+    warn_of_visits(orchard, warnings)
     tell_guess(orchard, wishes)
     say(f"{output}: {n_bytes / 1e6:.2f} MB, open it in a browser")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.odd_visits import warn_of_visits
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
+from pomona.cli.visit_warnings import warn_of_visits
 from pomona.likes import THINNING
 
 if TYPE_CHECKING:
@@ -39,15 +39,16 @@ def thinning(
     """
     from pomona.growth.season_growth import grow_season
     from pomona.growth.thinning_plan import plan_thinning
+    from pomona.growth.visit_warnings import of_visits
 
     grown = grow_season(orchard)
-    warn_of_visits(orchard, grown)
+    warn_of_visits(orchard, of_visits(grown))
     plan = plan_thinning(grown, target)
     if output is not None:
         _write(output, grown, plan)
     trees = _trees(grown, plan)
     if json:
-        say_json({"target": target, **_rates(plan), "trees": trees})
+        say_json({"target": target, **_rates(plan), "n_unmeasured": grown.fruits.n_unmeasured, "trees": trees})
         return
     say(*_about(orchard, grown, plan))
     say(f"  {'tree':>12} {'fruits':>7} {'will drop':>9} {'stay':>6} {'to thin':>8} {'in clusters':>11}")
@@ -57,6 +58,8 @@ def thinning(
         say(f"  {(tree['tree'] or _of_none(trees))[:12]:>12} {counts} {tree['n_clusters_to_thin']:>11}")
     if target is not None and not trees[-1]["tree"]:
         say(f"  {amount(trees[-1]['n_fruits'], 'fruit')} of no tree: none of them is thinned")
+    if unmeasured := grown.fruits.n_unmeasured:
+        say(f"  {amount(unmeasured, 'fruit')} that no visit measured: none of them is thinned")
 
 
 def _rates(plan: ThinningPlan) -> dict[str, Any]:
@@ -102,16 +105,18 @@ def _trees(grown: SeasonGrowth, plan: ThinningPlan) -> list[dict[str, Any]]:
     import numpy as np
 
     from pomona.growth.thinning_plan import are_fruitlets
+    from pomona.growth.whole_fruits import whole_fruits
 
     numbers, actions = grown.fruits.trees.numbers[plan.rows], np.array(plan.actions)
     is_told = plan.drop.is_told or not are_fruitlets(grown)
     found = []
     for number, name in enumerate(grown.fruits.trees.names):
-        of_tree = numbers == number
-        if not name and number and not of_tree.any():
+        of_tree, n_fruits = numbers == number, whole_fruits(plan.n_on_trees[number])
+        if not name and number and not n_fruits:
             continue
         thin = of_tree & (actions == "thin")
-        n_fruits, n_dropping = int(of_tree.sum()), int((of_tree & (actions == "drops")).sum())
+        drops = of_tree & (actions == "drops")
+        n_dropping = whole_fruits(plan.hang_chances[drops].sum())
         found.append(
             {
                 "tree": name or None,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pomona.growth.bearing_trees import as_counted
 from pomona.growth.foretelling import Summary
 from pomona.growth.measured import MeasuredFruits
+from pomona.growth.whole_fruits import whole_fruits
 
 __all__ = ["ALL", "HALF_A_FRUIT", "Block", "block_counts", "block_means", "blocks_of"]
 
@@ -40,7 +41,7 @@ class Block:
     @property
     def n_fruits(self) -> int:
         """How many are expected to hang, as a whole number."""
-        return round(float(self.chances.sum()))
+        return whole_fruits(self.chances.sum())
 
     def mean_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Mean of (N, ...) values over what hangs."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import BearingTrees, bearing_trees
+from pomona.growth.whole_fruits import whole_fruits
 from pomona.orchard import Observations, OrchardMap
 from pomona.orchard.hanging import hang_chances, may_hang
 
@@ -50,6 +52,8 @@ class MeasuredFruits:
         The sessions' own names of the fruits.
     days_without_sizes : tuple of date
         Of visits that measured no fruit, ascending.
+    unmeasured : mapping of str to float
+        How many are expected to hang that no visit measured, by tree: none of the N.
     """
 
     path: Path
@@ -61,11 +65,17 @@ class MeasuredFruits:
     diameters_mm: NDArray[np.float64]
     labels: tuple[tuple[str | None, ...], ...]
     days_without_sizes: tuple[date, ...] = ()
+    unmeasured: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def days(self) -> tuple[date, ...]:
         """Day of each visit, (S,)."""
         return tuple(moment.date() for moment in self.moments)
+
+    @property
+    def n_unmeasured(self) -> int:
+        """How many are expected to hang that no visit measured, as a whole number."""
+        return whole_fruits(sum(self.unmeasured.values()))
 
     @property
     def hanging(self) -> NDArray[np.bool_]:
@@ -125,7 +135,16 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         diameters_mm=diameters_mm[np.ix_(fruits, columns)],
         labels=tuple(tuple(labels[fruit, column] for column in columns) for fruit in fruits),
         days_without_sizes=tuple(sorted(without)),
+        unmeasured=_unmeasured(cloud, trees, fruits),
     )
+
+
+def _unmeasured(cloud: FruitCloud, trees: BearingTrees, measured: NDArray[np.int64]) -> dict[str, float]:
+    """Expect how many of each tree hang and are none of those that were measured, (N,) rows."""
+    chances = hang_chances(cloud)
+    chances[measured] = 0.0
+    counts = np.bincount(trees.numbers, weights=chances, minlength=len(trees.names)).tolist()
+    return {name: count for name, count in zip(trees.names, counts, strict=True) if count > 0.0}
 
 
 def _table(

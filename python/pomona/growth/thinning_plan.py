@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaError
 from pomona.growth.clusters import clusters_of
 from pomona.growth.fruit_drop import LARGEST_FRUITLET_MM, FruitDrop, MeasuredRates, drop_of
+from pomona.growth.measured import MeasuredFruits
 from pomona.growth.season_clock import CALENDAR
 from pomona.growth.season_growth import SeasonGrowth
 from pomona.growth.trust import OFF_BY
+from pomona.growth.whole_fruits import whole_fruits
 
 __all__ = ["ThinningPlan", "are_fruitlets", "plan_thinning", "rates_are_known"]
 
@@ -25,6 +27,9 @@ _NOISE_SPREAD = 0.6
 @dataclass(frozen=True, eq=False)
 class ThinningPlan:
     """What becomes of the hanging fruits.
+
+    How many hang on a tree is an expectation, the sum of probabilities; also what is likelier gone, and what no visit
+    measured, has its share in it, though none of these is thinned.
 
     Attributes
     ----------
@@ -40,10 +45,15 @@ class ThinningPlan:
     n_days : float
         Between the last two days.
     places : (M,) float64
-        Place of each among those that stay on its tree, from 1: a target of so many thins what has a higher place. 0
-        for what hangs on no tree, which no target thins, and NaN for what drops.
+        Place of each among as many as are expected to stay on its tree, from 1: a target of so many thins what has a
+        higher place. 0 for what no target thins, as it hangs on no tree or beyond those in the order of thinning, and
+        NaN for what drops.
     actions : tuple of M str
         `keep`, `drops` or `thin`.
+    hang_chances : (M,) float64
+        That each is a fruit and hangs.
+    n_on_trees : (T,) float64
+        How many are expected to hang on each tree of the growth.
     """
 
     rows: NDArray[np.int64]
@@ -55,6 +65,8 @@ class ThinningPlan:
     n_days: float
     places: NDArray[np.float64]
     actions: tuple[str, ...]
+    hang_chances: NDArray[np.float64]
+    n_on_trees: NDArray[np.float64]
 
     @property
     def days_to_wait(self) -> int:
@@ -93,18 +105,30 @@ def plan_thinning(growth: SeasonGrowth, target_per_tree: int | None = None) -> T
     clusters = clusters_of(fruits.cloud.positions[rows])
     sizes_mm = growth.foretold.sizes_mm[rows, len(fruits.days) - 1]
     drops = (np.nan_to_num(drop.probabilities) > 0.5) & drop.is_told
-    places = np.full(len(rows), np.nan)
+    places, chances = np.full(len(rows), np.nan), fruits.hang_chances[rows]
+    n_on_trees = _expected_on_trees(fruits)
     for tree, name in enumerate(fruits.trees.names):
         of_tree = np.flatnonzero((fruits.trees.numbers[rows] == tree) & ~drops)
         if not name:
             places[of_tree] = 0.0
             continue
         given_first = _order_of_thinning(of_tree, clusters, sizes_mm)
-        places[given_first] = np.arange(len(of_tree), 0, -1)
+        dropping = chances[drops & (fruits.trees.numbers[rows] == tree)].sum()
+        stay = whole_fruits(n_on_trees[tree]) - whole_fruits(dropping)
+        places[given_first] = np.maximum(stay - np.arange(len(given_first)), 0)
     thin = np.zeros(len(rows), dtype=bool) if target_per_tree is None else places > target_per_tree
     actions = tuple(DROPS if gone else THIN if taken else KEEP for gone, taken in zip(drops, thin, strict=True))
     in_cluster = np.bincount(clusters)[clusters]
-    return ThinningPlan(rows, clusters, in_cluster, sizes_mm, measured, drop, n_days, places, actions)
+    return ThinningPlan(
+        rows, clusters, in_cluster, sizes_mm, measured, drop, n_days, places, actions, chances, n_on_trees
+    )
+
+
+def _expected_on_trees(fruits: MeasuredFruits) -> NDArray[np.float64]:
+    """How many are expected to hang on each tree, (T,), with what no visit measured."""
+    names, numbers = fruits.trees.names, fruits.trees.numbers
+    measured = np.bincount(numbers, weights=fruits.hang_chances, minlength=len(names))
+    return np.asarray(measured + [fruits.unmeasured.get(name, 0.0) for name in names])
 
 
 def are_fruitlets(growth: SeasonGrowth) -> bool:

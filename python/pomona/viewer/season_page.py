@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -17,6 +17,7 @@ from pomona.growth.bearing_trees import bearing_trees
 from pomona.growth.measured import measured_fruits, require_one_season
 from pomona.growth.season_growth import grow_season
 from pomona.growth.size_classes import FIVE_MM
+from pomona.growth.visit_warnings import of_late_visits, of_visits
 from pomona.orchard import OrchardMap
 from pomona.viewer.row_frame import Vertical
 from pomona.viewer.told_calipers import calipers_told
@@ -26,9 +27,10 @@ from pomona.viewer.told_growth import growth_told
 from pomona.viewer.told_sizes import sizes_told
 from pomona.viewer.told_thinning import thinning_told
 
-__all__ = ["Wishes", "season_document"]
+__all__ = ["Warn", "Wishes", "season_document", "unheard"]
 
 CropsTold = Callable[[Path, FruitsTold], dict[str, Any] | None]
+Warn = Callable[[str], None]
 
 FORMAT = 2
 """Of the document; the page says so when it is another."""
@@ -63,7 +65,13 @@ class Wishes:
     up: NDArray[np.float64] | None = None
 
 
-def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside) -> dict[str, Any]:
+def unheard(_line: str) -> None:
+    """Let a warning pass."""
+
+
+def season_document(
+    path: Path, wishes: Wishes, crops: CropsTold = crops_inside, warn: Warn = unheard
+) -> dict[str, Any]:
     """Tell a map as plain values for JSON; the same map and wishes give the same document.
 
     Parameters
@@ -73,6 +81,8 @@ def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside)
     wishes : Wishes
     crops : callable
         Tells where the small pictures of fruits are, in the document otherwise.
+    warn : callable
+        Takes a line on what is wrong with visits.
 
     Raises
     ------
@@ -100,32 +110,41 @@ def season_document(path: Path, wishes: Wishes, crops: CropsTold = crops_inside)
         "fruits": fruits.as_columns(),
         "sights": fruits.sights(orchard.observations(), [visit.name for visit in visits]),
         "harvest": None if wishes.harvest is None else wishes.harvest.isoformat(),
-        **_grown(path, wishes, fruits),
+        **_grown(path, wishes, fruits, warn),
         "calipers": calipers_told(path, wishes.calipers, fruits),
         "crops": crops(path, fruits),
     }
 
 
-def _grown(path: Path, wishes: Wishes, fruits: FruitsTold) -> Mapping[str, Any]:
+def _grown(path: Path, wishes: Wishes, fruits: FruitsTold, warn: Warn) -> Mapping[str, Any]:
     """Tell growth and what follows from it; of a map that cannot have any, why."""
     try:
         measured = measured_fruits(path)
     except PomonaError as reason:
         return _no_growth(_by_name(reason, path), None)
     sizes = sizes_told(measured, wishes.limits_mm, wishes.pack_kg)
+    late = of_late_visits(measured, "sizes are")
     try:
         require_one_season(measured)
     except PomonaError as reason:
+        _each(warn, late)
         return _no_growth(_by_name(reason, path), sizes)
     if len(set(measured.days)) < 2:
+        _each(warn, late)
         return _no_growth(f"sizes of one day only, {measured.days[0]}: add another visit", sizes)
     growth = grow_season(path, harvest=wishes.harvest, temperature=wishes.temperature, limits_mm=wishes.limits_mm)
+    _each(warn, of_visits(growth))
     return {
         "growth": growth_told(growth, fruits, wishes.pack_kg),
         "thinning": thinning_told(growth, fruits, wishes.target),
         "no_growth": None,
         "sizes": None,
     }
+
+
+def _each(warn: Warn, lines: Sequence[str]) -> None:
+    for line in lines:
+        warn(line)
 
 
 def _by_name(reason: PomonaError, path: Path) -> str:

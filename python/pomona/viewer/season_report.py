@@ -6,12 +6,12 @@ from pathlib import Path
 
 from pomona.atomic import whole_file
 from pomona.viewer.built_page import built_page, report_of
-from pomona.viewer.season_page import Wishes, season_document
+from pomona.viewer.season_page import Warn, Wishes, season_document, unheard
 
 __all__ = ["write_report"]
 
 
-def write_report(orchard: str | Path, output: str | Path, wishes: Wishes | None = None) -> int:
+def write_report(orchard: str | Path, output: str | Path, wishes: Wishes | None = None, warn: Warn = unheard) -> int:
     """Write a map as one HTML file that needs no network.
 
     Parameters
@@ -20,6 +20,8 @@ def write_report(orchard: str | Path, output: str | Path, wishes: Wishes | None 
         The map (.gpkg).
     output : str or Path
     wishes : Wishes, optional
+    warn : callable
+        Takes a line on what is wrong with visits.
 
     Returns
     -------
@@ -31,7 +33,7 @@ def write_report(orchard: str | Path, output: str | Path, wishes: Wishes | None 
     PomonaError
         As `season_document`, or when the file cannot be written.
     """
-    report = report_of(built_page(), season_document(Path(orchard), wishes or Wishes())).encode()
+    report = report_of(built_page(), season_document(Path(orchard), wishes or Wishes(), warn=warn)).encode()
     with whole_file(output) as partial:
         partial.write_bytes(report)
     return len(report)

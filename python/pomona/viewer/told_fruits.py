@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pomona.cloud import FruitCloud
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.orchard import Observations
+from pomona.orchard.hanging import hang_chances
 from pomona.viewer.packed_columns import packed, packed_texts
 from pomona.viewer.row_frame import page_from_map
 
@@ -86,11 +87,15 @@ class FruitsTold:
 
 
 def trees_told(fruits: FruitsTold, trees: BearingTrees) -> list[dict[str, Any]]:
-    """Tell name, row and middle of each tree; a single blank name where no trees are known."""
+    """Tell name, row and middle of each tree, and how many fruits are expected to hang on it.
+
+    A single blank name where no trees are known.
+    """
     placed = fruits.placed(fruits.cloud.positions)
     middles = [placed[fruits.trees == number].mean(axis=0).round(3).tolist() for number in range(len(trees.names))]
-    told = zip(trees.names, trees.rows, middles, strict=True)
-    return [{"name": name, "row": row, "middle": middle} for name, row, middle in told]
+    hang = np.bincount(fruits.trees, weights=hang_chances(fruits.cloud), minlength=len(trees.names)).tolist()
+    told = zip(trees.names, trees.rows, middles, hang, strict=True)
+    return [{"name": name, "row": row, "middle": middle, "n_hang": n_hang} for name, row, middle, n_hang in told]
 
 
 def _numbers(cells: Sequence[str]) -> NDArray[np.float64]:

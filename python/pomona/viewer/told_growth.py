@@ -11,7 +11,7 @@ from pomona.growth.foretelling import NINETY
 from pomona.growth.growth_tables import CLASS_COLUMNS, class_lines, count_intervals
 from pomona.growth.season_growth import SeasonGrowth
 from pomona.viewer.packed_columns import packed
-from pomona.viewer.told_fruits import TENTH_MM, FruitsTold
+from pomona.viewer.told_fruits import SHARE, TENTH_MM, FruitsTold
 
 __all__ = ["growth_told"]
 
@@ -41,6 +41,8 @@ def growth_told(growth: SeasonGrowth, fruits: FruitsTold, pack_kg: float) -> dic
         "scales": dict(zip(growth.fruits.sessions, growth.foretold.scales.tolist(), strict=True)),
         **{name: packed(_spread(sizes, rows, n), TENTH_MM) for name, sizes in curves.items()},
         **{name: packed(_spread(rate, rows, n), THOUSANDTH_MM) for name, rate in rates.items()},
+        "n_unmeasured": growth.fruits.n_unmeasured,
+        "stopped": packed(_spread(growth.stopped, rows, n), SHARE),
         "odd": packed(_spread(growth.odd.astype(np.float64), rows, n)),
         "blocks": _blocks(growth),
         "pack_kg": pack_kg,

@@ -1,9 +1,10 @@
 /** What a grower can do now, the most pressing first; one line each. */
+import { oldDay } from "../facts";
 import type { Page } from "../page";
 import { expected, hangingRows, treeSummaries, type TreeSummary } from "../summary";
 import type { SizeClass } from "../told/document";
 import { STATES, type Season } from "../told/season";
-import { DAY_MS, day, fruits, fullDay, percent, whole } from "../words";
+import { DAY_MS, day, fruits, fullDay, percent, whole, wholeFruits } from "../words";
 
 /** A tree that grows so much slower than all is worth a look. */
 const SLOW = 0.9;
@@ -50,7 +51,8 @@ function again(season: Season): string[] {
   const left = season.harvest === null || season.harvest <= last ? Infinity : (season.harvest - last) / DAY_MS;
   if (left < LEAST_DAYS) return season.growth ? [] : [`Harvest on ${spaced(season.harvest!)}`];
   const when = left < FEW_DAYS ? "once more before the harvest" : "again in a week or two";
-  return [`Record the row ${when}${season.growth ? "" : missing(season)}`];
+  const sized = oldDay(season) === null ? "" : ", with diameters";
+  return [`Record the row ${when}${sized}${season.growth ? "" : missing(season)}`];
 }
 
 /** What growth needs. */
@@ -90,9 +92,6 @@ function slowTrees({ growth }: Season, trees: readonly TreeSummary[]): string[] 
 
 function hidden(season: Season): string[] {
   const missed = hangingRows(season).filter((fruit) => season.state[fruit] === MISSED);
-  const { hang, gone } = expected(season, missed);
-  const [hid, went] = [Math.round(hang), Math.round(gone)];
-  const has = went === 1 ? "has" : "have";
-  if (hid === 0) return went === 0 ? [] : [`${fruits(went)} not seen by the last visit ${has} probably gone`];
-  return [`${fruits(hid)} hid from the last visit${went === 0 ? "" : `, ${whole(went)} more ${has} probably gone`}`];
+  const hid = wholeFruits(expected(season, missed));
+  return hid === 0 ? [] : [`${fruits(hid)} hid from the last visit`];
 }

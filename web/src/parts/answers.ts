@@ -1,10 +1,11 @@
 /** The four questions of a grower, answered before any click: how many, how big, how fast, what to do. */
 import { element, replaceAll, type Child } from "../elements";
+import { oldDay } from "../facts";
 import type { Page } from "../page";
 import { advice } from "./advice";
-import { expected, hangingRows, sizesNow } from "../summary";
+import { expectedOfAll, hangingRows, sizesNow } from "../summary";
 import { STATES, type Season } from "../told/season";
-import { day, mm, number, whole } from "../words";
+import { day, fruits, mm, number, whole, wholeFruits } from "../words";
 
 export function answers(page: Page): HTMLElement {
   const root = element("section", { class: "answers", "aria-label": "At a glance" });
@@ -21,10 +22,10 @@ function answer(question: string, said: string, unit: string, ...more: Child[]):
 const line = (text: string): HTMLElement => element("p", { class: "soft" }, text);
 
 function howMany({ season }: Page): HTMLElement {
-  const { hang, gone } = expected(season, Array.from({ length: season.n }, (_, i) => i));
+  const { hang, gone } = expectedOfAll(season);
   const named = season.trees.filter((tree) => tree.name).length;
   const where = named > 0 ? `on ${named} trees, ${whole(hang / named)} a tree` : "no single trees known";
-  return answer("How many", whole(hang), "fruits hang", line(where), ...others(season, Math.round(gone)).map(line));
+  return answer("How many", whole(wholeFruits(hang)), "fruits hang", line(where), ...others(season, wholeFruits(gone)).map(line));
 }
 
 /** What was seen and is not counted. */
@@ -39,10 +40,13 @@ function howBig({ season }: Page): HTMLElement {
   const sizes = sizesNow(season);
   if (sizes.length === 0) return answer("How big", "–", "", line("no diameters in this map"));
   const middle = `eight of ten: ${number(quantile(sizes, 0.1), 0)} to ${number(quantile(sizes, 0.9), 0)} mm`;
-  if (!season.growth || !all) return answer("How big", number(mean(sizes), 1), "mm on average", line(middle));
+  const unit = `mm on average${onOldDay(season)}`;
+  if (!season.growth || !all) return answer("How big", number(mean(sizes), 1), unit, line(middle));
   const now = season.growth.nVisits - 1;
   const sure = `${number(all.low_mm[now], 1)} to ${number(all.high_mm[now], 1)} mm (90\u00a0%)`;
-  return answer("How big", number(all.mean_mm[now], 1), "mm on average", line(sure), line(middle));
+  const { unmeasured } = season.growth;
+  const more = unmeasured > 0 ? [`${fruits(unmeasured)} that no visit measured`] : [];
+  return answer("How big", number(all.mean_mm[now], 1), unit, ...[sure, middle, ...more].map(line));
 }
 
 function howFast({ season }: Page): HTMLElement {
@@ -54,7 +58,13 @@ function howFast({ season }: Page): HTMLElement {
   const then = growth.harvest === null ? line("--harvest DATE foretells a day") : line(
     `${day(growth.harvest)}: ${mm(growth.blocks[0].mean_mm[last])}, ${number(growth.blocks[0].low_mm[last], 1)} to ${number(growth.blocks[0].high_mm[last], 1)}`,
   );
-  return answer("How fast", number(rate, 2), "mm a day", sure, then);
+  return answer("How fast", number(rate, 2), `mm a day${onOldDay(season)}`, sure, then);
+}
+
+/** The day of sizes and rates, where the last visits have none. */
+function onOldDay(season: Season): string {
+  const old = oldDay(season);
+  return old === null ? "" : ` on ${old.replace(" ", "\u00a0")}`;
 }
 
 function whatToDo(page: Page): HTMLElement {

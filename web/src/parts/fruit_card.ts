@@ -1,7 +1,7 @@
 /** All that is known of the fruit that was chosen. */
 import { curveChart } from "../charts/curve";
 import { element, replaceAll, type Child } from "../elements";
-import { factsOf, type Facts } from "../facts";
+import { factsOf, oldDayOf, type Facts } from "../facts";
 import type { Page } from "../page";
 import { isTimeToThin } from "../summary";
 import { day, mm, number, percent } from "../words";
@@ -13,6 +13,8 @@ const SAID = {
   missed: "hid from the last visit",
   gone: "gone",
 } as const;
+/** Probability from which on a fruit is said to have stopped. */
+const LIKELY = 0.5;
 const PLANNED = { keep: "keep it", thin: "thin it", drops: "will drop by itself", "": "" } as const;
 
 /** Tells of the chosen fruit; `otherwise` stands there while none is. */
@@ -55,13 +57,16 @@ function steps({ selected, season }: Page, fruit: number): HTMLElement {
 
 function factList(page: Page, fruit: number, facts: Facts): HTMLElement {
   const { season } = page;
+  const old = oldDayOf(season, fruit);
   const lines: [string, Child][] = [
     ["State", `${said(page, fruit, facts)}, ${percent(facts.stateProbability)}\u00a0sure`],
   ];
-  if (!Number.isNaN(facts.sizeMm)) lines.push(["Now", withRange(facts.sizeMm, facts.lowMm, facts.highMm)]);
+  if (!Number.isNaN(facts.sizeMm)) lines.push([old === null ? "Now" : `On ${old}`, withRange(facts.sizeMm, facts.lowMm, facts.highMm)]);
   if (!Number.isNaN(facts.rate)) {
-    lines.push(["Growth", `${number(facts.rate, 2)} ± ${number(1.645 * (season.growth?.rateSigma[fruit] ?? NaN), 2)} mm a day`]);
+    lines.push(["Growth", `${number(facts.rate, 2)} ± ${number(1.645 * (season.growth?.rateSigma[fruit] ?? NaN), 2)} mm a day${old === null ? "" : ` on ${old}`}`]);
   }
+  const stopped = season.growth?.stopped[fruit] ?? NaN;
+  if (stopped > LIKELY) lines.push(["Stopped", `it has stopped growing, ${percent(stopped)}\u00a0sure`]);
   const harvest = season.growth?.harvest;
   if (harvest && !Number.isNaN(facts.forecastMm)) {
     lines.push([day(harvest), withRange(facts.forecastMm, facts.forecastLowMm, facts.forecastHighMm)]);

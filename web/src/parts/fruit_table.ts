@@ -1,6 +1,6 @@
 /** Every fruit as a line: sorted by any column, only those on screen are in the page. */
 import { element, replaceAll } from "../elements";
-import { factsOf, type Facts } from "../facts";
+import { factsOf, oldDay, type Facts } from "../facts";
 import { passing } from "../filter";
 import type { Page } from "../page";
 import { watchAll } from "../signal";
@@ -81,6 +81,7 @@ const rowColumn: Column = { width: 5, title: "Row", say: (one) => one.row, order
 
 function columnsOf(page: Page): Column[] {
   const { growth } = page.season;
+  const old = oldDay(page.season);
   const columns: Column[] = [
     { width: 5, title: "Fruit", say: (one) => one.id, order: (one) => Number(one.id) },
     ...(rowsOf(page.season).length > 0 ? [rowColumn] : []),
@@ -88,7 +89,7 @@ function columnsOf(page: Page): Column[] {
     { width: 5, title: "State", say: (one) => one.state, order: (one) => one.state },
     { width: 4.6, title: "sure", say: (one) => percent(one.stateProbability), order: (one) => one.stateProbability },
     { width: 5, title: "Visits", say: (one) => String(one.sights), order: (one) => one.sights },
-    { width: 6.6, title: "mm now", say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
+    { width: 6.6, title: old === null ? "mm now" : `mm, ${old}`, say: (one) => number(one.sizeMm, 1), order: (one) => one.sizeMm },
   ];
   if (growth) {
     columns.push(

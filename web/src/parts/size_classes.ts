@@ -1,5 +1,6 @@
 /** How many fruits of each size there are, on the last visit and at the harvest. */
 import { element } from "../elements";
+import { oldDay } from "../facts";
 import type { Page } from "../page";
 import type { SizeClass } from "../told/document";
 import { fullDay, number, timeOf, whole } from "../words";
@@ -23,7 +24,7 @@ export function sizeClasses(page: Page, isLong: boolean): HTMLElement {
     { class: "card sizes" },
     title,
     isLong ? null : key(days),
-    isLong ? element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Sizes" }, longTable(days)) : bars(days),
+    isLong ? element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Sizes" }, longTable(days)) : bars(days, oldDay(page.season)),
     isLong || page.season.growth ? element("p", { class: "soft" }, hint) : null,
   );
 }
@@ -42,7 +43,7 @@ function key(days: readonly Day[]): HTMLElement {
   return element("p", { class: "key soft" }, ...names);
 }
 
-function bars(days: readonly Day[]): HTMLElement {
+function bars(days: readonly Day[], old: string | null): HTMLElement {
   const most = Math.max(...days.flatMap(({ classes }) => classes.map((one) => one.n_fruits)));
   const rows = days[0].classes.map((first, i) => {
     const both = days.map(({ classes }, d) => {
@@ -53,7 +54,7 @@ function bars(days: readonly Day[]): HTMLElement {
     const counts = days.map(({ classes }) => element("td", {}, whole(classes[i].n_fruits)));
     return element("tr", {}, element("th", { scope: "row" }, between(first)), element("td", { class: "wide" }, ...both), ...counts);
   });
-  const heads = ["mm", "", "now", ...(days.length > 1 ? ["then"] : [])];
+  const heads = ["mm", "", old ?? "now", ...(days.length > 1 ? ["then"] : [])];
   const head = element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name)));
   return element("table", { class: "plain bars" }, element("thead", {}, head), element("tbody", {}, ...rows));
 }

@@ -1,8 +1,9 @@
 /** The same four answers tree by tree; a click looks at one tree. */
 import { element, replaceAll } from "../elements";
+import { oldDay } from "../facts";
 import type { Page } from "../page";
 import { meanMm, treeSummaries, type TreeSummary } from "../summary";
-import { day, number, whole } from "../words";
+import { day, number, whole, wholeFruits } from "../words";
 
 const BAR_PX = 28;
 
@@ -10,7 +11,8 @@ export function treeTable(page: Page): HTMLElement {
   const { season, filter, target } = page;
   const body = element("tbody");
   const growth = season.growth;
-  const heads = ["Tree", "Fruits", "mm", "a day"];
+  const old = oldDay(season);
+  const heads = ["Tree", "Fruits", old === null ? "mm" : `mm, ${old}`, "a day"];
   if (growth?.harvest) heads.push(day(growth.harvest));
   const isPlanned = (): boolean => season.thinning !== null && target.value !== null;
   const head = element("tr");
@@ -36,7 +38,7 @@ export function treeTable(page: Page): HTMLElement {
 function rowLine({ season, filter }: Page, row: string, trees: readonly TreeSummary[], isPlanned: boolean): HTMLElement {
   const { growth } = season;
   const own = trees.filter(({ tree }) => season.trees[tree].row === row);
-  const sum = (of: (tree: TreeSummary) => number): string => whole(own.reduce((total, tree) => total + of(tree), 0));
+  const sum = (of: (tree: TreeSummary) => number): string => whole(wholeFruits(own.reduce((total, tree) => total + of(tree), 0)));
   const block = growth?.blocks.find((one) => one.kind === "row" && one.name === row);
   const isChosen = filter.value.row === row && row !== "";
   const pick = (): void => filter.set({ ...filter.value, row: isChosen ? "" : row, tree: null });
@@ -56,7 +58,7 @@ function lineOf({ season, filter }: Page, tree: TreeSummary, most: number, isPla
   const bar = element("span", { class: "bar", "aria-hidden": "true" });
   bar.style.width = `${(BAR_PX * tree.fruits) / Math.max(1, most)}px`;
   const cells = [
-    element("td", {}, bar, whole(tree.fruits)),
+    element("td", {}, bar, whole(wholeFruits(tree.fruits))),
     element("td", {}, number(meanMm(season, tree.block, [tree]), 1)),
     element("td", {}, number(tree.block?.rate_mm_per_day[1] ?? NaN, 2)),
   ];

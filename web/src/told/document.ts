@@ -10,7 +10,8 @@ export interface Told {
   readonly visits: readonly { name: string; date: string; n_fruits: number; n_matched: number }[];
   readonly is_vertical_guessed: boolean;
   readonly map_from_page: readonly (readonly number[])[];
-  readonly trees: readonly { name: string; row: string; middle: readonly [number, number, number] }[];
+  /** `n_hang` fruits are expected to hang on a tree. */
+  readonly trees: readonly { name: string; row: string; middle: readonly [number, number, number]; n_hang: number }[];
   readonly fruits: {
     readonly ids: string;
     readonly tree: Packed;
@@ -79,6 +80,10 @@ export interface ToldGrowth {
   readonly high_mm: Packed;
   readonly rate_mm_per_day: Packed;
   readonly rate_sigma_mm_per_day: Packed;
+  /** Of what hangs and no visit measured: of none of these is growth told. */
+  readonly n_unmeasured: number;
+  /** Probability of each fruit that it has stopped growing. */
+  readonly stopped: Packed;
   readonly odd: Packed;
   readonly blocks: readonly Block[];
   readonly pack_kg: number;

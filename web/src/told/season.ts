@@ -20,6 +20,8 @@ export interface Tree {
   /** Name of its row, blank where the map has one row or none. */
   readonly row: string;
   readonly middle: readonly [number, number, number];
+  /** How many fruits are expected to hang on it. */
+  readonly hang: number;
 }
 
 /** Sights of fruit `i` are the rows from `starts[i]` to before `starts[i + 1]`, in order of visits. */
@@ -43,6 +45,9 @@ export interface Growth {
   readonly highMm: Float64Array;
   readonly rate: Float64Array;
   readonly rateSigma: Float64Array;
+  /** How many hang that no visit measured. */
+  readonly unmeasured: number;
+  readonly stopped: Float64Array;
   readonly odd: Float64Array;
   readonly blocks: readonly Block[];
   readonly packKg: number;
@@ -113,7 +118,7 @@ async function unpackedSeason(told: Told): Promise<Season> {
     name: told.name,
     program: told.program,
     visits: visitsOf(told),
-    trees: told.trees.map(({ name, row, middle }) => ({ name, row, label: name ? `Tree ${name}` : "No tree", middle })),
+    trees: told.trees.map(({ name, row, middle, n_hang }) => ({ name, row, label: name ? `Tree ${name}` : "No tree", middle, hang: n_hang })),
     isVerticalGuessed: told.is_vertical_guessed,
     mapFromPage: told.map_from_page,
     n: ids.length,
@@ -166,6 +171,8 @@ async function growthOf({ growth }: Told): Promise<Growth | null> {
     highMm: await unpacked(growth.high_mm),
     rate: await unpacked(growth.rate_mm_per_day),
     rateSigma: await unpacked(growth.rate_sigma_mm_per_day),
+    unmeasured: growth.n_unmeasured,
+    stopped: await unpacked(growth.stopped),
     odd: await unpacked(growth.odd),
     blocks: growth.blocks,
     packKg: growth.pack_kg,
