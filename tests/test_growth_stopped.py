@@ -75,6 +75,17 @@ def test_a_stopped_fruit_keeps_its_size(row: GrownRow, stopped: SeasonGrowth) ->
     assert means[4] == pytest.approx(told.sizes_mm[:, 4].mean(), abs=0.3)
 
 
+def test_one_small_size_shows_no_growth(grown: SeasonGrowth) -> None:
+    """What was measured once is small for any reason: it is no fruit more often than one that has stopped."""
+    sizes_mm = grown.fruits.diameters_mm.copy()
+    sizes_mm[STOPPED, :-1] = np.nan
+    sizes_mm[STOPPED, -1] *= np.linspace(0.55, 1.1, len(STOPPED))
+    found = growth_of(replace(grown.fruits, diameters_mm=sizes_mm))
+    # Learned of these too, the share would be four times as large, and so would the doubt in all.
+    assert np.delete(found.stopped, STOPPED).mean() < 0.002
+    assert found.stopped[STOPPED].mean() < 0.3
+
+
 def test_three_numbers_are_those_of_one_gaussian() -> None:
     times = np.array([0.0, 20.0, 45.0, 60.0])
     logs = np.log(np.array([[40.0, 52.0, 60.0, 61.0], [38.0, np.nan, 54.0, 55.0]]))
