@@ -51,9 +51,7 @@ pub(crate) struct Settled {
 struct Settlement<'a> {
     patches: Patchwork<'a>,
     expected: KnownNoise,
-    /// Probability that a fruit which the map could have shown is there, as the pairs show it.
-    share: f64,
-    /// The same of every fruit of the query, as the pairs around it show it.
+    /// Probability that a fruit of the query is there where the map could have shown it, as the pairs around it show it.
     shares: Vec<f64>,
     /// Pairs that hold the patches to their surroundings, and these to the common pose.
     holds: [f64; 2],
@@ -116,7 +114,7 @@ impl<'a> Settlement<'a> {
         };
         let patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
         let shares = vec![DETECTION; patches.query.len()];
-        Self { patches, expected, share: DETECTION, shares, holds: [HOLD; 2] }
+        Self { patches, expected, shares, holds: [HOLD; 2] }
     }
 
     /// What the pairs say of shares, noise and patches.
@@ -162,7 +160,7 @@ impl<'a> Settlement<'a> {
         }
     }
 
-    /// The share as the pairs show it: a step of expectation and maximisation a turn.
+    /// The shares as the pairs show them: a step of expectation and maximisation a turn.
     ///
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
@@ -170,8 +168,8 @@ impl<'a> Settlement<'a> {
         let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| self.patches.shown(row, &at.place));
         let due: Vec<f64> = self.patches.predictions.iter().enumerate().map(shown).collect();
         let found: f64 = beliefs.probabilities.iter().sum();
-        self.share = ((found + 1.0) / (due.iter().sum::<f64>() + 2.0)).clamp(SHARES.0, SHARES.1);
-        self.shares = of_places(&self.patches, beliefs, self.share, &due);
+        let share = ((found + 1.0) / (due.iter().sum::<f64>() + 2.0)).clamp(SHARES.0, SHARES.1);
+        self.shares = of_places(&self.patches, beliefs, share, &due);
     }
 
     /// Common pose, surroundings and patches from the mean partners.
