@@ -1,31 +1,38 @@
 """What visits that looked and did not see say of fruits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import check_grad
 
+from pomona.identity.first_views import N_BINS, N_SETTINGS, WIDTHS, ViewDensities
 from pomona.identity.histories import HistoryOdds, histories_of
 from pomona.identity.lives import MOST_WRONGLY_GONE, SHARE_FALSE, Lives, lives_of, states_of
+from pomona.identity.local_shares import fruits_about, shares_of_places
 from pomona.identity.looks import MISSES, Looks, visibility_classes
 
 HIDDEN, FREE = 0.04, 0.9
 """Ranks of fruits deep in the leaves, and of those that hang free."""
 
 
-def looks_at(seen, ranks=None):
+def looks_at(seen, ranks=None, places=None):
     """Looks from one side at fruits that all visits had in view; ranks where frames are counted."""
     views = seen * (0.5 if ranks is None else np.asarray(ranks))
     counted = np.full(seen.shape[1], ranks is not None)
     no_side, emptied = np.full((*seen.shape, 3), np.nan), np.zeros(seen.shape)
-    return Looks(seen, np.ones(seen.shape, bool), views, no_side, counted, emptied)
+    about = fruits_about(np.random.default_rng(0).random((len(seen), 3)) if places is None else places)
+    everywhere = np.ones(seen.shape, bool)
+    return Looks(seen, everywhere, views, no_side, counted, emptied, everywhere, about)
 
 
 def fortnights(n_visits):
     return 14.0 * np.arange(n_visits)
 
 
-def lives(seen, ranks=None, days=None):
-    return lives_of(histories_of(looks_at(seen, ranks), fortnights(seen.shape[1]) if days is None else np.array(days)))
+def lives(seen, ranks=None, days=None, places=None):
+    told = looks_at(seen, ranks, places)
+    return lives_of(histories_of(told, fortnights(seen.shape[1]) if days is None else np.array(days)))
 
 
 def row(rng, *, n_visits, hidden, false, persistent=False, n_fruits=600):
@@ -86,9 +93,7 @@ def test_a_visit_to_a_part_of_the_row_says_nothing_of_the_others():
     in_view[::2, -1] = False
     half = looks_at(seen & in_view)
     kept = half.seen.any(axis=1)
-    half = Looks(
-        half.seen[kept], in_view[kept], half.views[kept], half.towards[kept], half.is_counted, half.emptied[kept]
-    )
+    half = replace(looks_at(half.seen[kept]), in_view=in_view[kept])
     found = lives_of(histories_of(half, fortnights(6))).false
     once = half.seen.sum(axis=1) == 1
     assert found[once].mean() == pytest.approx(1.0 - is_fruit[kept][once].mean(), abs=0.1)
@@ -138,6 +143,83 @@ def test_a_fruit_seen_late_and_well_is_rather_a_false_point_than_one_seen_late_a
     assert hardly < well
 
 
+@pytest.mark.parametrize("frames", ["few", "alike", "many"])
+def test_frames_tell_false_points_from_fruits_by_what_fruits_seen_twice_are_seen_by(frames):
+    """Whether few frames see false points, as many as see fruits, or all: none of it is known beforehand."""
+    rng = np.random.default_rng(11)
+    seen, is_fruit = row(rng, n_visits=5, hidden=0.4, false=0.06, n_fruits=400)
+    spread = rng.random(seen.shape)
+    of_false = {"few": 0.05 * spread, "alike": spread, "many": 1.0 - 0.05 * spread}[frames]
+    found = 1.0 - lives(seen, np.where(is_fruit[:, None], spread, of_false)).false
+    once = seen.sum(axis=1) == 1
+    assert found[once].mean() == pytest.approx(is_fruit[once].mean(), abs=0.1)
+    if frames != "alike":
+        assert found[~is_fruit].mean() < 0.2 < 0.4 < found[once & is_fruit].mean()
+
+
+def test_the_slopes_of_view_densities_are_those_of_their_logarithms():
+    rng = np.random.default_rng(12)
+    counts = rng.integers(0, 9, (3, N_BINS)).astype(float)
+    settings = rng.normal(0.0, 0.5, N_SETTINGS)
+    value = lambda told: (counts * ViewDensities.of(told).logs[:, :-1]).sum()  # noqa: E731
+    assert check_grad(value, lambda told: ViewDensities.of(told).slopes(counts), settings) < 1e-4
+    assert np.exp(ViewDensities.of(settings).logs[:, :-1]) @ WIDTHS == pytest.approx(np.ones(3))
+
+
+def test_a_density_of_false_points_has_more_room_the_more_points_are_taken_for_false():
+    densities = ViewDensities.of(np.zeros(N_SETTINGS))
+    few, many = (densities.room(n * WIDTHS, np.zeros(N_BINS)) for n in (1.0, 100.0))
+    assert densities.room(np.zeros(N_BINS), np.zeros(N_BINS)) == 0.0 < few < many
+
+
+def test_where_a_stretch_was_stripped_its_fruits_are_gone_and_those_beside_it_hide():
+    """The share that goes is that of the place: one for the whole row would say a fifth of either."""
+    rng = np.random.default_rng(13)
+    places = np.column_stack([20.0 * np.sort(rng.random(1000)), rng.random((1000, 2))])
+    stripped = (places[:, 0] > 8.0) & (places[:, 0] < 12.0)
+    seen = rng.random((1000, 4)) > 0.35
+    seen[stripped, -1] = False
+    met = seen.any(axis=1)
+    found = lives(seen[met], places=places[met]).gone
+    inside, missed = stripped[met], ~seen[met, -1]
+    assert found[inside].mean() > 0.9
+    assert found[missed & ~inside].mean() < 0.15
+
+
+def test_what_a_visit_missed_beyond_its_end_says_nothing_of_the_share_there():
+    rng = np.random.default_rng(16)
+    places = np.column_stack([20.0 * np.sort(rng.random(800)), rng.random((800, 2))])
+    beyond = places[:, 0] > 18.0
+    seen = rng.random((800, 4)) > 0.35
+    seen[beyond, -1] = False
+    met = seen.any(axis=1)
+    told = looks_at(seen[met], places=places[met])
+    passed = ~(beyond[met, None] & (np.arange(4) == 3))
+    sure, doubtful = (
+        lives_of(histories_of(each, fortnights(4))).gone[beyond[met]].mean()
+        for each in (told, replace(told, went_by=passed))
+    )
+    assert doubtful < 0.5 < 0.9 < sure
+
+
+@pytest.mark.parametrize("gone", [0.0, 0.4])
+def test_where_as_many_go_everywhere_a_place_has_the_common_share(gone):
+    rng = np.random.default_rng(14)
+    about = fruits_about(rng.random((800, 3)) * [20.0, 1.0, 1.0])
+    went = (rng.random(800) < gone).astype(float)
+    shares = shares_of_places(went, 1.0 - went, max(gone, 0.01), about)
+    assert shares == pytest.approx(np.full(800, max(gone, 0.01)), abs=0.06)
+
+
+def test_a_place_of_which_nothing_was_seen_has_the_common_share():
+    about = fruits_about(np.column_stack([np.arange(400.0), np.zeros((400, 2))]))
+    went = np.where(np.arange(400) < 100, 1.0, np.where(np.arange(400) < 250, 0.0, 0.4))
+    shares = shares_of_places(went, 1.0 - went, 0.4, about)
+    assert shares[:80].min() > 0.9
+    assert shares[120:230].max() < 0.1
+    assert shares[270:] == pytest.approx(np.full(130, 0.4), abs=0.02)
+
+
 def test_the_gradient_of_the_posterior_is_that_of_its_value():
     rng = np.random.default_rng(9)
     seen, _ = row(rng, n_visits=4, hidden=0.3, false=0.1, n_fruits=60)
@@ -153,8 +235,7 @@ def test_looks_that_all_missed_a_fruit_are_counted_from_its_side():
     assert classes.tolist() == unseen.tolist() == [[*range(MISSES + 1), MISSES]]
     towards = np.tile([[0.0, 1.0, 0.0]], (1, MISSES + 2, 1))
     towards[0, 1::2] *= -1.0
-    looks = Looks(seen, ~np.zeros_like(seen), 0.5 * seen, towards, np.zeros(MISSES + 2, bool), np.zeros(seen.shape))
-    classes, _ = visibility_classes(looks)
+    classes, _ = visibility_classes(replace(looks_at(seen), towards=towards))
     assert classes.tolist() == [[0, 0, 1, 1, 2, 2, 3]]
 
 

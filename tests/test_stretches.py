@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
+from pomona.identity.stretches import FoundAround, went_by
 
 N_TREES, FRUITS, SPACING_M = 8, 40, 1.5
 TAKEN = 3
@@ -130,3 +131,11 @@ def test_a_gap_that_leaves_may_hide_is_none() -> None:
     row = Row.of(3)
     hidden = replace(row, hangs=np.random.default_rng(2).random(row.hangs.shape) < 0.65)
     assert hidden.said_gone(np.ones(len(row.trees), bool)) < 0.02
+
+
+def test_a_visit_went_by_between_its_first_and_last_fruits_and_where_its_cameras_say_so():
+    row = np.column_stack([np.arange(30.0), np.zeros((30, 2))])
+    places = np.column_stack([[-1.0, 0.5, 15.0, 28.5, 31.0], np.zeros((5, 2))])
+    visit = FoundAround(row, places, np.ones(5), np.ones(5, bool), True)
+    assert went_by(visit).tolist() == [False, False, True, False, False]
+    assert went_by(replace(visit, is_asked=False)).all()

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.looks import Looks, visibility_classes
+from pomona.identity.first_views import N_BINS, N_SETTINGS, UNCOUNTED, ViewDensities
+from pomona.identity.local_shares import shares_of_places
+from pomona.identity.looks import SHARES_OF_VIEWS, Looks, visibility_classes
 
 __all__ = ["CHANCES_OF_SEEING", "SHARE_GONE", "Histories", "HistoryOdds", "histories_of"]
 
-CHANCES_OF_SEEING = np.concatenate(
-    [
-        (0.80, 0.42, 0.27, 0.22, 0.18, 0.13),
-        (0.17, 0.23, 0.30, 0.35, 0.43, 0.56, 0.66, 0.80, 0.88, 0.93, 0.98, 0.99, 0.993),
-    ]
-)
+_BY_VIEWS = (0.17, 0.23, 0.30, 0.35, 0.43, 0.56, 0.66, 0.80, 0.88, 0.93, 0.98, 0.99, 0.993)
+CHANCES_OF_SEEING = np.concatenate([(0.80, 0.42, 0.27, 0.22, 0.18, 0.13), _BY_VIEWS, _BY_VIEWS])
 """Of a fruit that hangs where a visit looks, by its `visibility_classes`: what the looks before tell of the next one in
 the drawn orchards, where leaves hide the same fruits on every date."""
 
@@ -29,11 +27,11 @@ LEVEL, LEVEL_SPREAD = 0.85, 1.2
 SLOPE, SLOPE_SPREAD = 0.6, 0.5
 """How much the looks before tell: 0, nothing, where every visit misses others; 1, as in the drawn orchards."""
 
+IN_PART_SPREAD = 1.0
+"""By how much of two fruits with as many views the one that some looks missed is seen worse, or better."""
+
 OWN_SPREAD = 0.4
 """Of the logit of each class about what level and slope say of it."""
-
-LATENESS, LATENESS_SPREAD = 3.0, 3.0
-"""By how much fruits that were missed at first are seen worse than others: the rate of their first sights in ranks."""
 
 SHARE_GONE = 0.02
 """Of the fruits that go between two visits a week apart or more, before the season says its own."""
@@ -50,8 +48,6 @@ FARTHEST = 6.0
 FARTHEST_LEAVING = (-9.0, 4.0)
 """The same of the logit of the share that goes."""
 
-RANK_DIGITS = 2
-
 
 @dataclass(frozen=True, eq=False)
 class Histories:
@@ -66,9 +62,14 @@ class Histories:
     unseen : (K, V) int64
         The same for a fruit at that place that no visit has seen.
     days : (V,) float64
-    late_ranks : (K,) float64
-        How well its first sight saw a fruit that looks before had missed, as `Looks.views`; NaN of all others, and
-        where nobody counted.
+    is_late : (K,) bool
+        Whether looks had missed it before its first sight.
+    first_views : (K,) int64
+        Bin of how well its first sight saw it, as `Looks.views` among `SHARES_OF_VIEWS`; `UNCOUNTED` where nobody
+        counted.
+    went_by : (K, V) bool
+    about : (K, n) int64
+        Both as in `Looks`.
     """
 
     seen: NDArray[np.bool_]
@@ -76,30 +77,36 @@ class Histories:
     classes: NDArray[np.int64]
     unseen: NDArray[np.int64]
     days: NDArray[np.float64]
-    late_ranks: NDArray[np.float64]
+    is_late: NDArray[np.bool_]
+    first_views: NDArray[np.int64]
+    went_by: NDArray[np.bool_]
+    about: NDArray[np.int64]
 
 
 def histories_of(looks: Looks, days: NDArray[np.float64]) -> Histories:
     """Return what the looks say of each fruit; `days`, (V,), of the visits."""
     classes, unseen = visibility_classes(looks)
     rows, first = np.arange(len(looks.seen)), looks.seen.argmax(axis=1)
-    is_late = looks.is_counted[first] & (unseen[rows, first] > 0)
-    ranks = np.where(is_late, looks.views[rows, first].round(RANK_DIGITS), np.nan)
-    return Histories(looks.seen, looks.in_view, classes, unseen, days, ranks)
+    is_late = unseen[rows, first] > 0
+    bins = np.searchsorted(SHARES_OF_VIEWS, looks.views[rows, first], side="right")
+    first_views = np.where(looks.is_counted[first], bins, UNCOUNTED)
+    return Histories(looks.seen, looks.in_view, classes, unseen, days, is_late, first_views, looks.went_by, looks.about)
 
 
 class HistoryOdds:
     r"""The posterior of all that histories follow from, but for the share of false points, which is given.
 
     A fruit that hangs is seen with the chance $c_j$ of its class $j$, by what the looks before saw of it:
-    $\mathrm{logit}\, c_j = a + b\, x_j + e_j$, with $x_j$ as in the drawn orchards, the level $a$, the slope $b$ and
-    what is the class's own, $e_j$; before visit $v$ the share $h_v$ goes. So a history has the probability $P$, and
-    some visit sees a fruit there with $S$. Beside each that hangs a visit has $\rho = c_0 f / (1 - f)$ false points,
-    which no other visit sees: $f$ is their share of what a first look sees. Of what was seen at a place,
+    $\mathrm{logit}\, c_j = a + b\, x_j + d\, y_j + e_j$, with $x_j$ as in the drawn orchards, $y_j$ 1 where some looks
+    missed the fruit and others saw it, the level $a$, the slope $b$ and what is the class's own, $e_j$; before visit
+    $v$ the share $h_v$ goes. So a history has the probability $P$, and some visit sees a fruit there with $S$. Beside
+    each that hangs a visit has $\rho = c_0 f / (1 - f)$ false points, which no other visit sees: $f$ is their share of
+    what a first look sees. Of what was seen at a place, $n$ looks,
 
-    $$L = \prod \frac{P + \rho\, [\mathrm{one\ visit\ alone\ saw\ it}]}{S + \rho\, n}, \qquad n\ \mathrm{looks}$$
+    $$L = \prod \frac{q\, P + u\, \rho\, [\mathrm{one\ visit\ alone\ saw\ it}]}{S + \rho\, n}$$
 
-    is the likelihood. How many fruits hang that nobody saw is not asked: places are given.
+    is the likelihood, with the densities $q$ and $u$ of how well first sights see fruits and false points
+    (`ViewDensities`). How many fruits hang that nobody saw is not asked: places are given.
     """
 
     def __init__(self, histories: Histories) -> None:
@@ -111,13 +118,15 @@ class HistoryOdds:
         self.is_open = is_single | (last < self.n_visits - 1)
         own = np.nonzero(self.is_open)[0]
         self.seen, self.in_view, self.classes = one.seen[own], one.in_view[own], one.classes[own]
-        self.last, self.is_single, self.late_ranks = last[own], is_single[own], one.late_ranks[own]
+        self.last, self.is_single = last[own], is_single[own]
+        self.is_late, self.first_views = one.is_late[own].astype(np.int64), one.first_views[own]
+        self.went_by, self.about = one.went_by, one.about
         closed = ~self.is_open
         self.n_closed = np.count_nonzero(closed)
         self.closed_hits = _counts(one.classes[closed], one.seen[closed])
         self.closed_misses = _counts(one.classes[closed], one.in_view[closed] & ~one.seen[closed])
-        ranks = one.late_ranks[closed]
-        self.closed_late = np.array([np.count_nonzero(~np.isnan(ranks)), np.nansum(ranks)])
+        late, views = one.is_late[closed], one.first_views[closed]
+        self.closed_views = np.stack([_in_bins(views, ~late), _in_bins(views, late), np.zeros(N_BINS)])
         places, self.n_at = np.unique(np.concatenate([one.in_view, one.unseen], axis=1), axis=0, return_counts=True)
         self.place_in_view, self.place_classes = places[:, : self.n_visits] > 0, places[:, self.n_visits :]
         self.n_looks = self.place_in_view.sum(axis=1)
@@ -125,31 +134,35 @@ class HistoryOdds:
         self.share_gone = np.where(self.goes, SHARE_GONE * np.minimum(np.diff(one.days) / WEEK, 1.0), 0.0)
         logits = np.log(CHANCES_OF_SEEING / (1.0 - CHANCES_OF_SEEING))
         self.told = logits - logits[0]
+        self.in_part = np.arange(len(logits)) >= len(logits) - len(_BY_VIEWS)
 
     def start(self) -> NDArray[np.float64]:
-        """Return what is believed beforehand: level, slope, lateness, the classes' own, logits of what goes."""
+        """Return what is believed beforehand: level, slope, the classes' own, views, logits of what goes."""
         believed = np.where(self.goes, self.share_gone, SHARE_GONE)
-        return np.concatenate([np.zeros(3 + len(self.told)), np.log(believed / (1.0 - believed))])
+        return np.concatenate([np.zeros(self.n_own), np.log(believed / (1.0 - believed))])
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
         """How far from that each of it may be."""
-        return [(-FARTHEST, FARTHEST)] * (3 + len(self.told)) + [FARTHEST_LEAVING] * (self.n_visits - 1)
+        return [(-FARTHEST, FARTHEST)] * self.n_own + [FARTHEST_LEAVING] * (self.n_visits - 1)
+
+    @property
+    def n_own(self) -> int:
+        """How many settings there are before those of what goes."""
+        return 3 + len(self.told) + N_SETTINGS
 
     def __call__(self, told: NDArray[np.float64], share_false: float) -> tuple[float, NDArray[np.float64]]:
         """Return minus the log posterior and its gradient."""
         from scipy.special import xlogy
 
-        n_own = 3 + len(self.told)
-        chances, leaving = self._chances(told), self._leaving(told)
-        density = 1.0 - chances / MOST_SEEING
-        rate = share_false / (1.0 - share_false) * chances[0]
-        ends, log_real, false = self._weighed(told, chances, leaving, rate)
+        n_own = self.n_own
+        chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
+        density, rate = 1.0 - chances / MOST_SEEING, _rate(share_false, chances)
+        ends, log_real, log_false, false = self._weighed(views, chances, leaving, rate)
         unseen_ends, log_unseen = _endings(leaving, np.full(len(self.n_at), -1), self._misses_at(chances))
         met = -np.expm1(log_unseen) + rate * self.n_looks
         real, missing = 1.0 - false, self.n_at * np.exp(log_unseen) / met
-        log_single = np.log(np.exp(log_real) + rate)
-        value = np.where(self.is_single, log_single, log_real).sum() - self.n_at @ np.log(met)
+        value = np.logaddexp(log_real, log_false).sum() - self.n_at @ np.log(met)
         value += self.closed_hits @ np.log(chances) + self.closed_misses @ np.log1p(-chances)
         value += self.n_closed * np.log1p(-leaving).sum()
         # Expected counts: of looks that saw and that missed, of fruits that went and that stayed.
@@ -163,38 +176,72 @@ class HistoryOdds:
         of_chance = hits - misses * chances / (1.0 - chances)
         of_chance[0] += false.sum() - rate * (self.n_at * self.n_looks / met).sum()
         of_logit = of_chance * density
-        late, lateness = ~np.isnan(self.late_ranks), self._lateness(told)
-        n_late = self.closed_late[0] + real[late].sum()
-        ranks = self.closed_late[1] + real[late] @ self.late_ranks[late]
-        value += self.closed_late[0] * _log_rate(lateness) - lateness * self.closed_late[1]
-        of_lateness = n_late * (1.0 / lateness - 1.0 / np.expm1(lateness)) - ranks
-        slopes = [LEVEL_SPREAD * of_logit.sum(), SLOPE_SPREAD * of_logit @ self.told, LATENESS_SPREAD * of_lateness]
+        of_chances = np.concatenate(
+            [
+                [LEVEL_SPREAD * of_logit.sum(), SLOPE_SPREAD * of_logit @ self.told],
+                [IN_PART_SPREAD * of_logit @ self.in_part],
+                OWN_SPREAD * of_logit,
+            ]
+        )
+        seen_first = self.closed_views + self._first_sights(real, false)
+        value += (self.closed_views * views.logs[:, :-1]).sum()
         went_before, stayed_before = BELIEF_GONE * self.share_gone, BELIEF_GONE * (1.0 - self.share_gone)
         went, stayed, goes = went[1:] + went_before, stayed[1:] + stayed_before, leaving[1:]
         value += (xlogy(went_before, goes) + stayed_before * np.log1p(-goes)).sum()
         value -= 0.5 * told[:n_own] @ told[:n_own]
-        gradient = np.concatenate([slopes, OWN_SPREAD * of_logit, self.goes * (went * (1.0 - goes) - stayed * goes)])
+        of_leaving = self.goes * (went * (1.0 - goes) - stayed * goes)
+        gradient = np.concatenate([of_chances, views.slopes(seen_first), of_leaving])
         gradient[:n_own] -= told[:n_own]
         return -value, -gradient
 
     def lives(self, told: NDArray[np.float64], share_false: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return for each fruit, (K,), that it has gone, if it is one, and that it never was one."""
-        chances = self._chances(told)
-        rate = share_false / (1.0 - share_false) * chances[0]
-        ends, _, false = self._weighed(told, chances, self._leaving(told), rate)
+        chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
+        rate = _rate(share_false, chances)
+        ends, _, _, false = self._weighed(views, chances, leaving, rate)
+        ends, _, _, false = self._weighed(views, chances, self._leaving_places(leaving, ends, false), rate)
         gone, never = np.zeros(len(self.is_open)), np.zeros(len(self.is_open))
         gone[self.is_open], never[self.is_open] = 1.0 - ends[:, -1], false
         return gone, never
 
+    def _leaving_places(
+        self, leaving: NDArray[np.float64], ends: NDArray[np.float64], false: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the share that goes about each open fruit before each visit, (K, V), from those of all, (V,)."""
+        went, stayed = np.zeros((len(self.is_open), self.n_visits)), np.ones((len(self.is_open), self.n_visits))
+        went[self.is_open] = ends[:, :-1] * (1.0 - false)[:, None]
+        stayed[self.is_open] = _hanging(ends) * (1.0 - false)[:, None]
+        # What a visit missed beyond its own fruits, it may not have looked at: that says nothing of the place.
+        went, stayed = went * self.went_by, stayed * self.went_by
+        local = np.tile(leaving, (len(ends), 1))
+        for visit in np.flatnonzero(leaving):
+            shares = shares_of_places(went[:, visit], stayed[:, visit], float(leaving[visit]), self.about)
+            local[:, visit] = shares[self.is_open]
+        return local
+
+    def room(self, told: NDArray[np.float64], share_false: float) -> float:
+        """Return `ViewDensities.room` at the top of the log posterior."""
+        chances, views = self._chances(told), self._views(told)
+        false = self._weighed(views, chances, self._leaving(told), _rate(share_false, chances))[3]
+        return views.room(*(_in_bins(self.first_views, each) for each in (false, false * (1.0 - false))))
+
     def _weighed(
-        self, told: NDArray[np.float64], chances: NDArray[np.float64], leaving: NDArray[np.float64], rate: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return when each open fruit goes, as `_endings`; the log of what speaks for a real one; that it is none."""
+        self, views: ViewDensities, chances: NDArray[np.float64], leaving: NDArray[np.float64], rate: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Weigh each open fruit, (K,), by the share that goes before each visit, (V,) or of each, (K, V).
+
+        Return when it goes, as `_endings`; the logarithms of what speaks for a fruit and for none; that it is none.
+        """
         looks = np.where(self.seen, np.log(chances)[self.classes], np.log1p(-chances)[self.classes])
         ends, log_real = _endings(leaving, self.last, np.where(self.in_view, looks, 0.0))
-        lateness = self._lateness(told)
-        log_real = log_real + np.nan_to_num(_log_rate(lateness) - lateness * self.late_ranks)
-        return ends, log_real, np.where(self.is_single, rate / (rate + np.exp(log_real)), 0.0)
+        log_real = log_real + views.logs[self.is_late, self.first_views]
+        log_false = np.where(self.is_single, np.log(rate) + views.logs[2, self.first_views], -np.inf)
+        return ends, log_real, log_false, 1.0 / (1.0 + np.exp(log_real - log_false))
+
+    def _first_sights(self, real: NDArray[np.float64], false: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how many first sights of each kind are in each bin, (3, B), as `ViewDensities` has them."""
+        weights = (real * (1 - self.is_late), real * self.is_late, false)
+        return np.stack([_in_bins(self.first_views, each) for each in weights])
 
     def _misses_at(self, chances: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.where(self.place_in_view, np.log1p(-chances)[self.place_classes], 0.0)
@@ -202,21 +249,20 @@ class HistoryOdds:
     def _chances(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the chance of seeing a fruit of each class, (C,)."""
         common = LEVEL + LEVEL_SPREAD * told[0] + (SLOPE + SLOPE_SPREAD * told[1]) * self.told
-        return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - OWN_SPREAD * told[3 : 3 + len(self.told)])))
+        own = OWN_SPREAD * told[3 : 3 + len(self.told)] + IN_PART_SPREAD * told[2] * self.in_part
+        return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - own)))
 
     def _leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the share that goes before each visit, (V,); none before the first, nor between two of one date."""
-        return np.concatenate([[0.0], self.goes / (1.0 + np.exp(-told[3 + len(self.told) :]))])
+        return np.concatenate([[0.0], self.goes / (1.0 + np.exp(-told[self.n_own :]))])
 
-    @staticmethod
-    def _lateness(told: NDArray[np.float64]) -> float:
-        lateness = LATENESS + LATENESS_SPREAD * float(told[2])
-        return lateness if abs(lateness) > 1e-3 else 1e-3
+    def _views(self, told: NDArray[np.float64]) -> ViewDensities:
+        return ViewDensities.of(told[self.n_own - N_SETTINGS : self.n_own])
 
 
-def _log_rate(lateness: float) -> float:
-    """Return the log of what makes exp(-lateness * rank) a density over ranks of 0 to 1."""
-    return float(np.log(lateness / -np.expm1(-lateness)))
+def _rate(share_false: float, chances: NDArray[np.float64]) -> float:
+    """Return how many false points a visit has beside each fruit that hangs."""
+    return float(share_false / (1.0 - share_false) * chances[0])
 
 
 def _counts(classes: NDArray[np.int64], weights: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -224,16 +270,23 @@ def _counts(classes: NDArray[np.int64], weights: NDArray[np.generic]) -> NDArray
     return counted.astype(np.float64)
 
 
+def _in_bins(bins: NDArray[np.int64], weights: NDArray[np.generic]) -> NDArray[np.float64]:
+    """Return the sum of the weights of the first sights in each bin, (B,), but for those that nobody counted."""
+    return np.bincount(bins - UNCOUNTED, weights.astype(np.float64), N_BINS + 1)[1:].astype(np.float64)
+
+
 def _endings(
     leaving: NDArray[np.float64], last: NDArray[np.int64], logs: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return probabilities of going before each visit, the last column for never, (K, V + 1); and their log sum.
 
-    `logs`, (K, V), are of what each look saw or missed; up to the visit `last` the fruit hangs for sure.
+    `leaving`, (V,) or (K, V), are the shares that go before each visit; `logs`, (K, V), are of what each look saw or
+    missed; up to the visit `last` the fruit hangs for sure.
     """
-    stayed = np.concatenate([[0.0], np.cumsum(np.log1p(-leaving))])
+    at_first = np.zeros((*leaving.shape[:-1], 1))
+    stayed = np.concatenate([at_first, np.cumsum(np.log1p(-leaving), axis=-1)], axis=-1)
     with np.errstate(divide="ignore"):
-        going = np.concatenate([np.log(leaving), [0.0]]) + stayed
+        going = np.concatenate([np.log(leaving), at_first], axis=-1) + stayed
     weights = np.concatenate([np.zeros((len(logs), 1)), np.cumsum(logs, axis=1)], axis=1) + going
     weights = np.where(np.arange(logs.shape[1] + 1) > last[:, None], weights, -np.inf)
     most = weights.max(axis=1, keepdims=True, initial=-np.inf)

@@ -69,6 +69,7 @@ def lives_of(histories: Histories) -> Lives:
     A fruit that one visit saw alone may be none. How many are, two visits cannot tell from how many hide: as many are
     seen once either way. So the share of false points is not guessed but summed over, from none to a third, each by how
     likely it makes what was seen at the chances of seeing and the shares of going that explain it best (`HistoryOdds`).
+    In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
     odds = HistoryOdds(histories)
     fits = _fits(odds)
@@ -97,12 +98,12 @@ def _fits(odds: HistoryOdds) -> dict[int, tuple[float, NDArray[np.float64]]]:
 
 
 def _climbed(odds: HistoryOdds, share: float, told: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Return the top of the log posterior at a share, from `told` on, and where it is."""
+    """Return the log posterior of a share, by the top at this share from `told` on, and where that is."""
     from scipy.optimize import minimize
 
     top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=odds.bounds, options={"ftol": 1e-8})
     belief = SHARE_FALSE * BELIEF_FALSE * np.log(share) + ((1.0 - SHARE_FALSE) * BELIEF_FALSE - 1.0) * np.log1p(-share)
-    return float(belief - top.fun), top.x
+    return float(belief - top.fun - odds.room(top.x, share)), top.x
 
 
 def _weights(log_posteriors: dict[int, float]) -> dict[int, float]:

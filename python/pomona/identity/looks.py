@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.identity.local_shares import fruits_about
 from pomona.identity.near_fruits import AskedPlaces, NearFruits
 from pomona.identity.places import (
     has_fruits_near,
@@ -16,7 +17,7 @@ from pomona.identity.places import (
     surroundings_of,
     towards_camera,
 )
-from pomona.identity.stretches import FoundAround, emptied_stretches
+from pomona.identity.stretches import FoundAround, emptied_stretches, went_by
 from pomona.identity.visits import SeenVisit, Sights
 
 __all__ = ["Looks", "looks_of", "quantile_of_rows", "visibility_classes"]
@@ -58,6 +59,10 @@ class Looks:
         Whether the visit counts the frames that saw each fruit.
     emptied : (K, V) float64
         Probability that the visit came by, and what hung about the fruit had been taken.
+    went_by : (K, V) bool
+        Whether the visit went by there for sure, and did not end before.
+    about : (K, n) int64
+        The fruits around it, as `fruits_about`.
     """
 
     seen: NDArray[np.bool_]
@@ -66,6 +71,8 @@ class Looks:
     towards: NDArray[np.float64]
     is_counted: NDArray[np.bool_]
     emptied: NDArray[np.float64]
+    went_by: NDArray[np.bool_]
+    about: NDArray[np.int64]
 
 
 def looks_of(
@@ -101,7 +108,9 @@ def looks_of(
         towards[:, number] = towards_camera(in_map, asked, frames[number, :3, :3] / scale)
         views[labels[own], number] = _shares_of_views(visit.n_views, fruits[number])
     is_counted = np.array([visit.n_views is not None for visit in visits], bool)
-    return Looks(seen, in_view, views, towards, is_counted, emptied_stretches(found, seen, sights.days))
+    passed = np.stack([went_by(visit) for visit in found], axis=1)
+    emptied, about = emptied_stretches(found, seen, sights.days), fruits_about(places[:, -1])
+    return Looks(seen, in_view, views, towards, is_counted, emptied, passed, about)
 
 
 def _with_cameras_in_map(visit: SeenVisit, map_from_visit: NDArray[np.float64], scale: float) -> SeenVisit:
@@ -146,7 +155,7 @@ def visibility_classes(looks: Looks) -> tuple[NDArray[np.int64], NDArray[np.int6
     -------
     (K, V) int64
         The number of looks that all missed it, to `MISSES`; else more than that by the place of the mean of
-        `Looks.views` among `SHARES_OF_VIEWS`.
+        `Looks.views` among `SHARES_OF_VIEWS`; and so once more for those that some looks missed and others saw.
     (K, V) int64
         The same where all have missed it.
     """
@@ -158,7 +167,9 @@ def visibility_classes(looks: Looks) -> tuple[NDArray[np.int64], NDArray[np.int6
         n_looks = tells.sum(axis=1)
         unseen[:, visit] = np.minimum(n_looks, MISSES)
         views = _views_so_far(looks, tells) / np.maximum(n_looks, 1)
+        in_part = (tells & ~looks.seen[:, :visit]).any(axis=1)
         known = 1 + MISSES + np.searchsorted(SHARES_OF_VIEWS, views, side="right")
+        known += in_part * (len(SHARES_OF_VIEWS) + 1)
         classes[:, visit] = np.where(views > 0.0, known, unseen[:, visit])
     return classes, unseen
 

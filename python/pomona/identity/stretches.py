@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LIKELY", "FoundAround", "emptied_stretches"]
+__all__ = ["LIKELY", "FoundAround", "emptied_stretches", "went_by"]
 
 AT_EACH_END = 3
 """Fruits at the height and depth of a gap that a visit has before it, and behind it, when it went by."""
@@ -127,6 +127,18 @@ def emptied_stretches(
         for gap in _gaps(visit, along, beside):
             told[gap.place, number] = inner_chances[gap.holds].max(initial=0.0) / (1.0 + missed[number])
     return told
+
+
+def went_by(visit: FoundAround) -> NDArray[np.bool_]:
+    """Tell which places, (K,), a visit went by for sure: cameras say so, or it has fruits before them and behind.
+
+    Beyond its last fruits along a row it may have looked, or ended.
+    """
+    along = _along_row(visit.fruits) if visit.is_asked else None
+    if along is None:
+        return np.ones(len(visit.places), bool)
+    own_m, places_m = np.sort(visit.fruits @ along), visit.places @ along
+    return np.asarray((places_m > own_m[AT_EACH_END - 1]) & (places_m < own_m[-AT_EACH_END]))
 
 
 def _along_row(fruits: NDArray[np.float64]) -> NDArray[np.float64] | None:
