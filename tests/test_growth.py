@@ -284,16 +284,16 @@ def test_each_counts_by_the_probability_that_it_is_a_fruit_and_hangs(row_growth:
     fruits = judged(
         row_growth,
         state=("seen", "new", "missed", "missed", "gone", "gone") + ("seen",) * 84,
-        state_probability=("0.9", "0.3", "0.1", "", "0.8", "") + ("1.0",) * 84,
+        state_probability=("0.7", "0.3", "0.1", "", "0.8", "") + ("1.0",) * 84,
         fruit_probability=("0.9", "0.3", "0.5", "0.6", "0.5", "1.0") + ("1.0",) * 84,
     )
-    expected = [0.9, 0.3, 0.05, 0.6, 0.1, 0.0, *[1.0] * 84]
+    expected = [0.7, 0.3, 0.05, 0.6, 0.1, 0.0, *[1.0] * 84]
     found = blocks_of(fruits)
     np.testing.assert_allclose(found[0].chances, expected, atol=1e-12)
     assert [block.n_fruits for block in found] == [86, 26, 30, 30]
     assert fruits.hanging.tolist() == [True] * 2 + [False, True, False, False] + [True] * 84, "as forecasts are told"
     sizes_mm = np.array([10.0] * 6 + [60.0] * 84)
-    assert found[1].mean_of(sizes_mm) == pytest.approx((1.95 * 10.0 + 24 * 60.0) / 25.95)
+    assert found[1].mean_of(sizes_mm) == pytest.approx((1.75 * 10.0 + 24 * 60.0) / 25.75)
 
 
 def test_trees_on_which_half_a_fruit_is_expected_are_no_block(row_growth: SeasonGrowth) -> None:

@@ -239,6 +239,20 @@ def test_looks_that_all_missed_a_fruit_are_counted_from_its_side():
     assert classes.tolist() == [[0, 0, 1, 1, 2, 2, 3]]
 
 
+def test_what_no_later_visit_looked_at_hangs_as_surely_as_what_they_looked_at_stays():
+    """Half of a row is not visited again, and of the other two fifths went: nobody knows whether of this one, too."""
+    rng = np.random.default_rng(15)
+    places = np.column_stack([20.0 * np.sort(rng.random(800)), rng.random((800, 2))])
+    seen, in_view = rng.random((800, 3)) < 0.9, np.ones((800, 3), bool)
+    in_view[:400, -1] = False
+    seen[:, -1] &= in_view[:, -1] & (rng.random(800) > 0.4)
+    met = seen.any(axis=1)
+    told = replace(looks_at(seen[met], places=places[met]), in_view=in_view[met])
+    states, sure = states_of(told.seen, told.in_view, lives_of(histories_of(told, fortnights(3))))
+    elsewhere = (np.array(states) == "seen") & (places[met, 0] < places[400, 0])
+    assert sure[elsewhere].mean() == pytest.approx(0.6, abs=0.07)
+
+
 def test_no_more_are_called_gone_than_may_be_called_so_wrongly():
     """Half of what two visits saw and the third did not may be gone, and nobody can say which half."""
     seen = np.array([[True, False]] * 40 + [[True, True]] * 60)

@@ -36,8 +36,8 @@ export const orOne = (probability: number): number => (Number.isNaN(probability)
 
 /** Probability that a fruit is one and hangs: as `pomona growth` counts. Of what was missed or is gone the map's own is one of fruits. */
 export function hangChance({ state, stateProbability, fruitProbability }: Season, fruit: number): number {
-  const sure = orOne(stateProbability[fruit]);
-  return orOne(fruitProbability[fruit]) * (state[fruit] === MISSED ? sure : state[fruit] === GONE ? 1 - sure : 1);
+  const [sure, real] = [orOne(stateProbability[fruit]), orOne(fruitProbability[fruit])];
+  return state[fruit] === MISSED ? real * sure : state[fruit] === GONE ? real * (1 - sure) : Math.min(real, sure);
 }
 
 export function factsOf({ season, target }: Page, fruit: number): Facts {

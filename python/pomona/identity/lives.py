@@ -124,6 +124,7 @@ def states_of(
 ) -> tuple[list[str], NDArray[np.float64]]:
     """Return the state of each fruit, and its probability.
 
+    That a fruit `seen` or `new` is one and hangs: it may have gone since, before a visit that looked elsewhere.
     `seen` by the last visit that looked there; `new` when that is its only sight and visits before had looked there;
     else `gone` with a probability of `SAID_GONE` and more, as far as `MOST_WRONGLY_GONE` allows, or `missed`.
     """
@@ -133,7 +134,8 @@ def states_of(
     is_new = is_seen & (seen.sum(axis=1) == 1) & (in_view.sum(axis=1) > 1)
     is_gone = ~is_seen & (lives.gone > _least_gone(lives.gone, ~is_seen))
     states = np.select([is_new, is_seen, is_gone], ["new", "seen", "gone"], "missed")
-    probabilities = np.select([is_seen, is_gone], [1.0 - lives.false, lives.gone], 1.0 - lives.gone)
+    hangs = 1.0 - lives.gone
+    probabilities = np.select([is_seen, is_gone], [(1.0 - lives.false) * hangs, lives.gone], hangs)
     return states.tolist(), probabilities
 
 

@@ -32,8 +32,9 @@ def may_hang(fruits: FruitCloud) -> NDArray[np.bool_]:
 def hang_chances(fruits: FruitCloud) -> NDArray[np.float64]:
     """Probability of each point, (N,), that it is a fruit and hangs.
 
-    ``state_probability`` is told of what is a fruit: of `missed` that it hangs, of `gone` that it does not. Of `seen`
-    and `new` it is that it is a fruit at all, and what was seen by the last visit that looked hangs.
+    ``state_probability`` of `missed` and `gone` is told of what is a fruit: that it hangs, and that it does not. Of
+    `seen` and `new` it is that it is a fruit and hangs, so it is no more than ``fruit_probability``: what a later visit
+    that looked elsewhere learned of the share that goes counts there, too.
 
     Parameters
     ----------
@@ -47,7 +48,8 @@ def hang_chances(fruits: FruitCloud) -> NDArray[np.float64]:
     )
     told = np.array(states)
     sure, real = (np.array([float(one or 1) for one in each], np.float64) for each in (of_states, of_fruits))
-    return np.asarray(real * np.select([told == "missed", told == "gone"], [sure, 1.0 - sure], 1.0))
+    missed, gone = told == "missed", told == "gone"
+    return np.asarray(np.select([missed, gone], [real * sure, real * (1.0 - sure)], np.minimum(real, sure)))
 
 
 def tell_trees(states: Sequence[str], chances: Sequence[float | None]) -> NDArray[np.bool_]:
