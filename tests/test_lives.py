@@ -260,3 +260,15 @@ def test_no_more_are_called_gone_than_may_be_called_so_wrongly():
     states, _ = states_of(seen, np.ones(seen.shape, bool), doubtful)
     assert states == ["gone"] * 4 + ["missed"] * 36 + ["seen"] * 60
     assert MOST_WRONGLY_GONE * (1.0 - doubtful.gone).sum() < 36 * 0.5
+
+
+def test_of_fruits_that_are_gone_as_surely_all_are_called_so_where_most_of_them_may():
+    """One fruit more or less must not call a hundred gone or none."""
+    seen = np.array([[True, False]] * 100 + [[True, True]] * 100)
+    called = {}
+    for n_hidden in (100, 90, 40):
+        gone = np.concatenate([np.full(n_hidden, 0.9), np.full(100 - n_hidden, 0.2), np.zeros(100)])
+        states, _ = states_of(seen, np.ones(seen.shape, bool), Lives(gone, np.zeros(200)))
+        called[n_hidden] = states.count("gone")
+        assert MOST_WRONGLY_GONE * (1.0 - gone).sum() > 0.5 * 0.1 * n_hidden
+    assert called == {100: 100, 90: 90, 40: 40}

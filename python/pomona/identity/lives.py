@@ -38,6 +38,9 @@ MOST_WRONGLY_GONE = 0.06
 """Of the fruits that hang, the share that may be called gone by what is expected, which is twice of what comes: after
 two visits half of what was missed may be gone, and nobody can say which half."""
 
+LEVEL = 0.01
+"""Probabilities that differ by less are of fruits that are gone as surely."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lives:
@@ -140,8 +143,11 @@ def states_of(
 
 
 def _least_gone(gone: NDArray[np.float64], is_unseen: NDArray[np.bool_]) -> float:
-    """Return the probability above which the fruits that were not seen are called gone."""
-    surest_first = np.sort(gone[is_unseen])[::-1]
-    wrongly = np.cumsum(1.0 - surest_first)
-    beyond = surest_first[wrongly > MOST_WRONGLY_GONE * (1.0 - gone).sum()]
-    return max(SAID_GONE, float(beyond[0])) if len(beyond) else SAID_GONE
+    """Return the probability above which the fruits that were not seen are called gone.
+
+    Of fruits that are gone as surely all are called so, or none: all where half of them may.
+    """
+    levels, which = np.unique(gone[is_unseen] // LEVEL, return_inverse=True)
+    wrongly = np.bincount(which, 1.0 - gone[is_unseen], len(levels))[::-1]
+    beyond = levels[::-1][np.cumsum(wrongly) - 0.5 * wrongly > MOST_WRONGLY_GONE * (1.0 - gone).sum()]
+    return max(SAID_GONE, float(beyond[0] + 1.0) * LEVEL) if len(beyond) else SAID_GONE
