@@ -64,12 +64,27 @@ print(json.dumps({"heavy": sorted(heavy), "helps": helps}))
     assert [verb for verb, text in printed["helps"].items() if "Usage:" not in text] == []
 
 
+def test_a_row_that_is_torn_apart_is_told(tmp_path: Path, run_here) -> None:
+    torn = scene_pair("torn", 0)
+    torn.query.write(tmp_path / "query.csv")
+    torn.map.write(tmp_path / "map.csv")
+    answer = run_here("match", str(tmp_path / "query.csv"), str(tmp_path / "map.csv"))
+    assert "2, torn apart" in answer.stdout
+    told = json.loads(run_here("match", str(tmp_path / "query.csv"), str(tmp_path / "map.csv"), "--json").stdout)
+    assert told["n_parts"] == 2
+    orchard = str(tmp_path / "row.gpkg")
+    for name, date in (("map", "2024-06-01"), ("query", "2024-06-15")):
+        added = run_here("map", "add", orchard, str(tmp_path / f"{name}.csv"), "--date", date)
+    assert "it is torn apart, 2 parts" in added.stdout
+
+
 def test_json_keeps_the_contract(visits: Path, found: dict[str, object]) -> None:
     assert set(found) == {
         "status",
         "map_from_query",
         "scale",
         "log_odds",
+        "n_parts",
         "n_query",
         "n_map",
         "matches",

@@ -75,6 +75,15 @@ class Match:
     n_map: int
     elapsed_s: float
 
+    @property
+    def n_parts(self) -> int:
+        """Parts of the query that lie to one another as they do not in the map; `map_from_query` is the pose of the first.
+
+        More than one where a row is torn apart, because a camera lost its way, or a map whose own parts know nothing of
+        each other; 0 where nothing was found.
+        """
+        return int(dict(self.stages).get("parts", 1)) if self.map_from_query is not None else 0
+
     def __bool__(self) -> bool:
         return self.status is Verdict.FOUND
 

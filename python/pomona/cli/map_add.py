@@ -113,6 +113,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "n_matched": added.n_matched,
         "n_new": added.n_new,
         "n_missed": added.n_missed,
+        "n_parts": 0 if match is None else match.n_parts,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
         "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
@@ -135,7 +136,8 @@ def _added_as_text(visit: Session, added: Added) -> str:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
     if match.status.value != "Found":
         return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
+    torn = f"; it is torn apart, {match.n_parts} parts, and all lies as the first" if match.n_parts > 1 else ""
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
-        f"{added.n_missed} in view and not seen"
+        f"{added.n_missed} in view and not seen{torn}"
     )

@@ -35,6 +35,7 @@ def as_json(match: Match, query: FruitCloud, map: FruitCloud) -> dict[str, Any]:
         "map_from_query": None if match.map_from_query is None else match.map_from_query.tolist(),
         "scale": match.scale,
         "log_odds": match.log_odds if math.isfinite(match.log_odds) else None,
+        "n_parts": match.n_parts,
         "n_query": match.n_query,
         "n_map": match.n_map,
         "matches": [
@@ -51,6 +52,10 @@ def as_lines(match: Match) -> list[str]:
     lines = [f"{match.status.value}: {_MEANINGS[match.status.value]}"]
     if match.map_from_query is not None:
         lines += _describe_transform(match.map_from_query)
+    if match.n_parts > 1:
+        lines.append(
+            _line("parts", f"{match.n_parts}, torn apart: they lie otherwise in the map; the pose is the first's")
+        )
     share = f" ({len(match.pairs) / match.n_query:.0%})" if match.n_query else ""
     lines.append(_line("fruits", f"{match.n_query} in the query, {match.n_map} in the map"))
     lines.append(_line("pairs", f"{len(match.pairs)}{share}"))

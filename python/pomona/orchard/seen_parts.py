@@ -63,11 +63,13 @@ def seen_parts(
 ) -> list[SeenPart]:
     """Return the part in which a session was found, and others in which lies what it saw beyond; none where in none.
 
-    How parts lie to each other nobody knows, so a session that saw two has two poses in the map, neither of which
-    stands out: then each part is asked by itself.
+    How parts lie to each other nobody knows, so a session that saw two has two poses in the map: it is torn apart
+    there, or neither pose stands out. Then each part is asked by itself.
     """
     if found.match.status.value == "Ambiguous":
         return _asked_apart(connection, cloud, settings)
+    if found.match.n_parts > 1 and (apart := _asked_apart(connection, cloud, settings)):
+        return apart
     rows, parts = np.arange(len(cloud)), list[SeenPart]()
     while found.is_found:
         evidence = read_evidence(connection, parts_with(connection, seen_last_by(connection, found)))
