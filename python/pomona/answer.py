@@ -77,7 +77,7 @@ class Match:
 
     @property
     def n_parts(self) -> int:
-        """Parts of the query that lie to one another as they do not in the map; `map_from_query` is the pose of the first.
+        """Parts of the query that lie otherwise to one another in the map; `map_from_query` is the pose of the first.
 
         More than one where a row is torn apart, because a camera lost its way, or a map whose own parts know nothing of
         each other; 0 where nothing was found.

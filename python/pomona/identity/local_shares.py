@@ -28,6 +28,8 @@ LEAST_WORTH = 0.1
 
 def fruits_about(places: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the rows of the fruits that hang about each, (K, n), itself left out; `places`, (K, 3)."""
+    if not len(places):
+        return np.empty((0, 0), np.int64)
     rows = NearFruits(places).nearest(places, ABOUT + 1)[1]
     # Of two at one place either may come first.
     is_self = rows == np.arange(len(places))[:, None]
