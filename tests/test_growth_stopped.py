@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from growth_maker import HARVEST, GrownRow, grow_row, rows_of
+from growth_maker import HARVEST, GrownRow, rows_of
 from pomona.growth.curve_families import FAMILIES
 from pomona.growth.growth_tables import write_tables
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.mixed_quantiles import mixed_quantile
-from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
+from pomona.growth.season_growth import SeasonGrowth, growth_of
 from pomona.growth.size_table import SizeTable
 from pomona.growth.stopped_fruits import fates, stopped_growth, three_numbers
 
@@ -21,50 +21,40 @@ STOPPED_ON = 72.0
 
 
 @pytest.fixture(scope="module")
-def row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
-    return grow_row(tmp_path_factory.mktemp("grown") / "orchard.gpkg")
-
-
-@pytest.fixture(scope="module")
-def grown(row: GrownRow) -> SeasonGrowth:
-    return grow_season(row.path, harvest=HARVEST)
-
-
-@pytest.fixture(scope="module")
-def stopped(row: GrownRow, grown: SeasonGrowth) -> SeasonGrowth:
+def stopped(grown_row: GrownRow, row_growth: SeasonGrowth) -> SeasonGrowth:
     """The same, but every tenth fruit stays as it was on a day between the second visit and the third."""
-    sizes_mm = grown.fruits.diameters_mm.copy()
-    for visit, day in enumerate(row.days):
+    sizes_mm = row_growth.fruits.diameters_mm.copy()
+    for visit, day in enumerate(grown_row.days):
         if day > STOPPED_ON:
-            lost_mm = row.sizes_mm(day) - row.sizes_mm(STOPPED_ON)
-            sizes_mm[STOPPED, visit] -= lost_mm[_numbers(grown)[STOPPED]]
-    return growth_of(replace(grown.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
+            lost_mm = grown_row.sizes_mm(day) - grown_row.sizes_mm(STOPPED_ON)
+            sizes_mm[STOPPED, visit] -= lost_mm[_numbers(row_growth)[STOPPED]]
+    return growth_of(replace(row_growth.fruits, diameters_mm=sizes_mm), harvest=HARVEST)
 
 
 def _numbers(grown: SeasonGrowth) -> np.ndarray:
     return np.array([int(labels[0].split()[1]) for labels in grown.fruits.labels])
 
 
-def test_who_has_stopped_is_told(grown: SeasonGrowth, stopped: SeasonGrowth) -> None:
-    assert grown.stopped.max() < 0.2
+def test_who_has_stopped_is_told(row_growth: SeasonGrowth, stopped: SeasonGrowth) -> None:
+    assert row_growth.stopped.max() < 0.2
     assert stopped.stopped[STOPPED].min() > 0.9
     assert np.delete(stopped.stopped, STOPPED).max() < 0.2
     assert not stopped.odd[STOPPED].any()
 
 
-def test_the_others_grow_as_if_they_were_not_there(grown: SeasonGrowth, stopped: SeasonGrowth) -> None:
+def test_the_others_grow_as_if_they_were_not_there(row_growth: SeasonGrowth, stopped: SeasonGrowth) -> None:
     others = np.delete(np.arange(90), STOPPED)
-    found, alone = stopped.foretold, grown.foretold
+    found, alone = stopped.foretold, row_growth.foretold
     ratios = found.rates_mm_per_day[others] / alone.rates_mm_per_day[others]
     assert np.median(ratios) == pytest.approx(1.0, abs=0.02)
     # One or two are so slow that they might have stopped just now.
     assert np.quantile(np.abs(ratios - 1.0), 0.95) < 0.06
     assert np.quantile(np.abs(found.sizes_mm[others] - alone.sizes_mm[others]), 0.95) < 1.0
-    assert stopped.curve.name == grown.curve.name
+    assert stopped.curve.name == row_growth.curve.name
 
 
-def test_a_stopped_fruit_keeps_its_size(row: GrownRow, stopped: SeasonGrowth) -> None:
-    true_mm, told = row.sizes_mm(STOPPED_ON)[_numbers(stopped)[STOPPED]], stopped.foretold
+def test_a_stopped_fruit_keeps_its_size(grown_row: GrownRow, stopped: SeasonGrowth) -> None:
+    true_mm, told = grown_row.sizes_mm(STOPPED_ON)[_numbers(stopped)[STOPPED]], stopped.foretold
     for day in (3, 4):
         inside = (told.lows_mm[STOPPED, day] <= true_mm) & (true_mm <= told.highs_mm[STOPPED, day])
         assert inside.mean() > 0.85
@@ -75,12 +65,12 @@ def test_a_stopped_fruit_keeps_its_size(row: GrownRow, stopped: SeasonGrowth) ->
     assert means[4] == pytest.approx(told.sizes_mm[:, 4].mean(), abs=0.3)
 
 
-def test_one_small_size_shows_no_growth(grown: SeasonGrowth) -> None:
+def test_one_small_size_shows_no_growth(row_growth: SeasonGrowth) -> None:
     """What was measured once is small for any reason: it is no fruit more often than one that has stopped."""
-    sizes_mm = grown.fruits.diameters_mm.copy()
+    sizes_mm = row_growth.fruits.diameters_mm.copy()
     sizes_mm[STOPPED, :-1] = np.nan
     sizes_mm[STOPPED, -1] *= np.linspace(0.55, 1.1, len(STOPPED))
-    found = growth_of(replace(grown.fruits, diameters_mm=sizes_mm))
+    found = growth_of(replace(row_growth.fruits, diameters_mm=sizes_mm))
     # Learned of these too, the share would be four times as large, and so would the doubt in all.
     assert np.delete(found.stopped, STOPPED).mean() < 0.002
     assert found.stopped[STOPPED].mean() < 0.3
