@@ -71,7 +71,8 @@ def test_a_row_that_is_torn_apart_is_told(tmp_path: Path, run_here) -> None:
     answer = run_here("match", str(tmp_path / "query.csv"), str(tmp_path / "map.csv"))
     assert "2, torn apart" in answer.stdout
     told = json.loads(run_here("match", str(tmp_path / "query.csv"), str(tmp_path / "map.csv"), "--json").stdout)
-    assert told["n_parts"] == 2
+    assert told["n_parts"] == len(told["parts"]) == 2
+    assert told["parts"][0] == told["map_from_query"]
     orchard = str(tmp_path / "row.gpkg")
     for name, date in (("map", "2024-06-01"), ("query", "2024-06-15")):
         added = run_here("map", "add", orchard, str(tmp_path / f"{name}.csv"), "--date", date)
@@ -85,6 +86,7 @@ def test_json_keeps_the_contract(visits: Path, found: dict[str, object]) -> None
         "scale",
         "log_odds",
         "n_parts",
+        "parts",
         "n_query",
         "n_map",
         "matches",

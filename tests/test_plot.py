@@ -31,6 +31,8 @@ def a_match(status: Verdict, n_pairs: int, map_from_query: np.ndarray | None) ->
         probabilities=np.linspace(0.1, 0.9, n_pairs),
         distances_m=np.full(n_pairs, 0.02),
         support=np.ones(n_pairs),
+        part_of_pairs=np.zeros(n_pairs, np.int64),
+        parts=() if map_from_query is None else (map_from_query,),
         alternatives=(),
         noise_m=0.02,
         stages=(),

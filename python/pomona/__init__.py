@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pomona.survey.depth import Lifted, lift
     from pomona.survey.refinement import Motions, Refined, SeenFruits, refine
     from pomona.survey.tracking import Tracker, Tracks
+    from pomona.torn_rows import laid_in_parts
 
 # Loaded at first use, so that `pomona --help` does not wait for numpy.
 _MODULE_OF = {
@@ -49,6 +50,7 @@ _MODULE_OF = {
     "default_config": "pomona.matching",
     "draw_match": "pomona.plot",
     "grow_season": "pomona.growth.season_growth",
+    "laid_in_parts": "pomona.torn_rows",
     "lift": "pomona.survey.depth",
     "load_session": "pomona.orchard",
     "match": "pomona.matching",
@@ -90,6 +92,7 @@ __all__ = [
     "default_config",
     "draw_match",
     "grow_season",
+    "laid_in_parts",
     "lift",
     "load_session",
     "match",

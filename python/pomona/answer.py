@@ -48,6 +48,11 @@ class Match:
         sag, so that is not where `map_from_query` puts it.
     support
         (M,), what speaks for the pair: votes (paper) or nats (verified).
+    part_of_pairs
+        (M,), which of `parts` each pair belongs to.
+    parts
+        (4, 4) each: `map_from_query`, and where the query is torn apart, because a camera lost its way, the poses of
+        its other parts; empty where nothing was found. `pomona.laid_in_parts` lays a cloud so.
     alternatives
         (4, 4) each: other registrations as good as the first; empty unless ambiguous.
     noise_m
@@ -68,6 +73,8 @@ class Match:
     probabilities: NDArray[np.float64]
     distances_m: NDArray[np.float64]
     support: NDArray[np.float64]
+    part_of_pairs: NDArray[np.int64]
+    parts: tuple[NDArray[np.float64], ...]
     alternatives: tuple[NDArray[np.float64], ...]
     noise_m: float
     stages: tuple[tuple[str, float], ...]
@@ -82,7 +89,7 @@ class Match:
         More than one where a row is torn apart, because a camera lost its way, or a map whose own parts know nothing of
         each other; 0 where nothing was found.
         """
-        return int(dict(self.stages).get("parts", 1)) if self.map_from_query is not None else 0
+        return len(self.parts)
 
     def __bool__(self) -> bool:
         return self.status is Verdict.FOUND
@@ -104,15 +111,18 @@ class Match:
 
 def told_by_core(found: _core.Match, n_query: int, n_map: int, start: float) -> Match:
     """Take the core's answer to a question that was asked at `start`, by `time.perf_counter`."""
+    pose = found.map_from_query
     return Match(
         status=Verdict(found.status),
-        map_from_query=found.map_from_query,
+        map_from_query=pose,
         scale=found.scale,
         log_odds=float("nan") if found.log_odds is None else found.log_odds,
         pairs=found.pairs,
         probabilities=found.probabilities,
         distances_m=found.distances_m,
         support=found.support,
+        part_of_pairs=found.part_of_pairs,
+        parts=() if pose is None else (pose, *map(np.array, found.further)),
         alternatives=tuple(np.array(matrix) for matrix, _ in found.alternatives),
         noise_m=found.noise_m,
         stages=tuple(found.stages),

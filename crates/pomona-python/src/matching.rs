@@ -77,6 +77,11 @@ impl PyMatch {
     }
 
     #[getter]
+    fn further(&self) -> Vec<Vec<Vec<f64>>> {
+        self.0.further.iter().map(|found| rows(&found.map_from_query.to_matrix())).collect()
+    }
+
+    #[getter]
     fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
         let flat: Vec<i64> = self.0.pairs.iter().flat_map(|pair| [pair.query as i64, pair.map as i64]).collect();
         PyArray1::from_vec(py, flat).reshape([self.0.pairs.len(), 2])
@@ -95,6 +100,11 @@ impl PyMatch {
     #[getter]
     fn support<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.support))
+    }
+
+    #[getter]
+    fn part_of_pairs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.0.pairs.iter().map(|pair| pair.part as i64))
     }
 
     #[getter]

@@ -29,6 +29,8 @@ pub struct Pair {
     pub distance_m: f64,
     /// What speaks for the pair: votes of constellations (paper) or log-odds in nats (verified).
     pub support: f64,
+    /// Registration that the pair belongs to: 0 for that of the answer, others from 1 on for `further`.
+    pub part: usize,
 }
 
 /// A registration with its evidence.
@@ -47,6 +49,8 @@ pub struct Match {
     pub verdict: Verdict,
     /// The registration; `None` for `TooFew` and `NoMatch`.
     pub registration: Option<Registration>,
+    /// Registrations of the other parts of a row that is torn apart, which all hold.
+    pub further: Vec<Registration>,
     /// Other registrations as good as the first; empty unless `Ambiguous`.
     pub alternatives: Vec<Registration>,
     /// Fruits found again, sorted by query row; one to one.
@@ -60,6 +64,14 @@ pub struct Match {
 impl Match {
     /// A result without a registration.
     pub(crate) fn without_answer(verdict: Verdict, stages: Vec<(&'static str, f64)>) -> Self {
-        Self { verdict, registration: None, alternatives: Vec::new(), pairs: Vec::new(), noise_m: f64::NAN, stages }
+        Self {
+            verdict,
+            registration: None,
+            further: Vec::new(),
+            alternatives: Vec::new(),
+            pairs: Vec::new(),
+            noise_m: f64::NAN,
+            stages,
+        }
     }
 }

@@ -193,6 +193,7 @@ impl Conditioned {
         pairs.sort_unstable_by_key(|pair| pair.query);
         Match {
             registration: found.registration.map(pose),
+            further: found.further.into_iter().map(pose).collect(),
             alternatives: found.alternatives.into_iter().map(pose).collect(),
             pairs,
             noise_m: found.noise_m * self.unit,

@@ -136,7 +136,7 @@ def _added_as_text(visit: Session, added: Added) -> str:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
     if match.status.value != "Found":
         return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
-    torn = f"; it is torn apart, {match.n_parts} parts, and all lies as the first" if match.n_parts > 1 else ""
+    torn = f"; it is torn apart, {match.n_parts} parts, and each lies by its own pose" if match.n_parts > 1 else ""
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
         f"{added.n_missed} in view and not seen{torn}"

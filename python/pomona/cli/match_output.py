@@ -36,6 +36,7 @@ def as_json(match: Match, query: FruitCloud, map: FruitCloud) -> dict[str, Any]:
         "scale": match.scale,
         "log_odds": match.log_odds if math.isfinite(match.log_odds) else None,
         "n_parts": match.n_parts,
+        "parts": [map_from_query.tolist() for map_from_query in match.parts],
         "n_query": match.n_query,
         "n_map": match.n_map,
         "matches": [

@@ -16,6 +16,7 @@ from pomona.identity import VisitPair
 from pomona.orchard.added import Added
 from pomona.orchard.evidence import Evidence, new_visit
 from pomona.orchard.joining import Newcomer, join
+from pomona.orchard.mending import mended
 from pomona.orchard.recognising import recognised
 from pomona.orchard.removing import take_out
 from pomona.orchard.replacing import NotFoundError, holds, there_already
@@ -34,6 +35,9 @@ __all__ = ["Added", "add_session", "add_sessions", "require_unseen"]
 
 BETWEEN_PARTS_M = 10.0
 """From one part of a map to the next, where nobody knows how they lie to each other."""
+
+KEPT = 0.95
+"""Of the fruits that a torn session is recognised by, part by part, those that it has to keep in one piece."""
 
 
 def add_session(
@@ -208,9 +212,29 @@ def _add_where_found(
     connection: sqlite3.Connection, session: Session, parts: Sequence[SeenPart], settings: Settings
 ) -> Added:
     """Add the session to the parts of the map that have fruits which it saw."""
-    evidence, matches = matches_with_parts(parts, new_visit(session), settings)
+    content = session.content_sha256
+    if len(parts) == 1:
+        session, parts = _in_one_piece(connection, session, parts[0], settings)
+    evidence, matches = matches_with_parts(parts, new_visit(session, content), settings)
     first = parts[0].found.match
-    return _join(connection, session, evidence, matches, Placement(settings, first.log_odds, first.noise_m))
+    return _join(connection, session, evidence, matches, Placement(settings, first.log_odds, first.noise_m), content)
+
+
+def _in_one_piece(
+    connection: sqlite3.Connection, session: Session, part: SeenPart, settings: Settings
+) -> tuple[Session, Sequence[SeenPart]]:
+    """Return a session, mended where it is torn apart, and the parts of the map that it saw.
+
+    One pose lays a session in the map, and visits to come are compared with it as a whole. It is left as it came where
+    it would be recognised worse in one piece.
+    """
+    if part.found.match.n_parts < 2:
+        return session, [part]
+    whole = mended(session, part.found.match)
+    found = recognised(connection, whole.cloud, settings)
+    parts = seen_parts(connection, whole.cloud, found, settings)
+    before, after = (match.probabilities.sum() for match in (part.found.match, found.match))
+    return (whole, parts) if parts and after >= KEPT * before else (session, [part])
 
 
 def _beside(connection: sqlite3.Connection, session: Session) -> NDArray[np.float64]:
@@ -227,11 +251,12 @@ def _join(
     evidence: Evidence,
     matches: Mapping[int, VisitPair],
     placement: Placement | None = None,
+    content: str = "",
     *,
     map_from_session: NDArray[np.float64] | None = None,
 ) -> Added:
-    """Write the session and all that follows from it with the others."""
-    visit = new_visit(session)
+    """Write the session and all that follows from it with the others; `content` is its hash, where it was mended."""
+    visit = new_visit(session, content)
     if map_from_session is not None:
         visit = replace(visit, map_from_session=map_from_session)
     newcomer = Newcomer(session, placement, visit.seen.key[1])

@@ -248,14 +248,17 @@ def _rows(
     return rows
 
 
-def new_visit(session: Session) -> KnownVisit:
-    """Return a session that is not in the map yet; where it lies there nobody knows."""
+def new_visit(session: Session, content: str = "") -> KnownVisit:
+    """Return a session that is not in the map yet; where it lies there nobody knows.
+
+    `content` is the hash of what was seen, where the session is not as it was seen any more.
+    """
     cameras = None if session.trajectory is None else session.trajectory.session_from_camera
     return KnownVisit(
         session_id=0,
         date=session.date,
         cloud=session.cloud,
-        seen=_seen_visit((session.date, session.content_sha256), session.cloud, cameras),
+        seen=_seen_visit((session.date, content or session.content_sha256), session.cloud, cameras),
         map_from_session=np.eye(4),
         observation_ids=np.zeros(len(session.cloud), np.int64),
         fruit_ids=np.zeros(len(session.cloud), np.int64),

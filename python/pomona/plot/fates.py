@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.torn_rows import laid_in_parts
+
 if TYPE_CHECKING:
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
@@ -43,8 +45,7 @@ class Fates:
     @classmethod
     def of(cls, query: FruitCloud, map: FruitCloud, match: Match) -> Fates:
         """Tell them apart."""
-        pose = np.eye(4) if match.map_from_query is None else match.map_from_query
-        in_map = query.positions @ pose[:3, :3].T + pose[:3, 3]
+        in_map = laid_in_parts(match, query).positions if match.parts else query.positions
         again, known = match.pairs.T
         seen = np.isin(np.arange(len(map)), known)
         missed = np.isin(np.arange(len(map)), _in_view_unseen(map.positions, seen))

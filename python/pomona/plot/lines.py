@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pomona.plot.projections import Projection, view_from_above
+from pomona.torn_rows import laid_in_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ def draw_lines(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
 
     view = view_from_above(map.positions, up_in_map)
     in_map = view.project(map.positions)
-    in_query = _project_query(query.positions, match, view)
+    in_query = _project_query(query, match, view)
     if match.map_from_query is None and len(map) and len(query):
         in_query += in_map.mean(axis=0) - in_query.mean(axis=0)
     aside_m = _distance_aside(in_map, in_query)
@@ -62,10 +63,10 @@ def draw_lines(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: A
     return figure
 
 
-def _project_query(positions: NDArray[np.float64], match: Match, view: Projection) -> NDArray[np.float64]:
-    if match.map_from_query is not None:
-        return view.project(positions @ match.map_from_query[:3, :3].T + match.map_from_query[:3, 3])
-    return view_from_above(positions).project(positions)
+def _project_query(query: FruitCloud, match: Match, view: Projection) -> NDArray[np.float64]:
+    if match.parts:
+        return view.project(laid_in_parts(match, query).positions)
+    return view_from_above(query.positions).project(query.positions)
 
 
 def _distance_aside(in_map: NDArray[np.float64], in_query: NDArray[np.float64]) -> float:

@@ -269,12 +269,13 @@ impl PaperMap {
                     probability: odds / (1.0 + odds),
                     distance_m,
                     support: f64::from(votes),
+                    part: 0,
                 }
             })
             .collect();
         pairs.sort_unstable_by_key(|pair| pair.query);
         let registration = Some(Registration { map_from_query, log_odds });
-        Match { verdict: Verdict::Found, registration, alternatives: Vec::new(), pairs, noise_m, stages }
+        Match { registration, pairs, noise_m, ..Match::without_answer(Verdict::Found, stages) }
     }
 }
 

@@ -56,6 +56,7 @@ impl<'a> Search<'a> {
         Match {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),
+            further: found.further.iter().map(|part| self.registration(&part.overlap)).collect(),
             alternatives: rivals,
             pairs,
             noise_m: overlap.sigma,
@@ -67,16 +68,19 @@ impl<'a> Search<'a> {
     fn pairs(&self, found: &Finding) -> Vec<Pair> {
         let (query, map) = (self.query, self.map);
         let pair = |(edge, probability): (Edge, f64)| {
-            let off = |settled: &Settled| {
+            let off = |(part, settled): (usize, &Settled)| {
                 let at = settled.overlap.predictions[edge.query as usize]?.place;
-                Some((map.points[edge.map as usize] - at).norm())
+                Some((part, (map.points[edge.map as usize] - at).norm()))
             };
+            let nearest = |one: &(usize, f64), other: &(usize, f64)| one.1.total_cmp(&other.1);
+            let (part, distance_m) = found.of_all_parts().enumerate().filter_map(off).min_by(nearest)?;
             Some(Pair {
                 query: query.rows[edge.query as usize] as usize,
                 map: map.rows[edge.map as usize] as usize,
                 probability,
-                distance_m: found.of_all_parts().filter_map(off).reduce(f64::min)?,
+                distance_m,
                 support: edge.ratio.ln(),
+                part,
             })
         };
         let all = Beliefs::of_lists(found.of_all_parts().map(|settled| &settled.beliefs));
