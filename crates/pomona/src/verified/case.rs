@@ -94,6 +94,11 @@ impl Finding<'_> {
         self.of_all_parts().map(|settled| settled.evidence).reduce(|all, part| all + part).unwrap_or(f64::NEG_INFINITY)
     }
 
+    /// Whether a fruit of the query lies in what it explains.
+    pub(super) fn has(&self, row: usize) -> bool {
+        self.settled.as_ref().map_or(&self.overlap, |settled| &settled.overlap).predictions[row].is_some()
+    }
+
     /// As it stands in the end, with its further parts.
     pub(super) fn of_all_parts(&self) -> impl Iterator<Item = &Settled> {
         self.settled.iter().chain(&self.further)
@@ -224,7 +229,7 @@ impl<'a> Search<'a> {
 
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where they are fewer than a seed and one
     /// that speaks for it.
-    fn believed(&self, finding: &Finding) -> f64 {
+    pub(super) fn believed(&self, finding: &Finding) -> f64 {
         let Some(settled) = &finding.settled else { return 0.0 };
         let pairs = settled.beliefs.chosen(self.query.len(), self.map.len(), WORTH_IT);
         if pairs.len() <= STARS {

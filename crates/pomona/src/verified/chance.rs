@@ -138,6 +138,22 @@ impl Companions {
         Self { bin, within }
     }
 
+    /// As many, but spread in distance as another cloud's are by this `share`, whose lengths are `scale` times as long here.
+    ///
+    /// Where the other knows of none so far away, its own spread stands.
+    pub(super) fn spread_as(&self, other: &Self, scale: f64, share: f64) -> Self {
+        let reach = Self::BINS as f64 * self.bin.min(other.bin * scale);
+        let [own, others] = [self.up_to(reach), other.up_to(reach / scale)];
+        if own == 0.0 || others == 0.0 {
+            return self.clone();
+        }
+        let both = |(at, here): (usize, &f64)| {
+            let distance = at as f64 * self.bin;
+            if distance > reach { *here } else { here + share * (other.up_to(distance / scale) * own / others - here) }
+        };
+        Self { bin: self.bin, within: self.within.iter().enumerate().map(both).collect() }
+    }
+
     /// Mean number of fruits between two distances from a fruit.
     pub(super) fn between(&self, inner: f64, outer: f64) -> f64 {
         self.up_to(outer) - self.up_to(inner)
@@ -211,6 +227,28 @@ mod tests {
         assert!(row.companions.between(0.0, 0.06) == 0.0 && row.companions.between(0.11, 0.45) == 0.0);
         assert!((row.companions.density(0.09) * shell(0.06, 0.12) - 1.0).abs() < 0.1);
         assert!(row.companions.density(0.3) == 0.0);
+    }
+
+    #[test]
+    fn companions_are_as_many_as_here_and_spread_as_there() {
+        let mut dice = Dice(5);
+        let fruits = |count: usize, dice: &mut Dice| {
+            (0..count).map(|_| [dice.uniform(), dice.uniform(), dice.uniform()].into()).collect()
+        };
+        let [dense, sparse] =
+            [400, 50].map(|count| Landscape::new(&FruitCloud::from_positions(fruits(count, &mut dice))).companions);
+        for (own, other) in [(&dense, &sparse), (&sparse, &dense)] {
+            let both = own.spread_as(other, 1.0, 1.0);
+            // The denser one knows of none beyond 1.5 of its spacings: there the sparse one's own stand.
+            let all = Companions::BINS as f64 * own.bin;
+            assert!((both.up_to(all) / own.up_to(all) - 1.0).abs() < 1e-3);
+            let reach = Companions::BINS as f64 * own.bin.min(other.bin);
+            let share = |cloud: &Companions| cloud.up_to(0.6 * reach) / cloud.up_to(reach);
+            assert!((share(&both) - share(other)).abs() < 0.05, "{} {}", share(&both), share(other));
+        }
+        // Another unit changes nothing.
+        let own = dense.spread_as(&dense, 1.0, 0.5);
+        assert!((own.up_to(0.1) - dense.up_to(0.1)).abs() < 1e-12);
     }
 
     #[test]

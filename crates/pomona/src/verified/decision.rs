@@ -2,14 +2,14 @@
 
 use super::acceptance::{KEPT, VerifiedConfig, outlying};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
-use super::contender::Contender;
+use super::contender::{Contender, by_evidence, distinct};
 use super::doubts::RIVAL_CANDIDATES;
 use super::growth::{grow, hold, lay};
-use super::hypothesis::{Hypothesis, Model};
+use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
 use super::offsets;
 use super::proposal::Effort;
-use super::search::{FIRST_FRUITS, of_some_fruits};
+use super::search::{FIRST_FRUITS, REACH, of_some_fruits};
 use super::seeds::Seed;
 use super::settlement::SELDOM;
 use super::soft;
@@ -47,6 +47,16 @@ const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 /// Rows found with less than this many times the evidence needed are laid along rows too, for of few fruits in common seeds show a
 /// part; and may be no more than what the planting gives to wrong poses.
 pub(super) const CLEAR: f64 = 2.0;
+
+/// Mean probability of the pairs of a further part, at the least: 0.9 and more where it is one, 0.5 to 0.65 where fruits on shells or
+/// wires lie on others.
+const BELIEVED: f64 = 0.75;
+
+/// Candidates of seeds of the sparser visit that are refined.
+const LAID_SPARSE: usize = 64;
+
+/// Fruits of the query that no finding explains, where others are looked for: fewer are hardly found anywhere.
+const LEAST_REST: usize = 12;
 
 /// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
 pub(super) const SURE: f64 = 6.0;
@@ -102,6 +112,10 @@ impl<'a> Search<'a> {
                 break;
             }
         }
+        if findings.accepted.is_empty() {
+            self.lay_sparse_seeds(&mut findings);
+        }
+        self.look_at_the_rest(&mut findings);
         let clear = CLEAR * findings.log.threshold;
         if findings.accepted.iter().all(|found| found.overlap.log_odds < clear) {
             self.lay_along(&mut findings);
@@ -112,6 +126,53 @@ impl<'a> Search<'a> {
         }
         best_first(&mut findings.accepted);
         findings
+    }
+
+    /// Lays seeds of the sparser visit on all fruits of the other, where the index has none of them.
+    fn lay_sparse_seeds(&self, findings: &mut Findings<'a>) {
+        let (mut candidates, effort) = self.congruent();
+        findings.log.effort = findings.log.effort + effort;
+        candidates.sort_unstable_by(by_evidence);
+        let best = distinct(self.query, self.map.spacing, &candidates, LAID_SPARSE);
+        let starts: Vec<_> = best.iter().map(|one| (one.pose, one.place)).collect();
+        // As far as the sparser visit has as many fruits as a region is weighed by.
+        let reach = REACH * self.query.spacing.max(self.map.spacing);
+        let hypotheses = refined([self.query, self.map], &self.model, reach, &starts);
+        findings.log.refined += hypotheses.len();
+        self.grow_distinct(&hypotheses, findings);
+        self.sift(findings);
+        if !findings.accepted.is_empty() {
+            self.doubt(findings, &candidates);
+        }
+    }
+
+    /// Looks for further parts of a row that is torn apart, or rivals, where fruits of the query lie that no finding explains: the
+    /// search ended with the first answer, which leaves weaker ones behind.
+    fn look_at_the_rest(&self, findings: &mut Findings<'a>) {
+        loop {
+            let rest: Vec<bool> =
+                (0..self.query.len()).map(|row| !findings.accepted.iter().any(|found| found.has(row))).collect();
+            if findings.accepted.is_empty() || rest.iter().filter(|rest| **rest).count() < LEAST_REST {
+                return;
+            }
+            let mut more = Findings::none(Effort::default(), findings.log.threshold);
+            for (mut seeds, keep) in self.rounds() {
+                seeds.retain(|(quad, _)| quad.iter().all(|&row| rest[row as usize]));
+                self.try_seeds(&seeds, keep, &mut more);
+                self.sift(&mut more);
+                if !more.accepted.is_empty() {
+                    break;
+                }
+            }
+            more.accepted.retain(|one| {
+                self.believed(one) > BELIEVED
+                    && !findings.accepted.iter().any(|found| self.shows(&found.overlap, &one.overlap))
+            });
+            if more.accepted.is_empty() {
+                return;
+            }
+            findings.accepted.append(&mut more.accepted);
+        }
     }
 
     /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.

@@ -16,7 +16,7 @@
 
 use super::hypothesis::{DETECTION, SHARES, TURNS};
 use super::pairing::Meeting;
-use super::patches::{Landing, Patchwork};
+use super::patches::Patchwork;
 use super::shares::{fewer, of_either};
 use crate::beliefs::Beliefs;
 
@@ -24,8 +24,7 @@ use crate::beliefs::Beliefs;
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
     let map = laid.map;
     let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
-    let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| laid.shown(row, &at.place));
-    let here: Vec<f64> = laid.predictions.iter().enumerate().map(shown).collect();
+    let here = laid.due();
     let met = laid.meetings(|meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
@@ -53,6 +52,7 @@ mod tests {
     use crate::verified::fixture::visits;
     use crate::verified::hypothesis::Model;
     use crate::verified::landscape::Landscape;
+    use crate::verified::patches::Landing;
     use nalgebra::Vector3;
 
     #[test]

@@ -25,6 +25,7 @@ mod chance;
 mod claims;
 pub mod compact;
 mod conclusion;
+mod congruent;
 mod contender;
 mod cut;
 mod decision;

@@ -9,7 +9,7 @@ use super::doubts::is_most;
 use super::evidence::evidence;
 use super::layers::BEYOND_A_CLUSTER;
 use super::overlap::Overlap;
-use super::patches::{Landing, Patchwork};
+use super::patches::Patchwork;
 use crate::principal::Principal;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -53,8 +53,7 @@ fn most_moved(laid: &Patchwork) -> f64 {
 
 /// Fruits that the map should have shown.
 fn due(laid: &Patchwork) -> f64 {
-    let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| laid.shown(row, &at.place));
-    laid.predictions.iter().enumerate().map(shown).sum()
+    laid.due().iter().sum()
 }
 
 /// Ways to move the overlap along its two longer axes, either way: further than a cluster is wide, by half its extent at the most.
@@ -82,6 +81,7 @@ mod tests {
     use crate::verified::fixture::{Dice, visits};
     use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::landscape::Landscape;
+    use crate::verified::patches::Landing;
 
     /// Most evidence of the query, laid where it was drawn and then moved, over what it has there.
     fn share_kept([query, map]: [FruitCloud; 2]) -> f64 {

@@ -1,5 +1,6 @@
 //! The last word on every fruit: one-to-one pairs with calibrated probabilities.
 
+use super::chance::Companions;
 use super::direction::longest;
 use super::patches::{Landing, Patchwork};
 use crate::beliefs::Edge;
@@ -21,21 +22,22 @@ const LOOSE: (f64, f64) = (0.01, 3.0);
 const LEAST_RATIO: f64 = 1e-3;
 
 impl Patchwork<'_> {
-    /// Pairs with their likelihood ratios, where each fruit of the query is seen again with the probability that `shares` says, `size`
-    /// the likelihood ratio of two diameters.
+    /// Pairs with their likelihood ratios, where each fruit of the query is seen again with the probability that `shares` says and
+    /// one of the map with the probability that `back` says, `size` the likelihood ratio of two diameters.
     ///
-    /// An unmatched fruit of the query is new with the density of new fruits at its place. Every pair thus weighs
-    /// `p / (1 - p) N(d) / new density` against leaving both alone.
-    pub(super) fn edges(&self, shares: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
+    /// A fruit of the query without a partner is new with the density of new fruits at its place, one of the map was missed. Every
+    /// pair thus weighs `p N(d) / (1 - p) / (1 - q) / density of others` against leaving both alone.
+    pub(super) fn edges(&self, shares: &[f64], back: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
         let Self { query, map, .. } = *self;
+        let companions = self.companions();
         self.meetings(|meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
             // As many others as the two visits laid on each other have, where the map shows as much as it does here.
-            let others = self.companions(distance) * crowding * self.strangers * support;
-            let new = (1.0 - seen) * others.max(map.floor);
-            meeting.edge(seen / (1.0 - seen) * density / new * size(row, partner))
+            let others = companions.density(distance).max(map.floor) * crowding * self.strangers * support;
+            let missed = 1.0 - back[partner as usize];
+            meeting.edge(seen * density / ((1.0 - seen) * missed * others.max(map.floor)) * size(row, partner))
         })
     }
 }
@@ -60,13 +62,11 @@ impl Meeting {
 }
 
 impl Patchwork<'_> {
-    /// Fruits per cubic metre of the map that chance puts at a distance from a fruit: as many as both visits show around
-    /// their own.
-    pub(super) fn companions(&self, distance: f64) -> f64 {
-        let scale = self.pose.scale;
-        let both =
-            self.query.companions.density(distance / scale) / scale.powi(3) + self.map.companions.density(distance);
-        (0.5 * both).max(self.map.floor)
+    /// Fruits of the map that chance puts around a fruit: as many as the map shows around its own, spread as both visits show them.
+    pub(super) fn companions(&self) -> Companions {
+        let Self { query, map, .. } = self;
+        let share = query.len() as f64 / (query.len() + map.len()).max(1) as f64;
+        map.companions.spread_as(&query.companions, self.pose.scale, share)
     }
 
     /// What `kept` makes of every meeting within the gate, by rows of the query.

@@ -229,6 +229,12 @@ impl<'a> Patchwork<'a> {
         self.share_seen(row) * self.map.support.at(place)
     }
 
+    /// How surely the map's visit would have shown each fruit of the query, where it is predicted.
+    pub(super) fn due(&self) -> Vec<f64> {
+        let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| self.shown(row, &at.place));
+        self.predictions.iter().enumerate().map(shown).collect()
+    }
+
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.
     pub(super) fn looked_at(&self, row: usize) -> f64 {
         let place = self.pose.preimage(&self.map.points[row]);

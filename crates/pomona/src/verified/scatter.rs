@@ -89,7 +89,7 @@ pub(super) fn scatter(laid: &Patchwork, expected: KnownNoise) -> Scatter {
 
 impl Counts {
     fn new(laid: &Patchwork) -> Self {
-        let Patchwork { query, map, predictions, pose, .. } = laid;
+        let Patchwork { query, map, predictions, .. } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
             let (mut across, mut due) = ([0.0; BINS], [0.0; 2]);
@@ -109,11 +109,10 @@ impl Counts {
             (0..query.len()).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
         let across = std::array::from_fn(|i| parts.iter().map(|part| part.0[i]).sum());
         let [due, squares] = [0, 1].map(|power: usize| parts.iter().map(|part| part.1[power]).sum::<f64>());
+        let around = laid.companions();
         let companions = std::array::from_fn(|i| {
             let (inner, outer) = (i as f64 * bin, (i + 1) as f64 * bin);
-            let seen = query.companions.between(inner / pose.scale, outer / pose.scale);
-            let both = 0.5 * (seen + map.companions.between(inner, outer));
-            due * both.max(map.floor * shell(inner, outer))
+            due * around.between(inner, outer).max(map.floor * shell(inner, outer))
         });
         let usual = if due > 0.0 { squares / due } else { 1.0 };
         Self { bin, across, companions, due, usual, variances: laid.direction.variances() }

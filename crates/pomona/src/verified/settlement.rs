@@ -17,11 +17,11 @@ use super::direction::Direction;
 use super::evidence::evidence;
 use super::footing::Footing;
 use super::growth::{Growth, HOLD};
-use super::hypothesis::{DETECTION, SHARES, TURNS};
+use super::hypothesis::{DETECTION, TURNS};
 use super::overlap::Overlap;
-use super::patches::{ALL, Landing, NEXT, Patchwork};
+use super::patches::{ALL, NEXT, Patchwork};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, Scatter, scatter};
-use super::shares::of_places;
+use super::shares::{of_either, of_places};
 use super::size::Cue;
 use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
@@ -53,6 +53,9 @@ struct Settlement<'a> {
     expected: KnownNoise,
     /// Probability that a fruit of the query is there where the map could have shown it, as the pairs around it show it.
     shares: Vec<f64>,
+    /// How surely the query would have shown each fruit of the map, and the probability that it did.
+    there: Vec<f64>,
+    back: Vec<f64>,
     /// Pairs that hold the patches to their surroundings, and these to the common pose.
     holds: [f64; 2],
 }
@@ -98,7 +101,7 @@ fn paired(parts: &mut [Settlement], cue: Option<&Cue>) -> Vec<Beliefs> {
     let edges = |part: &mut Settlement| {
         part.predict();
         part.measure();
-        part.patches.edges(&part.shares, &size)
+        part.patches.edges(&part.shares, &part.back, &size)
     };
     let lists: Vec<_> = parts.iter_mut().map(edges).collect();
     let Patchwork { query, map, .. } = parts[0].patches;
@@ -114,7 +117,10 @@ impl<'a> Settlement<'a> {
         };
         let patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
         let shares = vec![DETECTION; patches.query.len()];
-        Self { patches, expected, shares, holds: [HOLD; 2] }
+        let there: Vec<f64> = (0..patches.map.len()).map(|row| patches.looked_at(row)).collect();
+        let [_, of_map] = of_either(DETECTION, [patches.due().iter().sum(), there.iter().sum()]);
+        let back = there.iter().map(|there| of_map * there).collect();
+        Self { patches, expected, shares, there, back, holds: [HOLD; 2] }
     }
 
     /// What the pairs say of shares, noise and patches.
@@ -165,11 +171,15 @@ impl<'a> Settlement<'a> {
     /// The distances of all fruits together do not know who hangs alone and who in a crowd; the pairs do, and err
     /// less. All the way they would take too little where fruits crowd within the noise.
     fn recount(&mut self, beliefs: &Beliefs) {
-        let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| self.patches.shown(row, &at.place));
-        let due: Vec<f64> = self.patches.predictions.iter().enumerate().map(shown).collect();
-        let found: f64 = beliefs.probabilities.iter().sum();
-        let share = ((found + 1.0) / (due.iter().sum::<f64>() + 2.0)).clamp(SHARES.0, SHARES.1);
-        self.shares = of_places(&self.patches, beliefs, share, &due);
+        let Patchwork { query, map, .. } = self.patches;
+        let mut found = [vec![0.0; query.len()], vec![0.0; map.len()]];
+        for (edge, probability) in beliefs.links() {
+            found[0][edge.query as usize] += probability;
+            found[1][edge.map as usize] += probability;
+        }
+        self.shares = of_places(query, &found[0], &self.patches.due());
+        self.back = of_places(map, &found[1], &self.there);
+        self.back.iter_mut().zip(&self.there).for_each(|(share, there)| *share *= there);
     }
 
     /// Common pose, surroundings and patches from the mean partners.

@@ -1,9 +1,9 @@
 //! Which share of what a visit shows of an overlap the other shows too.
 
-use super::cut::Cell;
 use super::hypothesis::SHARES;
-use super::patches::Patchwork;
-use crate::beliefs::Beliefs;
+use super::landscape::Landscape;
+use crate::neighbours::others::SHARE_OF_ROWS;
+use rayon::prelude::*;
 
 /// Shares of the fruits that any pose is taken to see again. Below, a wrong pose that meets few would lose little by what it
 /// misses: of rows with 15 % in common 4 of 100 were no longer found.
@@ -23,44 +23,42 @@ pub(super) fn fewer([here, there]: [f64; 2]) -> f64 {
     here.min(there).max(1.0)
 }
 
-/// Probabilities that fruits of the query are there in what the map could have shown of them, each as the pairs around it show it, its
-/// own left out: a tree may have been replaced, and its neighbour not.
+/// Probabilities that fruits of a cloud are seen again where the other visit looked: each as the fruits around it are `found` of those
+/// that were `due`, its own left out. A tree may have been replaced, and its neighbour not.
 ///
-/// Shares of places scatter about the `common` one. How much, neighbouring cells say: what chance has in one says nothing of the next.
-/// With a variance `v` of that, the share of a place has the prior of `k = common (1 - common) / v - 1` fruits.
-pub(super) fn of_places(laid: &Patchwork, beliefs: &Beliefs, common: f64, due: &[f64]) -> Vec<f64> {
-    let mut found = vec![0.0; due.len()];
-    for (edge, probability) in beliefs.links() {
-        found[edge.query as usize] += probability;
-    }
-    let sum = |rows: &[u32], of: &[f64]| rows.iter().map(|&row| of[row as usize]).sum::<f64>();
-    let cells: Vec<[f64; 2]> = laid.cells.iter().map(|cell| [sum(&cell.rows, &found), sum(&cell.rows, due)]).collect();
-    let excess = |[found, due]: [f64; 2]| found - common * due;
-    let (mut products, mut fruits) = (0.0, 0.0);
-    for (at, cell) in laid.cells.iter().enumerate() {
-        for &(other, weight) in cell.around.iter().filter(|(other, _)| *other as usize != at) {
-            let [one, two] = [cells[at], cells[other as usize]];
-            products += weight * excess(one) * excess(two);
-            fruits += weight * one[1] * two[1];
+/// Shares of places scatter about the `common` one. How much, neighbours say: what chance has in one says nothing of the next. With a
+/// variance `v` of that, the share of a place has the prior of `common (1 - common) / v - 1` fruits.
+pub(super) fn of_places(cloud: &Landscape, found: &[f64], due: &[f64]) -> Vec<f64> {
+    let common = common(found, due);
+    let shown: Vec<usize> = (0..cloud.len()).filter(|&row| due[row] > 0.0).collect();
+    let excess = |row: usize| found[row] - common * due[row];
+    let around = |&row: &usize| {
+        let [mut products, mut fruits, mut near, mut of] = [0.0; 4];
+        for (other, weight) in cloud.kin(row) {
+            let other = other as usize;
+            products += weight * excess(row) * excess(other);
+            fruits += weight * due[row] * due[other];
+            near += weight * found[other];
+            of += weight * due[other];
+        }
+        [products, fruits, near, of]
+    };
+    let around: Vec<[f64; 4]> = shown.par_iter().with_min_len(SHARE_OF_ROWS).map(around).collect();
+    let [products, fruits] = around.iter().fold([0.0; 2], |[a, b], [c, d, ..]| [a + c, b + d]);
+    let mut shares = vec![common; cloud.len()];
+    if products > 0.0 {
+        let prior = (common * (1.0 - common) * fruits / products - 1.0).max(0.0);
+        for (row, [.., near, of]) in shown.into_iter().zip(around) {
+            shares[row] = ((prior * common + near + common) / (prior + of + 1.0)).clamp(SHARES.0, SHARES.1);
         }
     }
-    if products <= 0.0 {
-        return vec![common; due.len()];
-    }
-    let prior = (common * (1.0 - common) * fruits / products - 1.0).max(0.0);
-    let around = |cell: &Cell| {
-        cell.around.iter().fold([0.0; 2], |sum, &(other, weight)| {
-            let [found, due] = cells[other as usize];
-            [sum[0] + weight * found, sum[1] + weight * due]
-        })
-    };
-    let near: Vec<[f64; 2]> = laid.cells.iter().map(around).collect();
-    let share = |row: usize| {
-        let [there, here] = near[laid.cut.cell_of[row] as usize];
-        let (there, here) = ((there - found[row]).max(0.0), (here - due[row]).max(0.0));
-        ((prior * common + there + common) / (prior + here + 1.0)).clamp(SHARES.0, SHARES.1)
-    };
-    (0..due.len()).map(share).collect()
+    shares
+}
+
+/// Share of all fruits that are due that are found.
+fn common(found: &[f64], due: &[f64]) -> f64 {
+    let [found, due] = [found, due].map(|all| all.iter().sum::<f64>());
+    ((found + 1.0) / (due + 2.0)).clamp(SHARES.0, SHARES.1)
 }
 
 /// The share under which evidence of this slope, which falls, is largest.
@@ -77,24 +75,14 @@ pub(super) fn likeliest_share(slope: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::beliefs::Edge;
-    use crate::geometry::{Scale, Similarity};
     use crate::verified::fixture::visits;
-    use crate::verified::hypothesis::{DETECTION, Model};
-    use crate::verified::landscape::Landscape;
 
     /// Shares of the fruits before the middle of the row and behind, where so many of three are found before and behind.
     fn shares_of_halves(found: [usize; 2]) -> [f64; 2] {
-        let (query, map) = visits(0.02);
-        let [query, map] = [query, map].map(|cloud| Landscape::new(&cloud));
-        let model = Model { sigma: 0.02, detection: DETECTION, scale: Scale::Metric, vertical: None, row: None };
-        let laid = Patchwork::new(&query, &map, Similarity::identity(), model.sigma, &model);
+        let query = Landscape::new(&visits(0.02).0);
         let is_found = |row: usize| row % 3 < found[usize::from(query.points[row].x > 0.0)];
-        let edge = |row: usize| Edge { query: row as u32, map: row as u32, ratio: 1e9 };
-        let beliefs =
-            Beliefs::new((0..query.len()).filter(|&row| is_found(row)).map(edge).collect(), query.len(), query.len());
-        let common = beliefs.probabilities.iter().sum::<f64>() / query.len() as f64;
-        let shares = of_places(&laid, &beliefs, common, &vec![1.0; query.len()]);
+        let found: Vec<f64> = (0..query.len()).map(|row| f64::from(u8::from(is_found(row)))).collect();
+        let shares = of_places(&query, &found, &vec![1.0; query.len()]);
         let mean = |behind: bool| {
             let those = (0..query.len())
                 .filter(|&row| query.points[row].x.abs() > 1.2 && (query.points[row].x > 0.0) == behind);
@@ -107,7 +95,7 @@ mod tests {
     #[test]
     fn a_half_that_was_replaced_has_a_share_of_its_own_and_halves_alike_have_one() {
         let [before, behind] = shares_of_halves([2, 0]);
-        assert!((before - 0.67).abs() < 0.06 && behind < 0.08, "{before} {behind}");
+        assert!((before - 0.67).abs() < 0.1 && behind < 0.1, "{before} {behind}");
         let [before, behind] = shares_of_halves([1, 1]);
         assert!((before - 0.33).abs() < 0.03 && (behind - 0.33).abs() < 0.03, "{before} {behind}");
     }

@@ -1,0 +1,128 @@
+//! Seeds laid on all fruits that lie to each other as theirs do, where no index knows them.
+//!
+//! The index holds sets of fruits that are next to each other. After a harvest few hang next to each other that did before, and a
+//! visit that shows little is as sparse: four neighbours there have others between them in the other visit, which has no seed of
+//! the four. So seeds of the sparser visit are laid on all fruits of the denser one, which shows all four of some.
+
+use super::case::{SEED_SIGMA, Search};
+use super::contender::Contender;
+use super::hypothesis::Model;
+use super::landscape::Landscape;
+use super::proposal::{Effort, Proposer};
+use super::seeds::{COMPANIONS, Quad, STARS, Seed, WITHIN, enumerate};
+use crate::geometry::Scale;
+use crate::neighbours::tree::single;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Spacing of one visit over that of the other from which on it is the sparser one: half of the fruits.
+const SPARSER: f64 = 1.25;
+
+/// Seeds times fruits of the denser visit that are tried, and seeds at the most: one takes a microsecond or two a fruit.
+const TRIED: usize = 50_000;
+const MOST: usize = 48;
+
+/// Length of a seed in standard deviations of the noise, at the least.
+const LEAST: f64 = 10.0;
+
+impl Search<'_> {
+    /// Poses of seeds of the sparser visit, and what they cost; none where both are as dense or the scale is free.
+    pub(super) fn congruent(&self) -> (Vec<Contender>, Effort) {
+        let Self { query, map, model, .. } = *self;
+        if model.scale != Scale::Metric {
+            return (Vec::new(), Effort::default());
+        }
+        if query.spacing > SPARSER * map.spacing {
+            return self.seeds_on_all();
+        }
+        if map.spacing < SPARSER * query.spacing {
+            return (Vec::new(), Effort::default());
+        }
+        let vertical = model.vertical.map(|vertical| vertical.exchanged());
+        let exchanged = Self { query: map, map: query, model: Model { vertical, ..model }, ..*self };
+        let (found, effort) = exchanged.seeds_on_all();
+        let back = |one: Contender| Contender { pose: one.pose.inverse(), place: one.pose.image(&one.place), ..one };
+        (found.into_iter().map(back).collect(), effort)
+    }
+
+    /// Poses that lay seeds of a sparse query on fruits of the map.
+    fn seeds_on_all(&self) -> (Vec<Contender>, Effort) {
+        let Self { query, map, .. } = *self;
+        // The denser visit says what noise is usual: where few fruits are left, how far they hang apart says nothing of it.
+        let sigma = self.model.sigma.min(SEED_SIGMA * map.spacing);
+        let (model, most) = (Model { sigma, ..self.model }, 2.0 * (WITHIN * sigma).powi(2));
+        // The shortest: how many fours lie alike by chance grows with the fourth power of their length.
+        let mut seeds = enumerate(query, COMPANIONS, LEAST * sigma);
+        seeds.sort_unstable_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
+        seeds.truncate((TRIED / map.len()).clamp(1, MOST));
+        let of_seed = |&(quad, _): &Seed| {
+            let (mut found, mut effort) = (Vec::new(), Effort { codes: 1, ..Effort::default() });
+            if let Some(proposer) = Proposer::new(query, map, &model, quad) {
+                let fruits = quad.map(|row| query.points[row as usize]);
+                each_alike(&fruits, map, WITHIN * sigma, &mut |target| {
+                    effort.candidates += 1;
+                    found.extend(proposer.contender(&target, most, &mut effort));
+                });
+            }
+            (found, effort)
+        };
+        let of_each: Vec<(Vec<Contender>, Effort)> = seeds.par_iter().map(of_seed).collect();
+        let effort = of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
+        (of_each.into_iter().flat_map(|(found, _)| found).collect(), effort)
+    }
+}
+
+/// Calls `take` with every four fruits of a cloud whose distances differ from those of `fruits` by less than `within`.
+fn each_alike(fruits: &[Vector3<f64>; STARS], cloud: &Landscape, within: f64, take: &mut impl FnMut(Quad)) {
+    let apart = |one: usize, other: usize| (fruits[one] - fruits[other]).norm();
+    let place = |row: u32| cloud.points[row as usize];
+    let alike = |one: usize, other: usize, rows: [u32; 2]| {
+        let [here, there] = rows.map(place);
+        ((here - there).norm() - apart(one, other)).abs() < within
+    };
+    // A and B are the farthest apart, so all four lie within that of A.
+    let reach = apart(0, 1) + within;
+    let mut near = Vec::new();
+    for a in 0..cloud.len() as u32 {
+        near.clear();
+        cloud.tree.within(&single(&place(a)), reach as f32, |row, _| near.push(row));
+        near.sort_unstable();
+        let at = |star: usize| near.iter().copied().filter(move |&row| row != a && alike(0, star, [a, row]));
+        let (of_c, of_d): (Vec<u32>, Vec<u32>) = (at(2).collect(), at(3).collect());
+        for b in at(1) {
+            for &c in of_c.iter().filter(|&&c| c != b && alike(1, 2, [b, c])) {
+                for &d in of_d.iter().filter(|&&d| d != b && d != c && alike(1, 3, [b, d]) && alike(2, 3, [c, d])) {
+                    take([a, b, c, d]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verified::fixture::visits;
+
+    #[test]
+    fn all_fours_that_lie_alike_are_found_and_no_others() {
+        let map = Landscape::new(&visits(0.02).1);
+        let rows = [3, 17, 40, 58];
+        let mut fruits = rows.map(|row: u32| map.points[row as usize]);
+        // A and B are those farthest apart.
+        let mut order = [0, 1, 2, 3];
+        let apart = |[a, b, ..]: [usize; STARS]| (fruits[a] - fruits[b]).norm();
+        let ends = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
+        order = ends.into_iter().fold(order, |best, next| if apart(next) > apart(best) { next } else { best });
+        fruits = order.map(|at| fruits[at]);
+        let (mut found, mut wrong) = (Vec::new(), 0);
+        each_alike(&fruits, &map, 0.01, &mut |four| {
+            found.push(four);
+            let places = four.map(|row| map.points[row as usize]);
+            let off = |i: usize, j: usize| ((places[i] - places[j]).norm() - (fruits[i] - fruits[j]).norm()).abs();
+            wrong += usize::from((0..STARS).any(|i| (0..i).any(|j| off(i, j) >= 0.01)));
+        });
+        assert!(found.contains(&order.map(|at| rows[at])));
+        assert_eq!(wrong, 0);
+    }
+}
