@@ -99,6 +99,7 @@ def drawn(kind: str, seed: int) -> Row:
     design = RowDesign(
         system=kind.removeprefix("living "), n_trees=n_trees, spacing_m=spacing_m, fruits_per_tree=(60, 110),
         leaves_per_tree=20, row_behind=False, grass_blades_per_m2=0.0,
+        clear_of_posts=False,
     )  # fmt: skip
     fruits = grow(design, seed).fruits_on(date(2024, 8, 20))
     return fruits.centres_m, fruits.trees, n_trees, spacing_m

@@ -20,7 +20,7 @@ from pomona.render.filming import Filming
 from pomona.synth.living import RowDesign
 
 SMALL = Filming(
-    RowDesign(n_trees=3, leaves_per_tree=1500, row_behind=False, grass_blades_per_m2=0.0),
+    RowDesign(n_trees=3, leaves_per_tree=1500, row_behind=False, grass_blades_per_m2=0.0, clear_of_posts=False),
     datetime.date(2024, 9, 1),
     seed=3,
     pairs=20,

@@ -2,11 +2,13 @@
 
 from dataclasses import fields, replace
 from datetime import date, timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.synth.living import LivingRow, RowDesign, Wind, grow
 from pomona.synth.living.cultivars import CULTIVARS
@@ -139,6 +141,59 @@ def test_fruits_overlap_neither_one_another_nor_the_wood(every_system: dict[str,
         thick = ((1 - share[..., 0]) * limbs.start_radii_m[wood] + share[..., 0] * limbs.end_radii_m[wood]).ravel()
         near, which = cKDTree(points).query(centres, k=4)
         assert (radii[:, None] + thick[which] - near).max() < 0.004
+
+
+def in_posts_and_wires(row: LivingRow, day: date) -> tuple[np.ndarray, np.ndarray]:
+    """Ids of the fruits that hang, and how deep posts and wires are in each, metres."""
+    fruits, rods = row.fruits_on(day), row.supports
+    share = np.linspace(0, 1, 2000)[:, None, None]
+    points = ((1 - share) * rods.starts_m + share * rods.ends_m).transpose(1, 0, 2)
+    depths = []
+    for place, radius in zip(points, rods.start_radii_m, strict=True):
+        gaps, _ = cKDTree(place).query(fruits.centres_m)
+        depths.append(fruits.diameters_m / 2 + radius - gaps)
+    return fruits.ids, np.max(depths, axis=0)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_fruits_hang_beside_posts_and_wires_and_the_others_stay(
+    every_system: dict[str, LivingRow], system: str
+) -> None:
+    now = every_system[system]
+    before = grow(replace(now.design, clear_of_posts=False), 5)
+    was_in_one: set[int] = set()
+    for day in (DAYS[0], DAYS[2], DAYS[4]):
+        ids, depths = in_posts_and_wires(before, day)
+        was_in_one |= set(ids[depths > 0])
+        assert in_posts_and_wires(now, day)[1].max() < 0.004
+        moved = np.linalg.norm(now.fruits_on(day).centres_m - before.fruits_on(day).centres_m, axis=1)
+        aside = set(ids[moved > 0.02])
+        in_october = np.flatnonzero(now.crop.hangs[:, 0] != before.crop.hangs[:, 0]) + 1
+        assert aside <= was_in_one | set(in_october), "a fruit that stood in nothing was moved"
+        assert (moved < 1e-9).mean() > 0.8
+    assert was_in_one, "nothing was to be moved"
+    np.testing.assert_array_equal(now.crop.spurs, before.crop.spurs)
+    np.testing.assert_array_equal(now.crop.lives.ends_days, before.crop.lives.ends_days)
+
+
+def test_no_fruit_of_a_filmed_cordon_stands_in_the_post() -> None:
+    day, design = date(2024, 9, 5), RowDesign(system="cordon", cultivar="granny-smith", n_trees=3)
+    ids, depths = in_posts_and_wires(grow(replace(design, clear_of_posts=False), 11), day)
+    assert depths[ids == 38][0] > 0.04
+    assert in_posts_and_wires(grow(design, 11), day)[1].max() < 0.002
+
+
+@pytest.mark.parametrize("day", [date(2024, 8, 9), date(2024, 8, 28), date(2024, 9, 12)])
+def test_the_recipe_of_the_shipped_row_still_gives_its_truth(day: date) -> None:
+    from benchmarks.shipped_recordings import DESIGN as SHIPPED_DESIGN
+    from benchmarks.shipped_recordings import SEED
+
+    shipped = FruitCloud.read(Path(__file__).parents[1] / "examples" / "row" / day.isoformat() / "fruits.csv")
+    fruits = grow(SHIPPED_DESIGN, SEED).fruits_on(day)
+    rows = np.searchsorted(fruits.ids, np.array(shipped.ids, int))
+    np.testing.assert_allclose(shipped.diameters_m, fruits.diameters_m[rows], atol=1e-5)
+    apart = [np.linalg.norm(places - places[0], axis=1) for places in (shipped.positions, fruits.centres_m[rows])]
+    np.testing.assert_allclose(apart[0], apart[1], atol=1e-4)
 
 
 def test_fruits_hang_from_their_stalks(row: LivingRow) -> None:

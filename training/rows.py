@@ -42,6 +42,7 @@ def drawn_row(number: int, pairs: int, renderer: str) -> Filming:
         leaves_per_tree=int(draw.integers(2000, 6500)),
         row_spacing_m=float(draw.uniform(2.8, 4.5)),
         grass_blades_per_m2=float(draw.uniform(0, 90)),
+        clear_of_posts=False,  # as what ships was trained on
     )
     sensor = Sensor(
         white_balance=(float(draw.uniform(0.9, 1.1)), float(draw.uniform(0.9, 1.1))),

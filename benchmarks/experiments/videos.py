@@ -16,7 +16,7 @@ from pomona.synth.living import RowDesign
 SYNTHETIC_SEED, SAME_DAY_SEED, SEASON_SEED = 41, 42, 43
 """A row of its own for each of the paper's three sets."""
 
-_DESIGN = RowDesign(n_trees=5)
+_DESIGN = RowDesign(n_trees=5, clear_of_posts=False)
 _SYNTHETIC = Filming(_DESIGN, datetime.date(2024, 8, 9), SYNTHETIC_SEED)
 _SAME_DAY = Filming(_DESIGN, datetime.date(2024, 8, 28), SAME_DAY_SEED)
 _SEASON = Filming(replace(_DESIGN, late_drop_share=0.2), datetime.date(2024, 8, 9), SEASON_SEED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -175,5 +175,7 @@ def _made_from(filming: Filming) -> dict[str, object]:
     """All of it as JSON values."""
     import json
 
-    values: dict[str, object] = json.loads(json.dumps(asdict(filming), default=str))
+    values: dict[str, Any] = json.loads(json.dumps(asdict(filming), default=str))
+    if not filming.design.clear_of_posts:
+        del values["design"]["clear_of_posts"]  # as before it could be asked: such recordings are gone on with
     return {"format": FORMAT, **values}

@@ -1,4 +1,4 @@
-"""What touches: fruits push one another aside, and the wood pushes them."""
+"""What touches: fruits push one another aside, and the wood, posts and wires push them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pomona.synth.living.wood import along_axes
+from pomona.synth.living.wood import NODES, along_axes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-__all__ = ["WoodPoints", "pushed_apart"]
+    from pomona.synth.row_geometry import Limbs
+
+__all__ = ["WoodPoints", "pushed_apart", "rods_as_points"]
 
 _SPACING_M = 0.02
 """Between points of wood: a fruit between two of them is hardly nearer to the axis than it seems."""
@@ -54,8 +58,21 @@ class WoodPoints:
         return np.asarray(gaps), np.asarray(which)
 
 
-def pushed_apart(centres_m: NDArray[np.float64], radii_m: NDArray[np.float64], wood: WoodPoints) -> NDArray[np.float64]:
-    """Push fruits, (N, 3), out of the wood, and out of one another, half each, over and over.
+def rods_as_points(rods: Limbs) -> list[WoodPoints]:
+    """Take straight rods, such as posts and wires, each thickness apart: points of wires would crowd out others."""
+    share = np.linspace(0.0, 1.0, NODES)[:, None]
+    points = []
+    for radius in np.unique(rods.start_radii_m):
+        alike = rods.start_radii_m == radius
+        nodes = (1.0 - share) * rods.starts_m[alike, None] + share * rods.ends_m[alike, None]
+        points.append(WoodPoints(nodes, np.full(nodes.shape[:2], radius)))
+    return points
+
+
+def pushed_apart(
+    centres_m: NDArray[np.float64], radii_m: NDArray[np.float64], in_the_way: Sequence[WoodPoints]
+) -> NDArray[np.float64]:
+    """Push fruits, (N, 3), out of what is in the way, and out of one another, half each, over and over.
 
     Branches that sink by different lengths bring them together.
     """
@@ -63,7 +80,7 @@ def pushed_apart(centres_m: NDArray[np.float64], radii_m: NDArray[np.float64], w
     for _ in range(_PUSHES):
         if len(centres) == 0:
             return centres
-        steps = wood.ways_out_m(centres, radii_m)
+        steps = _furthest([each.ways_out_m(centres, radii_m) for each in in_the_way])
         pairs = cKDTree(centres).query_pairs(2.0 * float(radii_m.max()), output_type="ndarray")
         pairs = pairs[np.lexsort(pairs.T)]
         between = centres[pairs[:, 1]] - centres[pairs[:, 0]]
@@ -76,3 +93,12 @@ def pushed_apart(centres_m: NDArray[np.float64], radii_m: NDArray[np.float64], w
             return centres
         centres += steps
     return centres
+
+
+def _furthest(ways_m: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Of the ways out of several things take the longest, for each fruit."""
+    furthest = ways_m[0]
+    for way in ways_m[1:]:
+        longer = np.linalg.norm(way, axis=1) > np.linalg.norm(furthest, axis=1)
+        furthest = np.where(longer[:, None], way, furthest)
+    return furthest

@@ -10,7 +10,7 @@ import numpy as np
 from pomona.synth.living.fruit_colours import FruitColours, draw_colours
 from pomona.synth.living.fruit_curves import ONSET_DAYS, FruitCurves, slowing_from
 from pomona.synth.living.fruit_lives import DROPPED, FruitLives, draw_lives
-from pomona.synth.living.fruit_places import hang_fruits
+from pomona.synth.living.fruit_places import hang_beside, hang_fruits
 from pomona.synth.living.streams_of_chance import chance
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pomona.synth.living.design import RowDesign
     from pomona.synth.living.spurs import Spurs
     from pomona.synth.living.wood import WoodAxes
+    from pomona.synth.row_geometry import Limbs
 
 __all__ = ["FULL_GROWN_DAYS", "Crop", "set_fruits"]
 
@@ -59,7 +60,7 @@ class Crop:
         return np.asarray(spur_tips_m[self.spurs] + self.hangs * below[:, None])
 
 
-def set_fruits(seed: int, design: RowDesign, wood: WoodAxes, spurs: Spurs) -> Crop:
+def set_fruits(seed: int, design: RowDesign, wood: WoodAxes, spurs: Spurs, supports: Limbs) -> Crop:
     """Set the fruits of a season.
 
     Raises
@@ -78,6 +79,8 @@ def set_fruits(seed: int, design: RowDesign, wood: WoodAxes, spurs: Spurs) -> Cr
     )
     full_grown = curves.diameters_m(FULL_GROWN_DAYS)
     places = hang_fruits(chance(seed, "places"), design, wood, spurs, trees, full_grown)
+    if design.clear_of_posts:
+        places = hang_beside(chance(seed, "beside posts"), design, wood, spurs, places, full_grown, supports)
     lives = draw_lives(chance(seed, "lives"), design, places.spurs, sizes)
     curves = replace(curves, slowed_from_days=slowing_from(lives.ends_days, lives.causes == DROPPED))
     outward = np.sign(places.centres_m[:, 1]) * np.minimum(

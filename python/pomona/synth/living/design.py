@@ -51,6 +51,9 @@ class RowDesign:
         Whether a row stands behind, at +y, unlabelled, and how far.
     grass_blades_per_m2
         Under the trees; 0 leaves the ground bare.
+    clear_of_posts
+        Whether fruits hang beside posts and wires; else some stand in them, as in rows that were drawn before this
+        could be asked. All other fruits are the same.
     """
 
     system: str = "spindle"
@@ -75,6 +78,7 @@ class RowDesign:
     row_behind: bool = True
     row_spacing_m: float = 3.3
     grass_blades_per_m2: float = 60.0
+    clear_of_posts: bool = True
 
     def __post_init__(self) -> None:
         _require_known("system", self.system, SYSTEMS)

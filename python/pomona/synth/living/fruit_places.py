@@ -10,16 +10,19 @@ from scipy.spatial import cKDTree
 
 from pomona.errors import PomonaError
 from pomona.synth.living.axis_growth import unit
-from pomona.synth.living.contact import WoodPoints
+from pomona.synth.living.contact import WoodPoints, rods_as_points
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from pomona.synth.living.design import RowDesign
     from pomona.synth.living.spurs import Spurs
     from pomona.synth.living.wood import WoodAxes
+    from pomona.synth.row_geometry import Limbs
 
-__all__ = ["FruitPlaces", "hang_fruits"]
+__all__ = ["FruitPlaces", "hang_beside", "hang_fruits"]
 
 _STALKS_M, _STALKS_IN_CLUSTER_M = (0.014, 0.032), (0.018, 0.045)
 _LOWEST_SPUR_M = 0.35
@@ -84,7 +87,7 @@ def hang_fruits(
             slots[open_] = rng.uniform(0.0, 2.0 * np.pi, len(open_))
         hangs, stalks = _proposed(rng, slots[open_], alone[open_])
         centres = tips[on[open_]] + hangs * (stalks + heights[open_] / 2.0)[:, None]
-        free = rods.depths_m(centres, diameters_m[open_] / 2.0).max(axis=1) <= 0.0
+        free = _clear_of([rods], centres, diameters_m[open_] / 2.0)
         free &= _clear_of_fruits(centres, diameters_m[open_] / 2.0, found.centres_m, diameters_m / 2.0, free)
         placed = open_[free]
         found.hangs[placed], found.stalks_m[placed], found.centres_m[placed] = hangs[free], stalks[free], centres[free]
@@ -93,6 +96,42 @@ def hang_fruits(
     wanted = int((trees == tree).sum())
     room = wanted - int((trees[open_] == tree).sum())
     raise PomonaError(f"fruits_per_tree: tree {tree} has room for {room} of {wanted} fruits, expected fewer")
+
+
+def hang_beside(
+    rng: np.random.Generator,
+    design: RowDesign,
+    wood: WoodAxes,
+    spurs: Spurs,
+    places: FruitPlaces,
+    diameters_m: NDArray[np.float64],
+    supports: Limbs,
+) -> FruitPlaces:
+    """Hang fruits that stand in posts or wires otherwise on their own spurs, with a chance of its own.
+
+    All others stay as they are, and so does what follows from the spurs. A fruit that finds no such place stays too: it
+    is pushed aside on the day.
+    """
+    posts = rods_as_points(supports)
+    in_the_way = [WoodPoints(wood.nodes_m, wood.radii_m), *posts]
+    radii, heights = diameters_m / 2.0, design.apple.height_share * diameters_m
+    tips = spurs.roots(wood.nodes_m) + spurs.offsets_m
+    alone = np.bincount(places.spurs, minlength=len(spurs))[places.spurs] == 1
+    hangs, stalks, centres = places.hangs.copy(), places.stalks_m.copy(), places.centres_m.copy()
+    open_ = np.flatnonzero(~_clear_of(posts, centres, radii))
+    centres[open_] = np.nan
+    for _ in range(_ROUNDS):
+        if len(open_) == 0:
+            break
+        proposed, lengths = _proposed(rng, rng.uniform(0.0, 2.0 * np.pi, len(open_)), alone[open_])
+        at = tips[places.spurs[open_]] + proposed * (lengths + heights[open_] / 2.0)[:, None]
+        free = _clear_of(in_the_way, at, radii[open_])
+        free &= _clear_of_fruits(at, radii[open_], centres, radii, free)
+        placed = open_[free]
+        hangs[placed], stalks[placed], centres[placed] = proposed[free], lengths[free], at[free]
+        open_ = open_[~free]
+    centres[open_] = places.centres_m[open_]
+    return FruitPlaces(places.spurs, hangs, stalks, centres)
 
 
 def _clusters(
@@ -132,6 +171,16 @@ def _proposed(
     level = np.sin(tilt)
     hangs = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(tilt)], axis=1)
     return unit(hangs), np.where(alone, rng.uniform(*_STALKS_M, n), rng.uniform(*_STALKS_IN_CLUSTER_M, n))
+
+
+def _clear_of(
+    in_the_way: Sequence[WoodPoints], centres: NDArray[np.float64], radii: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether balls are clear of wood."""
+    clear = np.ones(len(centres), bool)
+    for each in in_the_way if len(centres) else ():
+        clear &= each.depths_m(centres, radii).max(axis=1) <= 0.0
+    return clear
 
 
 def _clear_of_fruits(

@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pomona.synth.living.contact import WoodPoints, pushed_apart
+from pomona.synth.living.contact import pushed_apart
 from pomona.synth.living.fruit_lives import ALIVE, PICKED
 from pomona.synth.row_geometry import FruitSolids
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from pomona.synth.living.contact import WoodPoints
     from pomona.synth.living.crop import Crop
 
 __all__ = ["fallen_fruits", "hanging_fruits"]
@@ -25,13 +28,13 @@ _ROTTING_DAYS = 12.0
 
 
 def hanging_fruits(
-    crop: Crop, spur_tips_m: NDArray[np.float64], wood: WoodPoints, days: float, *, labelled: bool
+    crop: Crop, spur_tips_m: NDArray[np.float64], in_the_way: Sequence[WoodPoints], days: float, *, labelled: bool
 ) -> FruitSolids:
-    """Fruits under the tips of the spurs, (S, 3), beside the wood; without labels all ids are 0."""
+    """Fruits under the tips of the spurs, (S, 3), beside what is in the way; without labels all ids are 0."""
     # Before bloom there are none: their curves begin with nothing, not with a day.
     on = np.flatnonzero((crop.lives.states(days) == ALIVE) & (days > 0.0))
     diameters = crop.curves.diameters_m(days)[on]
-    centres = pushed_apart(crop.centres_m(spur_tips_m, days)[on], diameters / 2.0, wood)
+    centres = pushed_apart(crop.centres_m(spur_tips_m, days)[on], diameters / 2.0, in_the_way)
     ids = on + 1 if labelled else np.zeros(len(on), np.int64)
     trees = crop.trees[on] if labelled else np.full(len(on), -1, np.int64)
     return _solids(crop, on, ids, trees, centres, -crop.hangs[on], days, days)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pomona.errors import PomonaError
 from pomona.synth.living.bending import Bent, bend
-from pomona.synth.living.contact import WoodPoints
+from pomona.synth.living.contact import WoodPoints, rods_as_points
 from pomona.synth.living.crop import FULL_GROWN_DAYS, Crop, set_fruits
 from pomona.synth.living.foliage import Foliage, grow_leaves
 from pomona.synth.living.fruit_lives import ALIVE
@@ -121,8 +121,10 @@ class LivingRow:
         return bend(self.wood, self.design.softness, axes, places, forces)
 
     def _hanging(self, bent: Bent, days: float, *, labelled: bool) -> FruitSolids:
-        wood = WoodPoints(bent.nodes_m, self.wood.radii_m)
-        return hanging_fruits(self.crop, self._spur_tips(bent), wood, days, labelled=labelled)
+        in_the_way = [WoodPoints(bent.nodes_m, self.wood.radii_m)]
+        if self.design.clear_of_posts:
+            in_the_way += rods_as_points(self.supports)
+        return hanging_fruits(self.crop, self._spur_tips(bent), in_the_way, days, labelled=labelled)
 
     def _spur_tips(self, bent: Bent) -> NDArray[np.float64]:
         spurs = self.spurs
@@ -148,7 +150,8 @@ def grow(design: RowDesign, seed: int) -> LivingRow:
     feet = feet + chance(seed, "feet").normal(0.0, 0.02, feet.shape) * [1.0, 1.0, 0.0]
     wood = grow_wood(chance(seed, "wood"), feet, system)
     spurs = grow_spurs(chance(seed, "spurs"), wood, design.spurs_per_tree)
-    crop = set_fruits(seed, design, wood, spurs)
+    supports = posts_and_wires(design.n_trees, system)
+    crop = set_fruits(seed, design, wood, spurs, supports)
     centres = crop.centres_m(spurs.roots(wood.nodes_m) + spurs.offsets_m, FULL_GROWN_DAYS)
     foliage = grow_leaves(chance(seed, "leaves"), design, wood, spurs)
     return LivingRow(
@@ -157,7 +160,7 @@ def grow(design: RowDesign, seed: int) -> LivingRow:
         spurs,
         crop,
         beside_fruits(foliage, wood, centres, crop.curves.diameters_m(FULL_GROWN_DAYS) / 2.0),
-        posts_and_wires(design.n_trees, system),
+        supports,
         grow_grass(chance(seed, "grass"), design),
         grow(_behind(design), seed + 1_000_003) if design.row_behind else None,
     )
