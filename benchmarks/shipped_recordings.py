@@ -29,7 +29,7 @@ PAIRS = 48
 RATE_HZ = 10
 
 DESIGN = RowDesign(n_trees=5, clear_of_posts=False)
-"""As it was filmed: three of its 477 fruits stand in a post."""
+"""As it was filmed: five of its fruits stand in a post or a wire, one with its middle."""
 
 VISITS = (
     Filming(DESIGN, datetime.date(2024, 8, 9), SEED, "tractor", "sun", PAIRS, renderer="photo-gpu"),
