@@ -3,8 +3,11 @@
 import importlib.util
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -40,7 +43,6 @@ def test_without_the_extra_the_one_command_is_told(pomona, own, tmp_path):
     assert err == "pomona: training needs torch, not installed: pip install torch onnx\n"
 
 
-@needs_torch
 @pytest.mark.parametrize(
     ("lines", "told"),
     [
@@ -57,6 +59,87 @@ def test_wrong_labels_are_one_line(pomona, own, tmp_path, lines, told):
     assert not (tmp_path / "my.onnx").exists()
 
 
+def test_a_model_of_another_name_is_refused_before_any_work(pomona, own, tmp_path):
+    code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.txt")
+    assert (code, err) == (2, f"pomona: {tmp_path / 'my.txt'}: found suffix '.txt', expected .onnx\n")
+    begin = tmp_path / "none.onnx"
+    code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.onnx", "--begin", begin)
+    assert (code, err) == (2, f"pomona: {begin}: not found, expected a model\n")
+    assert not list(tmp_path.glob("*.training"))
+
+
+@needs_torch
+def test_ctrl_c_keeps_what_was_learnt_and_the_same_call_goes_on(own, tmp_path):
+    import torch
+
+    output, work = tmp_path / "my.onnx", tmp_path / "my.onnx.training"
+    call = [sys.executable, "-m", "pomona", "train", own, "--boxes", tmp_path / "boxes.csv", "-o", output]
+    call = [*map(str, call), "--batches", "4"]
+    training = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
+    while training.poll() is None and not list(work.glob("*.json")):
+        time.sleep(0.01)
+    training.send_signal(signal.SIGINT)
+    _, err = training.communicate(timeout=120)
+    assert training.returncode == 130, err
+    (checkpoint,) = work.glob("*.pt")
+    done = torch.load(checkpoint, weights_only=True)["done"]
+    assert 1 <= done <= 4
+    kept = f"pomona: {done} of 4 batches are kept in {work}: the same call goes on from there\n"
+    assert err == f"{kept}pomona: interrupted\n"
+    assert not output.exists()
+    subprocess.run(call, check=True, capture_output=True, timeout=120)
+    assert output.exists()
+    assert torch.load(checkpoint, weights_only=True)["done"] == 4
+
+
+@needs_torch
+@pytest.mark.parametrize("damage", ["garbage", "cut off", "another network", "empty"])
+def test_a_damaged_state_is_one_line(pomona, own, tmp_path, damage):
+    import torch
+
+    call = ("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.onnx", "--batches", 1)
+    assert pomona(*call)[0] == 0
+    (checkpoint,) = (tmp_path / "my.onnx.training").glob("*.pt")
+    whole = checkpoint.read_bytes()
+    if damage == "another network":
+        torch.save({"network": {}, "done": 1}, checkpoint)
+    else:
+        checkpoint.write_bytes({"garbage": b"garbage" * 99, "cut off": whole[: len(whole) // 2], "empty": b""}[damage])
+    code, _, err = pomona(*call)
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.startswith(f"pomona: {checkpoint}: found no state of this training, cut off or overwritten; expected")
+    assert "remove the file, and the training begins anew" in err
+    checkpoint.unlink()
+    for decoded in checkpoint.parent.glob("*.u8"):
+        decoded.write_bytes(decoded.read_bytes()[:100])
+    for shapes in checkpoint.parent.glob("*.json"):
+        shapes.write_text("[[1,")
+    assert pomona(*call)[0] == 0
+
+
+@needs_torch
+@pytest.mark.parametrize(("rate", "batches"), [(0.001, 1), (1.0, 1)])
+def test_a_training_that_spoilt_the_network_says_so(pomona, own, tmp_path, monkeypatch, rate, batches):
+    from pomona.detect.training import fine_tuning
+
+    monkeypatch.setattr(fine_tuning, "PLAN", replace(fine_tuning.PLAN, rate=rate, warm_up=1, falling=0.0))
+    output, photograph = tmp_path / "my.onnx", sorted(PICTURES.glob("*.jpg"))[0]
+    shutil.copy(photograph, own / "z.jpg")  # the last by name is kept apart
+    lines = [line.split(",") for line in (PICTURES / "boxes.csv").read_text().splitlines()]
+    with (tmp_path / "boxes.csv").open("a") as boxes:
+        boxes.writelines(f"z.jpg,{','.join(line[1:5])}\n" for line in lines if line[0] == photograph.name)
+    code, out, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", output, "--batches", batches)
+    assert err.count("\n") == 1
+    if rate == 1.0:
+        assert code == 2
+        assert err.startswith("pomona: the trained network finds nothing in the 1 picture kept apart, so its scores")
+    else:
+        assert code == 0
+        assert err.startswith(f"pomona: warning: {output}: finds less than what it began with, AP50 ")
+        assert "AP50 on the fifth kept apart: 0.9" in out
+    assert output.exists() == (code == 0)
+
+
 @needs_torch
 @pytest.mark.parametrize("teacher", [0, 2])
 def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path, teacher):
@@ -64,7 +147,7 @@ def test_a_training_that_was_killed_goes_on_and_ends_the_same(own, tmp_path, tea
 
     from pomona.detect.training import loop
     from pomona.detect.training.cache import cached
-    from pomona.detect.training.fine_tuning import labelled_pictures
+    from pomona.detect.training.labels import labelled_pictures
 
     torch.set_num_threads(1)
     samples = cached(labelled_pictures([own], tmp_path / "boxes.csv"), tmp_path / "cache")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pomona.amounts import amount
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Writes
 from pomona.likes import MODEL
 
@@ -29,31 +29,51 @@ def train(
 ) -> None:
     """Train the shipped detector on PICTURE with their boxes; the same call again goes on where it was interrupted.
 
+    Ctrl-C keeps what was learnt, exit code 130.
+
     A picture without a box is one without fruits. A fifth of the pictures is kept apart: it calibrates the scores and
     says what the training was good for.
     """
-    from pomona.cli.progress import counting
+    from pomona.cli.progress import counting, first_interrupt
     from pomona.detect.picture_file import pictures_in
     from pomona.detect.shipped import model_named
     from pomona.detect.training.extra import require_train
+    from pomona.detect.training.labels import labelled_pictures
+    from pomona.file_names import require_suffix
     from pomona.outputs import refuse_inputs
+    from pomona.reading import require_file
 
-    require_train()
+    require_suffix(output, (".onnx",))
+    require_file(model_named(begin), "a model")
     refuse_inputs([output], [*pictures_in(pictures).values(), boxes, model_named(begin)])
-    from pomona.detect.training.fine_tuning import fine_tune, labelled_pictures
-
     labelled = labelled_pictures(pictures, boxes)
+    require_train()
+    from pomona.detect.training.fine_tuning import fine_tune
+
     folder = work or output.parent / f"{output.name}.training"
-    with counting("training", batches) as progress:
-        made = fine_tune(
-            labelled,
-            output,
-            begin=model_named(begin),
-            work=folder,
-            batches=batches,
-            seed=seed,
-            progress=lambda done, _loss: progress(done, batches),
-        )
+    kept = 0
+
+    def tell_done(done: int, _loss: float) -> None:
+        nonlocal kept
+        kept = done
+        progress(done, batches)
+
+    try:
+        with counting("training", batches) as progress, first_interrupt() as stop:
+            made = fine_tune(
+                labelled,
+                output,
+                begin=model_named(begin),
+                work=folder,
+                batches=batches,
+                seed=seed,
+                progress=tell_done,
+                stop=stop,
+            )
+    except KeyboardInterrupt:
+        if kept:
+            tell(f"pomona: {kept} of {batches} batches are kept in {folder}: the same call goes on from there")
+        raise
     if json:
         counts = {"n_pictures": made.n_pictures, "n_fruits": made.n_fruits}
         ap50 = {"ap50_before": made.before, "ap50": made.after}

@@ -22,6 +22,10 @@ MAX_SIDE_PX = 1280
 """Larger pictures are shrunk: so the network will see them."""
 
 
+_Shape = tuple[int, int, float]
+"""Height, width, and by how much it was shrunk."""
+
+
 @dataclass(frozen=True, eq=False)
 class Sample:
     """A decoded picture, (H, W, 3) uint8 BGR, with its labels in its own pixels."""
@@ -33,9 +37,9 @@ class Sample:
 def cached(pictures: Sequence[Labelled], folder: Path) -> list[Sample]:
     """Decode pictures into a file in `folder`, once, and give them with their labels."""
     name = _name_of(pictures)
-    if not (folder / f"{name}.json").is_file():
-        _decode_all(pictures, folder, name)
-    shapes = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    shapes = _shapes_in(folder, name)
+    if shapes is None or len(shapes) != len(pictures):
+        shapes = _decode_all(pictures, folder, name)
     flat = np.memmap(folder / f"{name}.u8", np.uint8, "r")
     samples, begin = [], 0
     for labelled, (height, width, scale) in zip(pictures, shapes, strict=True):
@@ -50,9 +54,20 @@ def _name_of(pictures: Sequence[Labelled]) -> str:
     return sha256(json.dumps(stamps).encode()).hexdigest()[:16]
 
 
-def _decode_all(pictures: Sequence[Labelled], folder: Path, name: str) -> None:
+def _shapes_in(folder: Path, name: str) -> list[_Shape] | None:
+    """Read height, width and scale of each decoded picture; None where they are not there whole."""
+    try:
+        shapes = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        shapes = [(int(height), int(width), float(scale)) for height, width, scale in shapes]
+        n_bytes = (folder / f"{name}.u8").stat().st_size
+    except (OSError, ValueError, TypeError):
+        return None
+    return shapes if sum(height * width * 3 for height, width, _ in shapes) == n_bytes else None
+
+
+def _decode_all(pictures: Sequence[Labelled], folder: Path, name: str) -> list[_Shape]:
     folder.mkdir(parents=True, exist_ok=True)
-    shapes: list[tuple[int, int, float]] = []
+    shapes: list[_Shape] = []
     with whole_file(folder / f"{name}.u8") as partial, partial.open("wb") as file:
         for labelled in pictures:
             pixels, scale = _fitted(read_picture(labelled.picture))
@@ -60,6 +75,7 @@ def _decode_all(pictures: Sequence[Labelled], folder: Path, name: str) -> None:
             shapes.append((*pixels.shape[:2], scale))
     with whole_file(folder / f"{name}.json") as partial:
         partial.write_text(json.dumps(shapes), encoding="utf-8")
+    return shapes
 
 
 def _fitted(pixels: NDArray[np.uint8]) -> tuple[NDArray[Any], float]:

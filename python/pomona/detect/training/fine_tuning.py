@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
-from pomona.amounts import amount
 from pomona.atomic import whole_file
-from pomona.detect.picture_boxes import boxes_within, read_boxes
-from pomona.detect.picture_file import pictures_in
 from pomona.detect.training.cache import cached
 from pomona.detect.training.finishing import finished, judged_on
 from pomona.detect.training.graph import network_in, write_network
 from pomona.detect.training.labels import Labelled
-from pomona.detect.training.loop import Plan, Progress, Source, train
+from pomona.detect.training.loop import Plan, Progress, Source, Stop, train
 from pomona.detect.training.score_scaling import Scaling
-from pomona.errors import PomonaError
-from pomona.recording.pictures import picture_size
+from pomona.errors import PomonaWarning
 
-__all__ = ["Trained", "fine_tune", "labelled_pictures"]
-
-LEAST_PICTURES = 5
-"""Fewer cannot be split into some to learn from and some to try it on."""
+__all__ = ["Trained", "fine_tune"]
 
 EVERY = 5
 """A fifth of the pictures is not learnt from: it calibrates the scores and says how well it went."""
@@ -58,26 +50,6 @@ class Trained:
     scaling: Scaling
 
 
-def labelled_pictures(places: Sequence[Path], boxes: Path) -> list[Labelled]:
-    """Read pictures with their boxes; one without a box is one without a fruit.
-
-    Raises
-    ------
-    PomonaError
-        One line with the file and the line, what was found and what was expected.
-    """
-    pictures = pictures_in(places)
-    listed = read_boxes(boxes, pictures)
-    labelled = []
-    for name, path in pictures.items():
-        boxes_px = boxes_within(boxes, listed.get(name, ()), picture_size(path))
-        labelled.append(Labelled(path, boxes_px, np.full(len(boxes_px), np.nan, np.float32)))
-    if len(labelled) < LEAST_PICTURES or not listed:
-        found = f"found {amount(len(labelled), 'picture')} with {amount(sum(map(len, listed.values())), 'box')}"
-        raise PomonaError(f"{boxes}: {found}, expected {LEAST_PICTURES} pictures or more, and boxes in them")
-    return labelled
-
-
 def fine_tune(
     labelled: Sequence[Labelled],
     output: Path,
@@ -87,8 +59,9 @@ def fine_tune(
     batches: int = PLAN.batches,
     seed: int = PLAN.seed,
     progress: Progress = lambda _done, _loss: None,
+    stop: Stop = lambda: False,
 ) -> Trained:
-    """Train the network of a model on labelled pictures, and write the new model.
+    """Train the network of a model on labelled pictures, and write the new model, also where it is worse: it warns.
 
     Parameters
     ----------
@@ -102,12 +75,22 @@ def fine_tune(
     batches, seed : int
     progress : callable
         Told the batches that are done, and the mean loss of late.
+    stop : callable
+        Asked after each batch whether to end there, with `KeyboardInterrupt` and all that is done kept in `work`.
+
+    Raises
+    ------
+    PomonaError
+        A picture cannot be read, the model to begin with is another, or what `work` has is damaged.
     """
     learnt, kept = _split(labelled)
     plan = replace(PLAN, batches=batches, seed=seed)
     checkpoint = work / f"{_name_of(labelled, begin, plan)}.pt"
-    network = train([Source(cached(learnt, work), 1.0)], plan, checkpoint, network_in(begin), progress).eval()
+    begun = network_in(begin)
+    network = train([Source(cached(learnt, work), 1.0)], plan, checkpoint, begun, progress, stop=stop).eval()
     network, min_score, scaled = finished(network, kept)
+    if stop():
+        raise KeyboardInterrupt
     about = {
         "begun_with": begin.name,
         "pictures": len(labelled),
@@ -118,6 +101,9 @@ def fine_tune(
     with whole_file(output) as partial:
         write_network(partial, network, min_score, about)
         before, after = _precisions(begin, kept), _precisions(partial, kept)
+    if after < before:
+        message = f"{output}: finds less than what it began with, AP50 {after:.3f} against {before:.3f} before"
+        warnings.warn(f"{message}: more pictures may help", PomonaWarning, stacklevel=2)
     fruits = sum(len(each.boxes_px) for each in labelled)
     return Trained(len(labelled), fruits, before, after, min_score, scaled)
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Labelled"]
+from pomona.amounts import amount
+from pomona.detect.picture_boxes import boxes_within, read_boxes
+from pomona.detect.picture_file import pictures_in
+from pomona.errors import PomonaError
+from pomona.recording.pictures import picture_size
+
+__all__ = ["Labelled", "labelled_pictures"]
+
+LEAST_PICTURES = 5
+"""Fewer cannot be split into some to learn from and some to try it on."""
 
 USUAL_PX = 35.0
 """Side of a usual fruit in a picture without any."""
@@ -48,3 +58,23 @@ class Labelled:
             return 0.0
         sides_px = np.sqrt(np.prod(self.boxes_px[:, 2:] - self.boxes_px[:, :2], axis=1))
         return SMALLEST * float(np.median(sides_px) if len(sides_px) else USUAL_PX)
+
+
+def labelled_pictures(places: Sequence[Path], boxes: Path) -> list[Labelled]:
+    """Read pictures with their boxes; one without a box is one without a fruit.
+
+    Raises
+    ------
+    PomonaError
+        One line with the file and the line, what was found and what was expected.
+    """
+    pictures = pictures_in(places)
+    listed = read_boxes(boxes, pictures)
+    labelled = []
+    for name, path in pictures.items():
+        boxes_px = boxes_within(boxes, listed.get(name, ()), picture_size(path))
+        labelled.append(Labelled(path, boxes_px, np.full(len(boxes_px), np.nan, np.float32)))
+    if len(labelled) < LEAST_PICTURES or not listed:
+        found = f"found {amount(len(labelled), 'picture')} with {amount(sum(map(len, listed.values())), 'box')}"
+        raise PomonaError(f"{boxes}: {found}, expected {LEAST_PICTURES} pictures or more, and boxes in them")
+    return labelled

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import cv2
@@ -19,11 +20,12 @@ from pomona.detect.training.learner import Learner
 from pomona.detect.training.loss import loss_of, unlike_teacher
 from pomona.detect.training.shown_crops import drawn_crop
 from pomona.detect.training.targets import Targets, targets_of
+from pomona.errors import PomonaError
 
-__all__ = ["Plan", "Source", "first_pictures", "means_of", "train"]
+__all__ = ["Plan", "Source", "Stop", "first_pictures", "means_of", "train"]
 
 SAVED_EVERY = 200
-"""Batches between two checkpoints: that is what an interruption costs at most."""
+"""Batches between two checkpoints: that is what a power failure costs at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,9 @@ class Plan:
 Progress = Callable[[int, float], None]
 """Told the batches that are done and the mean loss of late."""
 
+Stop = Callable[[], bool]
+"""Asked after each batch whether to end."""
+
 
 @dataclass(eq=False)
 class _State:
@@ -102,6 +107,7 @@ def train(
     *,
     teacher: FruitNetwork | None = None,
     workers: int = 0,
+    stop: Stop = lambda: False,
 ) -> FruitNetwork:
     """Train a network, going on from a checkpoint that is there.
 
@@ -111,7 +117,7 @@ def train(
     plan : Plan
         Each batch is drawn by the seed and its number alone, so an interruption changes nothing.
     checkpoint : Path
-        Written every `SAVED_EVERY` batches, and at the end.
+        Written every `SAVED_EVERY` batches, at the end, and where it is stopped.
     begin : FruitNetwork or None
         What to begin with, None for numbers drawn by the seed.
     progress : callable
@@ -119,11 +125,19 @@ def train(
         What a teacher begins with; None for one that the plan asks for, if it does.
     workers : int
         Processes that draw crops meanwhile; 0 for none besides this one.
+    stop : callable
 
     Returns
     -------
     FruitNetwork
         The mean of its weights over the last batches.
+
+    Raises
+    ------
+    PomonaError
+        The checkpoint is none, or damaged.
+    KeyboardInterrupt
+        It was stopped; all batches that are done are in the checkpoint.
     """
     torch.manual_seed(plan.seed)
     learner = Learner.begun(FruitNetwork() if begin is None else begin, plan.device)
@@ -135,8 +149,11 @@ def train(
     for pictures, wanted in _batches(sources, plan, state.done, workers):
         _step(state, pictures, wanted, plan)
         progress(state.done, state.loss)
-        if state.done % SAVED_EVERY == 0 or state.done == plan.batches:
+        stopped = stop()
+        if stopped or state.done % SAVED_EVERY == 0 or state.done == plan.batches:
             _save(state, checkpoint)
+        if stopped:
+            raise KeyboardInterrupt
     return state.learner.mean.cpu()
 
 
@@ -224,11 +241,21 @@ def _save(state: _State, checkpoint: Path) -> None:
 
 
 def _restore(state: _State, checkpoint: Path) -> None:
-    content = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    state.learner.restore(content)
-    if state.teacher is not None:
-        state.teacher.restore(content["teacher"])
-    state.done, state.loss = content["done"], content["loss"]
+    try:
+        content = torch.load(checkpoint, map_location="cpu", weights_only=True)
+        state.learner.restore(content)
+        if state.teacher is not None:
+            state.teacher.restore(content["teacher"])
+        state.done, state.loss = int(content["done"]), float(content["loss"])
+    except _DAMAGED:
+        raise PomonaError(
+            f"{checkpoint}: found no state of this training, cut off or overwritten; expected what it kept there: "
+            "remove the file, and the training begins anew"
+        ) from None
+
+
+_DAMAGED = (OSError, EOFError, RuntimeError, UnpicklingError, ValueError, TypeError, LookupError, AttributeError)
+"""What PyTorch raises for files that are none of its own or not whole, and for those of other networks."""
 
 
 def means_of(checkpoint: Path) -> tuple[FruitNetwork, FruitNetwork | None, int]:
