@@ -162,6 +162,20 @@ def test_of_a_video_cut_off_in_the_middle_the_rest_is_used(row):
     assert len(checked(recording).unreadable) <= 1
 
 
+@pytest.mark.parametrize("rate", [10, 30])
+def test_an_avi_says_how_long_it_was_whatever_its_clock_counts(row, rate):
+    stamps = [100 * frame for frame in range(40)]  # ten a second, also where the header says thirty
+    video = write_video(row / "row.avi", 40, rate=rate, stamps=stamps)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(open_recording(video)) == 40
+    with av.open(str(video)) as container:
+        middle = [bytes(packet) for packet in container.demux(video=0) if packet.size][19]
+    video.write_bytes(video.read_bytes()[: video.read_bytes().index(middle)])
+    with pytest.warns(PomonaWarning, match=r"row\.avi: cut off: found \d+ of (39|40) frames"):
+        assert 17 <= len(open_recording(video)) <= 20
+
+
 def damage(video: Path, row: int) -> None:
     """Overwrite the inside of one packet."""
     with av.open(str(video)) as container:

@@ -197,11 +197,16 @@ def _decoded(container: InputContainer, wanted: frozenset[int]) -> Iterator[Any]
 def _warn_when_cut_off(path: Path, container: InputContainer, times_s: NDArray[np.float64]) -> None:
     """Compare with the length that the header promises."""
     found = len(times_s)
-    promises = [int(container.streams.video[0].frames or 0)]
-    if container.duration and found > 1:
+    stream = container.streams.video[0]
+    counted, end_s = int(stream.frames or 0), None
+    if container.format.name == "avi":
+        # AVI counts ticks of its clock as frames; of a file that is cut off FFmpeg guesses the length from its bytes.
+        end_s, counted = counted * float(stream.time_base or 0), 0
+    elif container.duration:
         end_s = ((container.start_time or 0) + container.duration) / 1e6
+    promises = [counted]
+    if end_s and found > 1:
         promises.append(found - 1 + round((end_s - times_s[-1]) / float(np.median(np.diff(times_s)))))
-    # AVI counts ticks of its clock as frames, so the smaller promise is the true one.
     promised = min((promise for promise in promises if promise), default=0)
     if promised - found > CUT_OFF_FRAMES:
         message = f"{path}: cut off: found {found} of {promised} frames; what is there is used"
