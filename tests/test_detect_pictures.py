@@ -15,6 +15,7 @@ import pytest
 import onnx_maker
 from pomona.detect import Detections
 from pomona.detect.accuracy import Found, judged
+from pomona.detect.drawn_boxes import draw_boxes
 from pomona.detect.onnx import OnnxDetector
 from pomona.detect.picture_file import read_picture
 from pomona.detect.shipped import EXACT, SHIPPED, model_named
@@ -117,9 +118,21 @@ def test_boxes_are_drawn_and_json_counts_them(pomona, tmp_path):
     counts = json.loads(out)["n_boxes"]
     assert counts == {name: len(rows) for name, rows in boxes_in(tmp_path / "b.csv").items()}
     for name in NAMES:
-        drawn = read_picture(tmp_path / "drawn" / f"{name}.boxes.png")
-        changed = (drawn != read_picture(PICTURES / name)).any(axis=2)
+        drawn, picture = read_picture(tmp_path / "drawn" / f"{name}.boxes.png"), read_picture(PICTURES / name)
+        assert drawn.shape[:2] == (2 * picture.shape[0], 2 * picture.shape[1])  # for scores to be read
+        changed = (drawn != cv2.resize(picture, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)).any(axis=2)
         assert 0 < changed.mean() < 0.5
+
+
+def test_every_score_is_drawn_whole(tmp_path):
+    corners = [(20, 0, 60, 30), (300, 200, 340, 240), (980, 500, 1000, 530), (5, 700, 60, 750), (400, 5, 440, 50)]
+    found = Detections(np.array(corners, np.float32), np.full(len(corners), 0.87, np.float32))
+    draw_boxes(tmp_path / "drawn.png", np.full((800, 1000, 3), 255, np.uint8), found)
+    letters = (read_picture(tmp_path / "drawn.png").max(axis=2) < 100).astype(np.uint8)
+    _, _, blobs, _ = cv2.connectedComponentsWithStats(cv2.dilate(letters, np.ones((3, 15), np.uint8)))
+    inside = [row for row in blobs[1:].tolist() if row[4] > 100]
+    assert len(inside) == len(corners)
+    assert np.ptp([(row[2], row[3]) for row in inside], axis=0).max() <= 7  # at an edge no letter is dilated beyond it
 
 
 def test_a_drawn_picture_gives_its_place_to_the_next_and_a_photograph_of_its_name_does_not(pomona, tmp_path):

@@ -163,5 +163,5 @@ def test_settings_for_tiles():
     assert read_tiling("off") == (1, 1)
     assert read_tiling("3x2") == (3, 2)
     for wrong in ("", "3", "0x2", "3x", "on", "1000x1"):
-        with pytest.raises(PomonaError, match=r"expected auto, off, or columns x rows, as 3x2"):
+        with pytest.raises(PomonaError, match=r"expected auto, off, or columns x rows, 1 to 99 each, as 3x2"):
             read_tiling(wrong)

@@ -102,7 +102,9 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        (("--trees", "0"), "n_trees: found 0"),
+        (("--trees", "0"), "--trees: found 0"),
+        (("--system", "vase"), "--system: found 'vase'"),
+        (("--jitter", "nan"), "--jitter': found 'nan', expected less than or equal to 1"),
         (("--width", "0"), "width, height: found a size of 0x180"),
         (("--width", "99999"), "width, height: found a size of 99999x180"),
         (("--path", "boat"), "no path is called 'boat'; expected one of tractor"),

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from pomona.errors import PomonaError
 from pomona.recording.calibration import Calibration
 from pomona.render.filming import Filming, film
-from pomona.render.photo import BLENDER_PYTHON, PathTracer
+from pomona.render.photo import BLENDER_PYTHON, INSTALL, PathTracer
 from pomona.render.scene_view import Weather
 from pomona.synth.row_geometry import FruitSolids, Leaves, Limbs, RowGeometry
 
@@ -135,15 +136,21 @@ def test_another_job_in_the_folder_is_refused(tmp_path):
         next(PathTracer(folder=tmp_path).render(geometry(), CAMERA, poses(1), SUN, seed=5))
 
 
+def test_the_docs_and_the_extra_name_what_is_to_be_installed():
+    root = Path(__file__).parents[1]
+    assert INSTALL in (root / "docs" / "photo-real.md").read_text()
+    assert INSTALL.removeprefix("pip install ") in (root / "pyproject.toml").read_text()
+
+
 def test_without_blender_it_says_what_to_install_and_leaves_nothing(tmp_path, monkeypatch):
     # A Python without packages, so surely without Blender.
     bare = tmp_path / "bare"
     bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S -E "$@"\n')
     bare.chmod(0o755)
-    with pytest.raises(PomonaError, match="bpy, which is not installed: pip install bpy"):
+    with pytest.raises(PomonaError, match=f"bpy, which is not installed: {INSTALL}"):
         next(PathTracer(interpreter=str(bare)).render(geometry(), CAMERA, poses(1), SUN, seed=5))
     monkeypatch.setenv(BLENDER_PYTHON, str(bare))
-    with pytest.raises(PomonaError, match="not installed: pip install bpy"):
+    with pytest.raises(PomonaError, match=f"not installed: {INSTALL}"):
         film(Filming(renderer="photo"), tmp_path / "row")
     assert not (tmp_path / "row").exists()
 

@@ -157,6 +157,20 @@ def test_arrows_say_by_how_much_they_are_magnified() -> None:
     assert pytest.approx(int(times) * int(length_cm) / 100) == key.U
 
 
+def test_arrows_end_inside_their_panels() -> None:
+    query, map, match = moved_row()
+    highest = int(query.positions[:40, 2].argmax())
+    places = query.positions.copy()
+    places[highest, 2] += 0.15  # and its arrow is longer than the margin
+    figure = draw_match(FruitCloud(places), map, match, up_in_map=[0, 0, 1])
+    for axes in figure.axes:
+        for arrows in (artist for artist in axes.collections if isinstance(artist, Quiver)):
+            ends = arrows.XY + np.stack([arrows.U, arrows.V], axis=1)
+            for along, (low, high) in enumerate((axes.get_xlim(), axes.get_ylim())):
+                assert low < ends[:, along].min()
+                assert ends[:, along].max() < high
+
+
 def test_trees_are_taken_from_the_map_or_found_and_said_to_be() -> None:
     query, map, match = moved_row()
     named = dataclasses.replace(map, extras={"tree": ("A",) * 30 + ("B",) * 29 + ("",)})

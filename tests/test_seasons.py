@@ -60,6 +60,21 @@ def test_the_hidden_are_those_that_show_least(season: Season) -> None:
         assert visit.shown[missed].mean() < 0.25 < 0.4 < visit.shown[seen].mean()
 
 
+def test_of_what_shows_nothing_as_few_are_seen_as_the_docs_say() -> None:
+    seen = []
+    for visit in draw_season(SEASONS["hard"], 3).visits:
+        found = np.isin(visit.truth.ids, visit.fruits)
+        seen.append((int(found.sum()), int((visit.shown[found] == 0).sum())))
+    assert seen[0] == (351, 12)
+    assert sum(nothing for _, nothing in seen[1:]) == 1
+
+
+def test_progress_is_told_visit_by_visit(season: Season) -> None:
+    told: list[tuple[int, int]] = []
+    draw_season(replace(SMALL, n_visits=2), season.seed, tell=lambda done, total: told.append((done, total)))
+    assert told == [(0, 2), (1, 2), (2, 2)]
+
+
 def test_one_side_sees_what_the_other_does_not() -> None:
     plan = replace(SMALL, skips_end_trees=False, first_after_bloom_days=110, last_after_bloom_days=111, n_visits=2)
     near, far = draw_season(plan, 2).visits
@@ -259,10 +274,17 @@ def test_another_season_is_not_replaced_without_a_word(tmp_path, run_here) -> No
     ("arguments", "line"),
     [
         (("synth", "season", "spring"), "no season is called 'spring'; expected one of easy, hard"),
-        (("synth", "season", "easy", "--trees", "0"), "n_trees: found 0, expected 1 to 200"),
+        (("synth", "season", "easy", "--trees", "0"), "--trees: found 0, expected 1 to 200"),
+        (("synth", "season", "easy", "--hidden", "3"), "--hidden: found 3.0, expected 0.0 to 0.95"),
+        (("synth", "season", "easy", "--noise-mm", "5000"), "--noise-mm: found 5000, expected 0 to 1000"),
+        (("synth", "season", "easy", "--noise-mm", "nan"), "--noise-mm: found nan, expected 0 to 1000"),
+        (("synth", "season", "easy", "--false", "nan"), "--false: found nan, expected 0.0 to 5.0"),
+        (("synth", "season", "easy", "--visits", "0"), "--visits: found 0, expected 1 to"),
+        (("synth", "season", "easy", "--fruits", "9:3"), "--fruits: found 9 to 3, expected"),
+        (("synth", "clouds", "base", "--seeds", "1:3", "--seed", "4"), "found --seed 4 and --seeds 1:3, expected one"),
         (("synth", "season", "easy", "--trees", "1", "--fruits", "999:999"), "has room for"),
         (("synth", "season", "easy", "--fruits", "many"), "--fruits: found 'many', expected LEAST:MOST"),
-        (("synth", "season", "easy", "--system", "vase"), "system: found 'vase'"),
+        (("synth", "season", "easy", "--system", "vase"), "--system: found 'vase'"),
         (("synth", "season", "easy", "--seed", "-1"), "seed -1 is negative"),
     ],
 )

@@ -35,7 +35,11 @@ from pomona.cli import (
 from pomona.cli.terminal import require_written, say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
+from pomona.reading import shown
 from pomona.store.waiting import TIMEOUT_S, tell_waits
+
+NOT_FOUND = "Input should be "
+"""Begins what Typer says of a value that it does not take."""
 
 app = Verbs(
     name="pomona",
@@ -122,10 +126,17 @@ def _refuse(line: str) -> NoReturn:
 def _usage_line(error: Exception) -> str:
     """Say a usage error in one line, with where to read on."""
     message: str = getattr(error, "format_message", error.__str__)()
+    message = message.replace(NOT_FOUND, f"{_found_by(error)}expected ", 1)
     context = getattr(error, "ctx", None)
     if context is None or not message or "\n" in message:
         return message or "no verb given, see `pomona --help`"
     return f"{message.rstrip('.')}; see `{context.command_path} --help`"
+
+
+def _found_by(error: Exception) -> str:
+    """Say what was found where Typer, which has Pydantic look at values, says only what was expected."""
+    wrong: list[dict[str, object]] = getattr(error.__cause__, "errors", list)()
+    return f"found {shown(wrong[0]['input'])}, " if wrong and "input" in wrong[0] else ""
 
 
 def _say_waiting(path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.flags import told_by_flags
 from pomona.cli.synth_video import synth_video
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Verbs, Writes
@@ -18,6 +19,19 @@ if TYPE_CHECKING:
 
     from pomona.synth.clouds import ScenePair
     from pomona.synth.seasons import SeasonPlan
+
+FLAGS = {
+    "n_trees": "--trees",
+    "visits": "--visits",
+    "fruits_per_tree": "--fruits",
+    "system": "--system",
+    "cultivar": "--cultivar",
+    "hidden_share": "--hidden",
+    "false_rate": "--false",
+}
+"""What the flags of a season change in its plan."""
+
+MOST_NOISE_MM = 1000.0
 
 app = Verbs(help="Draw seeded orchards with known truth.", no_args_is_help=True)
 
@@ -33,7 +47,7 @@ def synth_clouds(
     output: Annotated[Path, Writes(VISITS)] = typer.Option(
         ..., "-o", "--output", help="Folder to write to; made where it does not exist."
     ),
-    seed: int = typer.Option(0, help="Which pair of visits to draw."),
+    seed: int | None = typer.Option(None, help="Which pair of visits to draw; else 0."),
     seeds: str = typer.Option("", help="FIRST:END instead draws many pairs; END is not drawn.", metavar="FIRST:END"),
 ) -> None:
     """Write two visits to a row as query.csv and map.csv, and their truth as truth.json.
@@ -43,9 +57,12 @@ def synth_clouds(
     from rich.console import Console
     from rich.progress import track
 
+    from pomona.errors import PomonaError
     from pomona.synth.clouds import scene_pair
 
-    wanted = _seed_range(seeds) if seeds else range(seed, seed + 1)
+    if seeds and seed is not None:
+        raise PomonaError(f"found --seed {seed} and --seeds {seeds}, expected one of them")
+    wanted = _seed_range(seeds) if seeds else range(seed or 0, (seed or 0) + 1)
     first = scene_pair(cell, wanted.start)
     output.mkdir(parents=True, exist_ok=True)
     console = Console(stderr=True)
@@ -80,11 +97,12 @@ def synth_season(
 ) -> None:
     """Write what several visits to a living row would see, as YYYY-MM-DD.csv, and the truth as truth.json.
 
-    Fruits grow, sink with their branches, drop and are thinned; a visit misses what leaves, wood and other fruits
-    hide from its side.
+    Fruits grow, sink with their branches, drop and are thinned; a visit misses, as many as asked, those of which
+    leaves, wood and other fruits leave least to see from its side.
     """
     from dataclasses import replace
 
+    from pomona.cli.progress import counting
     from pomona.synth.seasons import draw_season
     from pomona.synth.seasons.season_files import write_season
 
@@ -92,12 +110,21 @@ def synth_season(
     design: dict[str, Any] = {"n_trees": trees, "system": system or None, "cultivar": cultivar or None}
     design["fruits_per_tree"] = _least_and_most(fruits) if fruits else None
     changes: dict[str, Any] = {"n_visits": visits, "hidden_share": hidden, "false_rate": false_rate}
-    changes |= {"noise_m": None if noise_mm is None else noise_mm / 1000.0, "own_frames": not same_frame}
-    plan = replace(plan, design=replace(plan.design, **_given(design)), **_given(changes))
-    drawn = draw_season(plan, seed)
+    changes |= {"noise_m": None if noise_mm is None else _metres(noise_mm), "own_frames": not same_frame}
+    with told_by_flags(FLAGS), counting("drawing", plan.n_visits) as progress:
+        plan = replace(plan, design=replace(plan.design, **_given(design)), **_given(changes))
+        drawn = draw_season(plan, seed, tell=progress)
     write_season(drawn, output)
     for visit in drawn.visits:
         say(f"{visit.day}  {amount(len(visit.cloud), 'fruit')}, {visit.drive.side} side")
+
+
+def _metres(noise_mm: float) -> float:
+    from pomona.errors import PomonaError
+
+    if not 0.0 <= noise_mm <= MOST_NOISE_MM:  # NaN is in no range
+        raise PomonaError(f"--noise-mm: found {noise_mm:g}, expected 0 to {MOST_NOISE_MM:g}")
+    return noise_mm / 1000.0
 
 
 def _given(options: dict[str, Any]) -> dict[str, Any]:

@@ -9,9 +9,13 @@ from typing import Annotated
 import typer
 
 from pomona.amounts import amount
+from pomona.cli.flags import told_by_flags
 from pomona.cli.terminal import say
 from pomona.cli.verbs import Writes
 from pomona.likes import RENDERED
+
+FLAGS = {"n_trees": "--trees", "system": "--system", "cultivar": "--cultivar"}
+"""What the flags change in the design of the row."""
 
 
 def synth_video(
@@ -42,8 +46,10 @@ def synth_video(
     from pomona.render.sensor import Sensor
     from pomona.synth.living import RowDesign
 
+    with told_by_flags(FLAGS):
+        design = RowDesign(system=system, cultivar=cultivar, n_trees=trees)
     filming = Filming(
-        design=RowDesign(system=system, cultivar=cultivar, n_trees=trees),
+        design=design,
         day=date.date(),
         seed=seed,
         path=path,

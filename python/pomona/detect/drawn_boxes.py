@@ -15,8 +15,13 @@ from pomona.likes import BOXES_DRAWN, BOXES_DRAWN_MARK
 
 __all__ = ["draw_boxes", "drawn_name", "write_png"]
 
-COLOUR = (255, 64, 255)
-"""BGR: no fruit and no leaf has it."""
+COLOUR, INK = (255, 64, 255), (40, 0, 40)
+"""BGR: of boxes and what is below their scores, which no fruit and no leaf has; of the scores."""
+
+USUAL_PX = 1000
+"""A smaller picture is drawn so many times as large as comes nearest to it, for scores to be read."""
+
+TEXT_SCALE, TEXT_EDGE_PX = 0.45, 2
 
 
 def drawn_name(name: str) -> str:
@@ -25,15 +30,32 @@ def drawn_name(name: str) -> str:
 
 
 def draw_boxes(path: Path, picture: NDArray[np.uint8], found: Detections) -> None:
-    """Write a picture, (H, W, 3) uint8 BGR, with its boxes and their scores as PNG."""
+    """Write a picture, (H, W, 3) uint8 BGR, with its boxes and their scores as PNG; a small one is enlarged."""
     import cv2
 
-    drawn = picture.copy()
-    for corners, score in zip(np.round(found.boxes_px).astype(int).tolist(), found.scores, strict=True):
+    times = max(round(USUAL_PX / max(picture.shape[:2])), 1)
+    size_px = (times * picture.shape[1], times * picture.shape[0])
+    drawn = np.array(cv2.resize(picture, size_px, interpolation=cv2.INTER_CUBIC), np.uint8)
+    boxes = np.round(times * found.boxes_px).astype(int).tolist()
+    for corners in boxes:
         cv2.rectangle(drawn, corners[:2], corners[2:], COLOUR, 1)
-        place = (corners[0], max(corners[1] - 2, 8))
-        cv2.putText(drawn, f"{score:.2f}", place, cv2.FONT_HERSHEY_SIMPLEX, 0.35, COLOUR, 1, cv2.LINE_AA)
+    for row in np.argsort(found.scores, kind="stable"):  # where they meet, the best lies on top
+        _write_score(drawn, boxes[row], found.scores[row])
     write_png(path, drawn, BOXES_DRAWN_MARK)
+
+
+def _write_score(drawn: NDArray[np.uint8], corners: list[int], score: float) -> None:
+    """Write a score on a ground of its own above its box, below the box's upper edge where there is no room above."""
+    import cv2
+
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    (width, height), _ = cv2.getTextSize(f"{score:.2f}", font, TEXT_SCALE, 1)
+    width, height = width + 2 * TEXT_EDGE_PX, height + 2 * TEXT_EDGE_PX
+    left = max(min(corners[0], drawn.shape[1] - width), 0)
+    top = corners[1] - height if corners[1] >= height else max(corners[1], 0)
+    cv2.rectangle(drawn, (left, top), (left + width, top + height), COLOUR, cv2.FILLED)
+    place = (left + TEXT_EDGE_PX, top + height - TEXT_EDGE_PX)
+    cv2.putText(drawn, f"{score:.2f}", place, font, TEXT_SCALE, INK, 1, cv2.LINE_AA)
 
 
 PNG_HEAD_BYTES = 33

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,15 @@ class Arrows:
         fitting = [times for times in MAGNIFICATIONS if times * usual_m * sheet.in_per_m <= USUAL_IN]
         return cls(was, found, max(fitting, default=1), sheet.in_per_m)
 
+    def ends(self, view: Projection) -> NDArray[np.float64]:
+        """Where their tips are in a panel, (M, 2)."""
+        start, end = view.project(self.was), view.project(self.found)
+        return np.asarray(start + self.times * (end - start))
+
+    def on_another(self, sheet: Sheet) -> Arrows:
+        """Give the same, as long in metres, for another page."""
+        return replace(self, in_per_m=sheet.in_per_m)
+
     def draw(self, axes: Axes, view: Projection) -> Quiver | None:
         """Draw them in a panel; None where nothing moved."""
         start, end = view.project(self.was), view.project(self.found)
@@ -50,7 +59,7 @@ class Arrows:
             return None
         return axes.quiver(
             *start.T,
-            *(self.times * (end - start)).T,
+            *(self.ends(view) - start).T,
             angles="xy",
             scale_units="xy",
             scale=1,

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["draw_row"]
 
 
+ROOM_M = 0.5
+"""For tips of arrows beyond the fruits, at most."""
+
+
 @dataclass(frozen=True)
 class Mark:
     """How fruits of one fate are drawn; colours of Okabe and Ito, and a shape of its own for each."""
@@ -60,8 +64,10 @@ def draw_row(query: FruitCloud, map: FruitCloud, match: Match, *, up_in_map: Arr
     fates = Fates.of(query, map, match)
     everything = np.concatenate([map.positions, fates.found, fates.new])
     views = side_and_plan(everything, up_in_map)
-    sheet = Sheet.of([view.project(everything) for view in views])
-    _draw_fates(sheet, views, fates)
+    places = [view.project(everything) for view in views]
+    arrows = Arrows.on(Sheet.of(places), fates.was, fates.found)
+    sheet = Sheet.of([_with_room(shown, arrows.ends(view)) for shown, view in zip(places, views, strict=True)])
+    _draw_fates(sheet, views, fates, arrows.on_another(sheet))
     _mark_trees(sheet, Trees.along(views[0].axes[0], map, everything))
     sheet.panels[-1].set_xlabel(f"{views[0].labels[0]} (m)" + ("" if up_in_map is not None else ", vertical not told"))
     sheet.title(f"Found: {len(fates.found)} of {match.n_query} fruits seen again", _about(match))
@@ -97,8 +103,13 @@ def _centred(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return points - points.mean(axis=0) if len(points) else points
 
 
-def _draw_fates(sheet: Sheet, views: tuple[Projection, Projection], fates: Fates) -> None:
-    arrows = Arrows.on(sheet, fates.was, fates.found)
+def _with_room(places: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Add tips of arrows, (M, 2), to what a panel shows, (N, 2); one pair that is wrong shall not empty the panel."""
+    least, most = places.min(axis=0, initial=np.inf), places.max(axis=0, initial=-np.inf)
+    return np.concatenate([places, np.clip(ends, least - ROOM_M, most + ROOM_M)])
+
+
+def _draw_fates(sheet: Sheet, views: tuple[Projection, Projection], fates: Fates, arrows: Arrows) -> None:
     kinds = ((fates.was, FOUND), (fates.new, NEW), (fates.missed, MISSED), (fates.elsewhere, ELSEWHERE))
     for axes, view in zip(sheet.panels, views, strict=True):
         for above, (positions, kind) in enumerate(kinds):

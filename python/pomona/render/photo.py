@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pomona.render.surfaces import Surface
     from pomona.synth.row_geometry import RowGeometry
 
-__all__ = ["BLENDER_PYTHON", "GPU_SAMPLES", "PathTracer"]
+__all__ = ["BLENDER_PYTHON", "GPU_SAMPLES", "INSTALL", "PathTracer"]
 
 SCRIPT = Path(__file__).with_name("blender_script") / "render_job.py"
 
@@ -42,6 +42,9 @@ GPU_SAMPLES = 16
 
 NO_BLENDER = 3
 """Exit code of the script when Blender's module cannot be loaded."""
+
+INSTALL = "pip install bpy==5.0.1"
+"""What brings Blender's module, of the version that the extra `render` names."""
 
 TOLD = "pomona pair "
 """What the script prints before the number of a pair that is done."""
@@ -214,7 +217,7 @@ def _reason(code: int, log: str) -> str:
     if code != NO_BLENDER:
         return f"Blender: ended with {code}: {last}"
     if "bpy" in last:
-        return "photo-real pictures need Blender's module bpy, which is not installed: pip install bpy"
+        return f"photo-real pictures need Blender's module bpy, which is not installed: {INSTALL}"
     return f"photo-real pictures need a library of the system for bpy: {last}"
 
 

@@ -51,7 +51,7 @@ def read_tiling(text: str) -> Tiling:
         return None
     sides = re.fullmatch(r"([1-9]\d?)x([1-9]\d?)", "1x1" if text == "off" else text)
     if sides is None:
-        raise PomonaError(f"tiles: found {text!r}, expected auto, off, or columns x rows, as 3x2")
+        raise PomonaError(f"tiles: found {text!r}, expected auto, off, or columns x rows, 1 to 99 each, as 3x2")
     return int(sides[1]), int(sides[2])
 
 

@@ -18,7 +18,7 @@ from pomona.synth.seasons.place_errors import drifted, ray_covariances
 from pomona.synth.seasons.visibility import shown_shares
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from datetime import date
 
     from numpy.typing import NDArray
@@ -87,8 +87,17 @@ class Season:
     visits: tuple[SeasonVisit, ...]
 
 
-def draw_season(plan: SeasonPlan, seed: int) -> Season:
+def draw_season(
+    plan: SeasonPlan, seed: int, *, tell: Callable[[int, int], None] = lambda _done, _total: None
+) -> Season:
     """Draw a season; the same plan and seed give the same.
+
+    Parameters
+    ----------
+    plan : SeasonPlan
+    seed : int
+    tell : callable
+        Told how many visits are drawn, and of how many.
 
     Raises
     ------
@@ -96,7 +105,12 @@ def draw_season(plan: SeasonPlan, seed: int) -> Season:
         When the seed is negative, or a tree has no room for its fruits.
     """
     row = grow(plan.design, seed)
-    return Season(plan, seed, row, tuple(visits_of(plan, seed, row)))
+    tell(0, plan.n_visits)
+    visits = []
+    for visit in visits_of(plan, seed, row):
+        visits.append(visit)
+        tell(len(visits), plan.n_visits)
+    return Season(plan, seed, row, tuple(visits))
 
 
 def visits_of(plan: SeasonPlan, seed: int, row: LivingRow) -> Iterator[SeasonVisit]:
