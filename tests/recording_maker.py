@@ -1,6 +1,7 @@
 """Small recording folders with known fruits, and the same folders broken in one place."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -23,14 +24,19 @@ def write_depth(path: Path, depth_m: NDArray[np.float32]) -> None:
 
 
 def make_recording(
-    folder: Path, steps_m: tuple[float, ...] = (0.0,), *, ids: bool = True, poses: bool | None = None
+    folder: Path,
+    steps_m: tuple[float, ...] = (0.0,),
+    *,
+    ids: bool = True,
+    poses: bool | None = None,
+    fruits: Mapping[str, Sphere] = FRUITS,
 ) -> Path:
     """Make a folder with one frame for each step of the camera to the right, in a session whose frame is the first."""
     (folder / "depth").mkdir(parents=True)
     (folder / "calibration.json").write_text(json.dumps(FIELDS))
     lines = [HEADER if ids else HEADER.removesuffix(",id")]
     for frame, step_m in enumerate(steps_m):
-        seen = {name: moved(sphere, -step_m) for name, sphere in FRUITS.items()}
+        seen = {name: moved(sphere, -step_m) for name, sphere in fruits.items()}
         write_depth(folder / "depth" / f"{frame:04d}.png", picture(list(seen.values())))
         for name, sphere in seen.items():
             corners = ",".join(f"{edge:.3f}" for edge in box_of(sphere))

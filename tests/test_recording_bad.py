@@ -141,6 +141,12 @@ def test_what_says_nothing_is_let_through(tmp_path, frames):
     check_sides(open_recording(write_folder(tmp_path / "row", frames)))
 
 
+def test_pictures_of_three_pixels_say_nothing(tmp_path):
+    row = write_folder(tmp_path / "row", [(leaves(1)[:3, :3], leaves(2)[:3, :3])] * 3)
+    write_calibration(row, width=3, height=3, fx=3.0, fy=3.0, cx=1.5, cy=1.5)
+    check_sides(open_recording(row))
+
+
 def test_sides_are_found_out_beside_frames_that_cannot_be_read(tmp_path):
     row = write_folder(tmp_path / "row", pairs(5, swapped=True))
     for number in (0, 1, 2, 3):

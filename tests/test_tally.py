@@ -25,9 +25,9 @@ def test_every_box_and_every_track_has_one_fate():
     joined = np.array([0, -1, -1, 1, 0, 1, -1, 2])
     fruits = np.array([0, -1, -1, -1, 0, -1, -1, -1])
     is_believed, by_views = np.array([True, False, False]), np.array([True, True, False])
-    tracks = track_fates(4, is_believed, by_views, 1)
+    tracks = track_fates(4, is_believed, by_views, np.zeros(3, bool), 1)
     assert +tracks == {TrackFate.FRUIT: 1, TrackFate.JOINED: 1, TrackFate.LEAVES: 1, TrackFate.FEW_VIEWS: 1}
-    tally = Tally.of(looks, fruits, first, joined, tracks)
+    tally = Tally.of(looks, fruits, first, joined, tracks, np.zeros(3, bool))
     assert tally.boxes == {
         BoxFate.FRUIT: 2,  # of them one whose own depth was refused
         Refusal.CUT: 1,
@@ -36,6 +36,15 @@ def test_every_box_and_every_track_has_one_fate():
         BoxFate.SECOND: 1,
     }
     assert (tally + tally).boxes.total() == 16
+
+
+def test_what_is_behind_is_neither_a_fruit_nor_none():
+    looks, rows = [one_look(0, 4, {})], np.arange(4)
+    is_behind = np.array([False, True, True, False])
+    tracks = track_fates(4, np.array([True, True, True, False]), np.ones(4, bool), is_behind, 1)
+    assert +tracks == {TrackFate.FRUIT: 1, TrackFate.BEHIND: 2, TrackFate.LEAVES: 1}
+    tally = Tally.of(looks, np.array([0, -1, -1, -1]), rows, rows, tracks, is_behind)
+    assert tally.boxes == {BoxFate.FRUIT: 1, BoxFate.BEHIND: 2, BoxFate.NO_FRUIT: 1}
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ class Scan:
     looks : mapping
         All that looking at one frame depends on, JSON values.
     choices : mapping
-        Where poses and identities come from: `odometry`, `slam`, `retrack`.
+        Where poses and identities come from, and which rows count: `odometry`, `slam`, `retrack`, `all_rows`.
     config : mapping
         Values of the core's tables that differ from the defaults.
     every : int
@@ -109,6 +109,7 @@ def scan(
     odometry: bool = False,
     slam: bool = False,
     retrack: bool = False,
+    all_rows: bool = False,
     every: int = 1,
     first: int | None = None,
     last: int | None = None,
@@ -142,6 +143,8 @@ def scan(
     odometry, slam, retrack : bool
         Find poses although there are some, by the pictures, or by the fruits in all frames too; track boxes although
         they have ids.
+    all_rows : bool
+        Keep the fruits of rows behind the one that is scanned, where boxes are tracked.
     every, first, last : int, optional
         Take one of so many frames, from one frame number to another.
     keep : str or Path, optional
@@ -179,6 +182,7 @@ def scan(
         odometry=odometry,
         slam=slam,
         retrack=retrack,
+        all_rows=all_rows,
         every=every,
         first=first,
         last=last,
@@ -203,6 +207,7 @@ def prepared(
     odometry: bool,
     slam: bool,
     retrack: bool,
+    all_rows: bool,
     every: int,
     first: int | None,
     last: int | None,
@@ -226,9 +231,8 @@ def prepared(
     looks = {"detector": boxes.configuration, "depth": depth}
     kept = None if keep is None else Kept(keep, {**_made_from(taken, boxes), **looks})
     check_sides(taken)
-    return Scan(
-        taken, boxes, looks, {"odometry": odometry, "slam": slam, "retrack": retrack}, config, every, kept, crops
-    )
+    choices = {"odometry": odometry, "slam": slam, "retrack": retrack, "all_rows": all_rows}
+    return Scan(taken, boxes, looks, choices, config, every, kept, crops)
 
 
 def _boxes_given(detections: object) -> Path | Detector | None:

@@ -92,6 +92,10 @@ def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
         lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
+    if left_out := found["tracks"].get("behind", 0):
+        lines.append(
+            f"  left out {amount(left_out, 'fruit')} in rows behind the one that was scanned: --all-rows keeps them"
+        )
     if not found["n_fruits"]:
         lines.append("  no fruit was found: there is nothing to add to a map")
     return [

@@ -15,6 +15,7 @@ from pomona.survey.believing import Believing
 from pomona.survey.best_shots import BestShots
 from pomona.survey.pose_source import PoseSource
 from pomona.survey.registration import Fruits
+from pomona.survey.rows_behind import rows_behind
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of, places_of
 from pomona.survey.tally import Tally, TrackFate, often_enough, track_fates
@@ -109,6 +110,8 @@ class OpenPart:
         Tells which tracks are fruits.
     with_crops : bool
         Whether to keep a small picture of each fruit.
+    all_rows : bool
+        Whether tracked fruits of rows behind the one that is scanned are fruits too.
     """
 
     def __init__(
@@ -119,9 +122,11 @@ class OpenPart:
         believing: Believing,
         *,
         with_crops: bool = True,
+        all_rows: bool = False,
     ) -> None:
         self._number, self._began, self._open_tracker, self._believing = number, began, open_tracker, believing
         self._tracker, self._with_crops, self._shots = open_tracker(), with_crops, BestShots()
+        self._all_rows = all_rows
         self._looks: list[Look] = []
         self._times_s: list[float] = []
         self._seen: Counter[str | int] = Counter()
@@ -174,7 +179,7 @@ class OpenPart:
 
     def continued(self, poses: NDArray[np.float64], other: OpenPart, other_poses: NDArray[np.float64]) -> OpenPart:
         """Give this part with the later frames of another one, whose poses are in the same frame of reference."""
-        joined = OpenPart(self._number, self._began, self._open_tracker, self._believing)
+        joined = OpenPart(self._number, self._began, self._open_tracker, self._believing, all_rows=self._all_rows)
         joined._shots = self._shots.with_those_of(other._shots)
         for part, known in ((self, poses), (other, other_poses)):
             for look, time_s, pose in zip(part._looks, part._times_s, known, strict=True):
@@ -188,12 +193,14 @@ class OpenPart:
         first = joined = owners = self._named() if tracks is None else self._tracked(tracks)
         frames = [look.frame for look in self._looks]
         probability = frames_in_view = None
+        is_behind = np.zeros(0, bool)
         if tracks is not None:
             # Fragments of one fruit that drift kept apart come together once poses and places are refined.
             tracks = _joined(tracks, _Measured.of(sightings, owners), poses)
             joined = self._tracked(tracks)
             belief = self._believing(tracks, self._looks, poses)
-            rows, frames_in_view = np.flatnonzero(belief.is_believed), belief.frames_in_view
+            is_behind = self._behind(tracks, belief.is_believed, poses)
+            rows, frames_in_view = np.flatnonzero(belief.is_believed & ~is_behind), belief.frames_in_view
             owners, probability = self._tracked(tracks.select(rows)), belief.probability[rows]
         measured = _Measured.of(sightings, owners)
         cloud, row_of = (
@@ -206,12 +213,21 @@ class OpenPart:
         fates = Counter({TrackFate.FRUIT: len(cloud), TrackFate.NO_PLACE: len(owners.names) - len(cloud)})
         if tracks is not None:
             seen = often_enough(self._believing, tracks, self._looks, poses)
-            fates = track_fates(len(first.names), belief.is_believed, seen, len(cloud))
+            fates = track_fates(len(first.names), belief.is_believed, seen, is_behind, len(cloud))
         trajectory = Trajectory(np.array(frames, np.int64), np.array(self._times_s), poses)
         boxes = _boxes(self._looks, row_of[owners.fruits])
-        tally = Tally.of(self._looks, boxes.fruits, first.fruits, joined.fruits, fates)
+        tally = Tally.of(self._looks, boxes.fruits, first.fruits, joined.fruits, fates, is_behind)
         crops = self._shots.crops(boxes.frames, boxes.fruits)
         return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally, crops)
+
+    def _behind(self, tracks: Tracks, is_fruit: NDArray[np.bool_], poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which of the tracks that are fruits hang in a row behind, (N,)."""
+        is_behind = np.zeros(len(tracks), bool)
+        if not self._all_rows:
+            fruits = tracks.select(np.flatnonzero(is_fruit))
+            frames = np.searchsorted([look.frame for look in self._looks], fruits.frames)
+            is_behind[is_fruit] = rows_behind(fruits.centres, frames, fruits.fruits, poses)
+        return is_behind
 
     def _owners(self) -> _Owners:
         return self._named() if self._tracker is None else self._tracked(self._tracker.finish(min_views=1))

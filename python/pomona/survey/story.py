@@ -117,6 +117,7 @@ def scan(
     odometry: bool = False,
     slam: bool = False,
     retrack: bool = False,
+    all_rows: bool = False,
     crops: bool = True,
     config: Mapping[str, Any] | None = None,
     keep: Kept | None = None,
@@ -140,6 +141,8 @@ def scan(
         recording has some; loops are closed.
     retrack : bool
         Track the boxes even where they have ids.
+    all_rows : bool
+        Keep the fruits of rows behind the one that is scanned, where boxes are tracked.
     crops : bool
         Keep a small picture of each fruit, of a recording with colour.
     config : mapping, optional
@@ -173,7 +176,7 @@ def scan(
         camera = pose_source_of(recording, odometry=odometry, config=config)
     # In a single frame nothing can be seen twice: each box is a fruit.
     named = len(recording) == 1 or (not retrack and bool(getattr(detector, "with_ids", False)))
-    findings = _Findings(partial(_open_part, recording, None if named else config or {}, crops))
+    findings = _Findings(partial(_open_part, recording, None if named else config or {}, crops, all_rows))
     frames = prefetched(recording.frames(), (*seeing.needs, *camera.needs))
     with closing(frames), ThreadPoolExecutor(1, "pomona-look") as looker:
         for done, (frame, look) in enumerate(looked_ahead(frames, look_at, looker), start=1):
@@ -203,7 +206,7 @@ def _placed(camera: PoseSource, frame: Frame) -> Place:
 
 
 def _open_part(
-    recording: Recording, config: Mapping[str, Any] | None, crops: bool, number: int, began: str | None
+    recording: Recording, config: Mapping[str, Any] | None, crops: bool, all_rows: bool, number: int, began: str | None
 ) -> OpenPart:
     """Open a part whose boxes are tracked, or, without a configuration, go by their names."""
 
@@ -211,7 +214,7 @@ def _open_part(
         return None if config is None else Tracker(recording.calibration, config)
 
     believing = Believing(recording.calibration, config or {})
-    return OpenPart(number, began, open_tracker, believing, with_crops=crops)
+    return OpenPart(number, began, open_tracker, believing, with_crops=crops, all_rows=all_rows)
 
 
 class _Findings:

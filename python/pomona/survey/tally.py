@@ -42,6 +42,7 @@ class BoxFate(StrEnum):
     FRUIT = "of a fruit"
     NO_TRACK = "of no track"
     SECOND = "second box of a fruit in its frame"
+    BEHIND = "of a fruit in a row behind"
     NO_FRUIT = "of a track that is no fruit"
     SKIPPED = "in a skipped frame"
 
@@ -50,6 +51,7 @@ class TrackFate(StrEnum):
     """What became of a track."""
 
     FRUIT = "a fruit"
+    BEHIND = "in a row behind the one that was scanned"
     JOINED = "joined with another, the same fruit"
     FEW_VIEWS = "seen in too few frames"
     LEAVES = "coloured as leaves are, or larger than fruits"
@@ -70,6 +72,7 @@ ADVICE = {
     Refusal.CUT: "check that the boxes are of these pictures, in their pixels",
     Refusal.NO_DEPTH: "check the depth pictures and depth_unit_m with `pomona info`",
     Refusal.UNMATCHED: "check calibration, left and right with `pomona info --check`",
+    TrackFate.BEHIND: "--all-rows counts them too",
     TrackFate.FEW_VIEWS: "film slower, take every frame, or lower tracking.min_views",
     TrackFate.LEAVES: "check that the boxes are around fruits, with --preview",
     TrackFate.NO_PLACE: "check calibration, left and right with `pomona info --check`",
@@ -103,7 +106,15 @@ class Tally:
         return Tally(self.boxes + other.boxes, self.tracks + other.tracks, self.frames + other.frames)
 
     @classmethod
-    def of(cls, looks: Sequence[Look], fruits: Rows, first: Rows, joined: Rows, tracks: Counter[TrackFate]) -> Tally:
+    def of(
+        cls,
+        looks: Sequence[Look],
+        fruits: Rows,
+        first: Rows,
+        joined: Rows,
+        tracks: Counter[TrackFate],
+        is_behind: NDArray[np.bool_],
+    ) -> Tally:
         """Count the boxes of some frames.
 
         Parameters
@@ -114,8 +125,11 @@ class Tally:
             Row of the fruit of each box, of its track, and of what the track was joined to; -1 for none.
         tracks : Counter of TrackFate
             What became of the tracks.
+        is_behind : (N,) bool
+            Which of the joined tracks are in a row behind.
         """
         codes = np.full(len(fruits), _CODES[BoxFate.NO_FRUIT])
+        codes[np.isin(joined, np.flatnonzero(is_behind))] = _CODES[BoxFate.BEHIND]
         codes[joined < 0] = _CODES[BoxFate.SECOND]
         codes[first < 0] = _CODES[BoxFate.NO_TRACK]
         offset = 0
@@ -135,7 +149,11 @@ def _frame_fate(look: Look) -> FrameFate:
 
 
 def track_fates(
-    n_found: int, is_believed: NDArray[np.bool_], by_views: NDArray[np.bool_], n_fruits: int
+    n_found: int,
+    is_believed: NDArray[np.bool_],
+    by_views: NDArray[np.bool_],
+    is_behind: NDArray[np.bool_],
+    n_fruits: int,
 ) -> Counter[TrackFate]:
     """Count what became of tracks.
 
@@ -145,18 +163,21 @@ def track_fates(
         Tracks, before those of one fruit were joined.
     is_believed, by_views : (N,) bool
         Whether each of those that are left is believed to be a fruit, and whether it is seen often enough for one.
+    is_behind : (N,) bool
+        Whether each of the believed is in a row behind.
     n_fruits : int
-        Those of the believed that have a place.
+        Those of the other believed that have a place.
     """
-    n_believed = int(is_believed.sum())
+    n_believed, n_behind = int(is_believed.sum()), int(is_behind.sum())
     n_few = int((~is_believed & ~by_views).sum())
     return Counter(
         {
             TrackFate.FRUIT: n_fruits,
+            TrackFate.BEHIND: n_behind,
             TrackFate.JOINED: n_found - len(is_believed),
             TrackFate.FEW_VIEWS: n_few,
             TrackFate.LEAVES: len(is_believed) - n_believed - n_few,
-            TrackFate.NO_PLACE: n_believed - n_fruits,
+            TrackFate.NO_PLACE: n_believed - n_behind - n_fruits,
         }
     )
 

@@ -1,8 +1,8 @@
 //! Seeds laid on all fruits that lie to each other as theirs do, where no index knows them.
 //!
-//! The index holds sets of fruits that are next to each other. After a harvest few hang next to each other that did before, and a
-//! visit that shows little is as sparse: four neighbours there have others between them in the other visit, which has no seed of
-//! the four. So seeds of the sparser visit are laid on all fruits of the denser one, which shows all four of some.
+//! The index holds sets of fruits that are next to each other. After a harvest few hang next to each other that did before: four
+//! neighbours have others between them in the map, which has no seed of the four. So seeds of such a query are laid on all fruits of
+//! the map, which shows all four of some.
 
 use super::case::{SEED_SIGMA, Search};
 use super::contender::Contender;
@@ -15,10 +15,10 @@ use crate::neighbours::tree::single;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Spacing of one visit over that of the other from which on it is the sparser one: half of the fruits.
+/// Spacing of the query over that of the map from which on it is sparser: half of the fruits.
 const SPARSER: f64 = 1.25;
 
-/// Seeds times fruits of the denser visit that are tried, and seeds at the most: one takes a microsecond or two a fruit.
+/// Seeds times fruits of the map that are tried, and seeds at the most: one takes a microsecond or two a fruit.
 const TRIED: usize = 50_000;
 const MOST: usize = 48;
 
@@ -26,29 +26,14 @@ const MOST: usize = 48;
 const LEAST: f64 = 10.0;
 
 impl Search<'_> {
-    /// Poses of seeds of the sparser visit, and what they cost; none where both are as dense or the scale is free.
+    /// Poses that lay seeds of a query that is sparser than the map on all its fruits, and what they cost; none where it is not, or
+    /// the scale is free.
     pub(super) fn congruent(&self) -> (Vec<Contender>, Effort) {
-        let Self { query, map, model, .. } = *self;
-        if model.scale != Scale::Metric {
-            return (Vec::new(), Effort::default());
-        }
-        if query.spacing > SPARSER * map.spacing {
-            return self.seeds_on_all();
-        }
-        if map.spacing < SPARSER * query.spacing {
-            return (Vec::new(), Effort::default());
-        }
-        let vertical = model.vertical.map(|vertical| vertical.exchanged());
-        let exchanged = Self { query: map, map: query, model: Model { vertical, ..model }, ..*self };
-        let (found, effort) = exchanged.seeds_on_all();
-        let back = |one: Contender| Contender { pose: one.pose.inverse(), place: one.pose.image(&one.place), ..one };
-        (found.into_iter().map(back).collect(), effort)
-    }
-
-    /// Poses that lay seeds of a sparse query on fruits of the map.
-    fn seeds_on_all(&self) -> (Vec<Contender>, Effort) {
         let Self { query, map, .. } = *self;
-        // The denser visit says what noise is usual: where few fruits are left, how far they hang apart says nothing of it.
+        if self.model.scale != Scale::Metric || query.spacing < SPARSER * map.spacing {
+            return (Vec::new(), Effort::default());
+        }
+        // The map says what noise is usual: where few fruits are left, how far they hang apart says nothing of it.
         let sigma = self.model.sigma.min(SEED_SIGMA * map.spacing);
         let (model, most) = (Model { sigma, ..self.model }, 2.0 * (WITHIN * sigma).powi(2));
         // The shortest: how many fours lie alike by chance grows with the fourth power of their length.

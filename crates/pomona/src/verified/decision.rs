@@ -5,11 +5,11 @@ use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::contender::{Contender, by_evidence, distinct};
 use super::doubts::RIVAL_CANDIDATES;
 use super::growth::{grow, hold, lay};
-use super::hypothesis::{Hypothesis, Model, refined};
+use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
 use super::offsets;
 use super::proposal::Effort;
-use super::search::{FIRST_FRUITS, REACH, of_some_fruits};
+use super::search::{FIRST_FRUITS, of_some_fruits};
 use super::seeds::Seed;
 use super::settlement::SELDOM;
 use super::soft;
@@ -52,7 +52,10 @@ pub(super) const CLEAR: f64 = 2.0;
 /// wires lie on others.
 const BELIEVED: f64 = 0.75;
 
-/// Candidates of seeds of the sparser visit that are refined.
+/// Poses that a search by seeds has to have grown before one can stand out: fewer do not say what chance reaches.
+const SHOWN: usize = 4;
+
+/// Candidates of seeds of a sparse query that are refined.
 const LAID_SPARSE: usize = 64;
 
 /// Fruits of the query that no finding explains, where others are looked for: fewer are hardly found anywhere.
@@ -122,22 +125,21 @@ impl<'a> Search<'a> {
         }
         if findings.accepted.is_empty() {
             findings.others.extend(self.upside_down_poses());
-            self.accept_outlier(&mut findings, f64::NEG_INFINITY);
+            if findings.others.len() >= SHOWN {
+                self.accept_outlier(&mut findings, f64::NEG_INFINITY);
+            }
         }
         best_first(&mut findings.accepted);
         findings
     }
 
-    /// Lays seeds of the sparser visit on all fruits of the other, where the index has none of them.
+    /// Lays seeds of a sparse query on all fruits of the map, where its index has none of them.
     fn lay_sparse_seeds(&self, findings: &mut Findings<'a>) {
         let (mut candidates, effort) = self.congruent();
         findings.log.effort = findings.log.effort + effort;
         candidates.sort_unstable_by(by_evidence);
         let best = distinct(self.query, self.map.spacing, &candidates, LAID_SPARSE);
-        let starts: Vec<_> = best.iter().map(|one| (one.pose, one.place)).collect();
-        // As far as the sparser visit has as many fruits as a region is weighed by.
-        let reach = REACH * self.query.spacing.max(self.map.spacing);
-        let hypotheses = refined([self.query, self.map], &self.model, reach, &starts);
+        let hypotheses = self.refined(&best);
         findings.log.refined += hypotheses.len();
         self.grow_distinct(&hypotheses, findings);
         self.sift(findings);

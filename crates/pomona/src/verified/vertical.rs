@@ -24,11 +24,6 @@ impl Vertical {
         self.query
     }
 
-    /// The same where the map is the query and the query the map.
-    pub(super) fn exchanged(&self) -> Self {
-        Self { query: self.map, map: self.query }
-    }
-
     /// The same where the query is upside down.
     pub(crate) fn inverted(&self) -> Self {
         Self { query: -self.query, map: self.map }

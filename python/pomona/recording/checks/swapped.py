@@ -73,7 +73,7 @@ def check_sides(recording: Recording) -> None:
 
 
 def _is_same(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bool:
-    if left.shape != right.shape:
+    if left.shape != right.shape or left.shape[1] <= SAME_PX:
         return False
     grey = left.astype(np.float32)
     moved = np.abs(grey[:, SAME_PX:] - grey[:, :-SAME_PX]).mean()
