@@ -59,7 +59,7 @@ def test_an_expected_pose_saves_the_search_and_changes_nothing_of_what_is_found(
         expected[:3, 3] += searched.map_from_query[:3, :3] @ middle - expected[:3, :3] @ middle + off_m
         found = match_expected(query, map, expected)
         np.testing.assert_array_equal(found.pairs, searched.pairs)
-        # Another seed ends in the same pose but for its last digits, and beliefs end where they change by less than 1e-5.
+        # Another seed ends in the same pose but for its last digits, and beliefs end where they change by 1e-5.
         np.testing.assert_allclose(found.probabilities, searched.probabilities, atol=2e-6)
     aside = searched.map_from_query + np.pad([[2.0], [2.0], [0.0]], ((0, 1), (3, 0)))
     assert not match_expected(query, map, aside)
