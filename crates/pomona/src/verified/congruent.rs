@@ -25,6 +25,9 @@ const MOST: usize = 48;
 /// Length of a seed in standard deviations of the noise, at the least.
 const LEAST: f64 = 10.0;
 
+/// And in spacings of the map, at the most: a few fruits strewn over a long row would be laid on all of it for minutes.
+const LONGEST: f64 = 6.0;
+
 impl Search<'_> {
     /// Poses that lay seeds of a query that is sparser than the map on all its fruits, and what they cost; none where it is not, or
     /// the scale is free.
@@ -38,6 +41,7 @@ impl Search<'_> {
         let (model, most) = (Model { sigma, ..self.model }, 2.0 * (WITHIN * sigma).powi(2));
         // The shortest: how many fours lie alike by chance grows with the fourth power of their length.
         let mut seeds = enumerate(query, COMPANIONS, LEAST * sigma);
+        seeds.retain(|(_, code)| f64::from(code[0]) < LONGEST * map.spacing);
         seeds.sort_unstable_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
         seeds.truncate((TRIED / map.len()).clamp(1, MOST));
         let of_seed = |&(quad, _): &Seed| {
