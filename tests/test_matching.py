@@ -199,6 +199,22 @@ def test_a_planting_that_meets_itself_everywhere_is_not_found(seed: int) -> None
     assert match.status in ("NoMatch", "Ambiguous")
 
 
+def shells(seed: int) -> NDArray[np.float64]:
+    """Three in four fruits of four round crowns of citrus, which bear in the outermost 17 cm."""
+    random = np.random.default_rng(seed)
+    outwards = random.normal(size=(800, 3))
+    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    middles = np.repeat(3.5 * np.arange(4), 200)[:, None] * [1.0, 0.0, 0.0]
+    fruits = middles + 1.4 * outwards * random.uniform(0.88, 1.0, (800, 1))
+    return fruits[random.random(800) > 0.25] + random.normal(0.0, 0.01, 3)
+
+
+@pytest.mark.parametrize("seed", [5, 16, 23])
+def test_crowns_that_bear_on_their_outside_are_not_found_in_others(seed: int) -> None:
+    """A curved sheet that is turned lies on itself, and strangers are as dense there as the sheet is thin."""
+    assert pomona.match(shells(2 * seed), shells(2 * seed + 1), up=UP).status == "NoMatch"
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_moved_copy_is_found(method: str) -> None:
     fruits = row()

@@ -11,16 +11,16 @@ use nalgebra::{Matrix3, Vector3};
 /// meets strangers within its thickness. A kernel that is wider than the wall would spread them to where none are, so it
 /// is as flat as the cloud around; and where that is not as thin as what they hang on, the cloud moved along itself shows it.
 pub(super) fn local_density(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64, floor: f64) -> Vec<f64> {
-    let flatness = flatness(points, neighbours, spacing);
+    let sheets = sheets(points, neighbours, spacing);
     let density = each_row(points.len(), |row| {
-        let kernels = KERNELS.map(|width| Kernel::new(width * spacing, &flatness[row]));
+        let kernels = KERNELS.map(|width| Kernel::new(width * spacing, &sheets[row].flatness));
         let from = |&other: &u32| {
             let apart = points[other as usize] - points[row];
             kernels.iter().map(|kernel| kernel.at(&apart)).sum::<f64>()
         };
         neighbours.of(row).iter().map(from).sum::<f64>() / KERNELS.len() as f64 + floor
     });
-    let times = denser(points, neighbours, spacing, &density);
+    let times = denser(points, neighbours, spacing, &sheets, &density);
     density.iter().map(|density| density * times).collect()
 }
 
@@ -51,12 +51,31 @@ impl Kernel {
     }
 }
 
-/// How flat the cloud is around each fruit: the inverse covariance of a fruit's neighbours, less that of their longest
-/// extent, so that it is zero where fruits hang alike in all directions.
+/// What a cloud looks like around a fruit.
+pub(super) struct Sheet {
+    /// Inverse covariance of the fruits around, less that of their longest extent: zero where they hang alike in all directions.
+    flatness: Matrix3<f64>,
+    /// The way in which they extend least.
+    pub(super) normal: Vector3<f64>,
+}
+
+impl Sheet {
+    fn of(covariance: Matrix3<f64>) -> Self {
+        let found = covariance.symmetric_eigen();
+        let longest = found.eigenvalues.max();
+        let flat = found.eigenvalues.map(|extent| 1.0 / extent - 1.0 / longest);
+        Self {
+            flatness: found.eigenvectors * Matrix3::from_diagonal(&flat) * found.eigenvectors.transpose(),
+            normal: found.eigenvectors.column(found.eigenvalues.imin()).into_owned(),
+        }
+    }
+}
+
+/// The sheet around each fruit, from its neighbours and theirs.
 ///
 /// A dozen fruits are flat by chance, so one that hangs alike in all directions, a spacing away, is added to those seen: the
 /// weakest inverse-Wishart prior that has a mean. And noise gives some thickness to a wall that has none.
-fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Vec<Matrix3<f64>> {
+fn sheets(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Vec<Sheet> {
     let around = |row: usize| {
         let near = neighbours.of(row);
         let count = near.len().max(1) as f64;
@@ -76,9 +95,7 @@ fn flatness(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> V
         let near = neighbours.of(row);
         let covariance =
             near.iter().map(|&other| of_each[other as usize]).sum::<Matrix3<f64>>() / near.len().max(1) as f64;
-        let covariance = (covariance * seen + round) / (seen + 1.0) + noise;
-        let longest = covariance.symmetric_eigenvalues().max();
-        covariance.try_inverse().map_or(Matrix3::zeros(), |inverse| inverse - Matrix3::identity() / longest)
+        Sheet::of((covariance * seen + round) / (seen + 1.0) + noise)
     };
     each_row(points.len(), shape)
 }
