@@ -4,14 +4,13 @@
 //! neighbours have others between them in the map, which has no seed of the four. So seeds of such a query are laid on all fruits of
 //! the map, which shows all four of some.
 
-use super::case::{SEED_SIGMA, Search};
-use super::contender::Contender;
+use super::case::{Findings, SEED_SIGMA, Search};
+use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::Model;
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
 use super::seeds::{COMPANIONS, Quad, STARS, Seed, WITHIN, enumerate};
 use crate::geometry::Scale;
-use crate::neighbours::tree::single;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -28,10 +27,28 @@ const LEAST: f64 = 10.0;
 /// And in spacings of the map, at the most: a few fruits strewn over a long row would be laid on all of it for minutes.
 const LONGEST: f64 = 6.0;
 
-impl Search<'_> {
+/// Candidates of seeds of a sparse query that are refined.
+const LAID_SPARSE: usize = 64;
+
+impl<'a> Search<'a> {
+    /// Lays seeds of a sparse query on all fruits of the map, where its index has none of them.
+    pub(super) fn lay_sparse_seeds(&self, findings: &mut Findings<'a>) {
+        let (mut candidates, effort) = self.congruent();
+        findings.log.effort = findings.log.effort + effort;
+        candidates.sort_unstable_by(by_evidence);
+        let best = distinct(self.query, self.map.spacing, &candidates, LAID_SPARSE);
+        let hypotheses = self.refined(&best);
+        findings.log.refined += hypotheses.len();
+        self.grow_distinct(&hypotheses, findings);
+        self.sift(findings);
+        if !findings.accepted.is_empty() {
+            self.doubt(findings, &candidates);
+        }
+    }
+
     /// Poses that lay seeds of a query that is sparser than the map on all its fruits, and what they cost; none where it is not, or
     /// the scale is free.
-    pub(super) fn congruent(&self) -> (Vec<Contender>, Effort) {
+    fn congruent(&self) -> (Vec<Contender>, Effort) {
         let Self { query, map, .. } = *self;
         if self.model.scale != Scale::Metric || query.spacing < SPARSER * map.spacing {
             return (Vec::new(), Effort::default());
@@ -63,24 +80,34 @@ impl Search<'_> {
 
 /// Calls `take` with every four fruits of a cloud whose distances differ from those of `fruits` by less than `within`.
 fn each_alike(fruits: &[Vector3<f64>; STARS], cloud: &Landscape, within: f64, take: &mut impl FnMut(Quad)) {
+    // A and B are the farthest apart, so all four lie within that of A.
+    let reach = (fruits[0] - fruits[1]).norm() + within;
+    for a in 0..cloud.len() as u32 {
+        let near = cloud.within(&cloud.points[a as usize], reach);
+        each_alike_among(fruits, cloud, [&[a], &near, &near, &near], within, take);
+    }
+}
+
+/// The same of four fruits one of which is of each list.
+pub(super) fn each_alike_among(
+    fruits: &[Vector3<f64>; STARS],
+    cloud: &Landscape,
+    lists: [&[u32]; STARS],
+    within: f64,
+    take: &mut impl FnMut(Quad),
+) {
     let apart = |one: usize, other: usize| (fruits[one] - fruits[other]).norm();
     let place = |row: u32| cloud.points[row as usize];
     let alike = |one: usize, other: usize, rows: [u32; 2]| {
         let [here, there] = rows.map(place);
-        ((here - there).norm() - apart(one, other)).abs() < within
+        rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < within
     };
-    // A and B are the farthest apart, so all four lie within that of A.
-    let reach = apart(0, 1) + within;
-    let mut near = Vec::new();
-    for a in 0..cloud.len() as u32 {
-        near.clear();
-        cloud.tree.within(&single(&place(a)), reach as f32, |row, _| near.push(row));
-        near.sort_unstable();
-        let at = |star: usize| near.iter().copied().filter(move |&row| row != a && alike(0, star, [a, row]));
-        let (of_c, of_d): (Vec<u32>, Vec<u32>) = (at(2).collect(), at(3).collect());
-        for b in at(1) {
-            for &c in of_c.iter().filter(|&&c| c != b && alike(1, 2, [b, c])) {
-                for &d in of_d.iter().filter(|&&d| d != b && d != c && alike(1, 3, [b, d]) && alike(2, 3, [c, d])) {
+    for &a in lists[0] {
+        let of = |star: usize| lists[star].iter().copied().filter(move |&row| alike(0, star, [a, row]));
+        let (of_c, of_d): (Vec<u32>, Vec<u32>) = (of(2).collect(), of(3).collect());
+        for b in of(1) {
+            for &c in of_c.iter().filter(|&&c| alike(1, 2, [b, c])) {
+                for &d in of_d.iter().filter(|&&d| alike(1, 3, [b, d]) && alike(2, 3, [c, d])) {
                     take([a, b, c, d]);
                 }
             }

@@ -1,25 +1,21 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::{KEPT, VerifiedConfig, outlying};
+use super::acceptance::{KEPT, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
-use super::contender::{Contender, by_evidence, distinct};
+use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
-use super::growth::{grow, hold, lay};
+use super::growth::{grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
-use super::offsets;
 use super::proposal::Effort;
 use super::search::{FIRST_FRUITS, of_some_fruits};
 use super::seeds::Seed;
-use super::settlement::SELDOM;
-use super::soft;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
 use crate::matching::Request;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Fruits below which there is no answer: a seed of four and one that speaks for it.
 pub(super) const MIN_FRUITS: usize = 5;
@@ -33,33 +29,12 @@ pub(super) const RIVAL_SEED: f64 = 0.3;
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
 
-/// Evidence, in nats, that a row laid along a row has to be held: strangers have 5 to 16 there, true poses 27 and more.
-const LEAST_LAID: f64 = 10.0;
-
-/// Evidence, in nats, that chance is taken to reach wherever rows are laid along rows, however few other poses a search shows:
-/// the best wrong ones of crowns and hedges have 17 in the median, more than those of seeds.
-const REACHED_LAID: f64 = 17.0;
-
-/// A row laid along a row of which less than this share is found, of what the map can show of it, is a stranger: half of what is
-/// assumed. Strangers show up to 0.12, true poses 0.13 and more, 0.24 in the median where a fruit in ten is in common.
-const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
-
 /// Rows found with less than this many times the evidence needed are laid along rows too, for of few fruits in common seeds show a
 /// part; and may be no more than what the planting gives to wrong poses.
 pub(super) const CLEAR: f64 = 2.0;
 
-/// Mean probability of the pairs of a further part, at the least: 0.9 and more where it is one, 0.5 to 0.65 where fruits on shells or
-/// wires lie on others.
-const BELIEVED: f64 = 0.75;
-
 /// Poses that a search by seeds has to have grown before one can stand out: fewer do not say what chance reaches.
 const SHOWN: usize = 4;
-
-/// Candidates of seeds of a sparse query that are refined.
-const LAID_SPARSE: usize = 64;
-
-/// Fruits of the query that no finding explains, where others are looked for: fewer are hardly found anywhere.
-const LEAST_REST: usize = 12;
 
 /// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
 pub(super) const SURE: f64 = 6.0;
@@ -133,50 +108,6 @@ impl<'a> Search<'a> {
         findings
     }
 
-    /// Lays seeds of a sparse query on all fruits of the map, where its index has none of them.
-    fn lay_sparse_seeds(&self, findings: &mut Findings<'a>) {
-        let (mut candidates, effort) = self.congruent();
-        findings.log.effort = findings.log.effort + effort;
-        candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, LAID_SPARSE);
-        let hypotheses = self.refined(&best);
-        findings.log.refined += hypotheses.len();
-        self.grow_distinct(&hypotheses, findings);
-        self.sift(findings);
-        if !findings.accepted.is_empty() {
-            self.doubt(findings, &candidates);
-        }
-    }
-
-    /// Looks for further parts of a row that is torn apart, or rivals, where fruits of the query lie that no finding explains: the
-    /// search ended with the first answer, which leaves weaker ones behind.
-    fn look_at_the_rest(&self, findings: &mut Findings<'a>) {
-        loop {
-            let rest: Vec<bool> =
-                (0..self.query.len()).map(|row| !findings.accepted.iter().any(|found| found.has(row))).collect();
-            if findings.accepted.is_empty() || rest.iter().filter(|rest| **rest).count() < LEAST_REST {
-                return;
-            }
-            let mut more = Findings::none(Effort::default(), findings.log.threshold);
-            for (mut seeds, keep) in self.rounds() {
-                seeds.retain(|(quad, _)| quad.iter().all(|&row| rest[row as usize]));
-                self.try_seeds(&seeds, keep, &mut more);
-                self.sift(&mut more);
-                if !more.accepted.is_empty() {
-                    break;
-                }
-            }
-            more.accepted.retain(|one| {
-                self.believed(one) > BELIEVED
-                    && !findings.accepted.iter().any(|found| self.shows(&found.overlap, &one.overlap))
-            });
-            if more.accepted.is_empty() {
-                return;
-            }
-            findings.accepted.append(&mut more.accepted);
-        }
-    }
-
     /// Poses that are upside down, where the vertical is known: chance finds as many as upright ones, and they are wrong for sure.
     fn upside_down_poses(&self) -> Vec<Finding<'a>> {
         let Some(inverted) = self.upside_down() else { return Vec::new() };
@@ -219,7 +150,7 @@ impl<'a> Search<'a> {
     }
 
     /// Looks for rivals of what was found, and for better optima near it.
-    fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
+    pub(super) fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
         self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
         if findings.log.seeds < FIRST_FRUITS {
@@ -236,7 +167,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tells findings with enough evidence, grown and settled, from the others.
-    fn sift(&self, findings: &mut Findings<'a>) {
+    pub(super) fn sift(&self, findings: &mut Findings<'a>) {
         for mut finding in std::mem::take(&mut findings.accepted) {
             if !self.is_pose(&finding) {
                 continue;
@@ -248,7 +179,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a finding is a whole pose: it stands as a known vertical asks, and its turns are fixed.
-    fn is_pose(&self, finding: &Finding) -> bool {
+    pub(super) fn is_pose(&self, finding: &Finding) -> bool {
         self.model.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
     }
 
@@ -272,50 +203,5 @@ impl<'a> Search<'a> {
         let best = enough.map(|finding| finding.seed.log_odds).fold(0.0, f64::max);
         seed.log_odds >= RIVAL_SEED * best
             && !accepted.iter().any(|finding| self.explains(finding, &seed.place, &seed.pose))
-    }
-
-    /// Asks the offsets of all fruits, where too few are in common for any seed.
-    ///
-    /// Rows that lie on rows, as most turns that a known vertical leaves lay them, meet more than the threshold allows for. How
-    /// much more the other poses of this search show: the answer must stand out of them.
-    fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
-        let few = offsets::few_again(self.map, &self.model);
-        let hypotheses = offsets::hypotheses(self.query, self.map, &few);
-        log.refined += hypotheses.len();
-        if hypotheses.first().is_none_or(|best| best.log_odds < LEAST_LAID) {
-            return;
-        }
-        let laid = |seed: &Hypothesis| {
-            Finding::new(lay(self.query, self.map, seed, &Model { sigma: seed.sigma, ..few }), *seed)
-        };
-        let mut laid: Vec<Finding> = hypotheses.par_iter().map(laid).collect();
-        log.grown += laid.len();
-        laid.retain(|finding| self.is_pose(finding));
-        let least = outlying(self.config.false_alarm_rate, REACHED_LAID);
-        let answer = self.single_out(&mut laid, f64::NEG_INFINITY, KEPT.laid, log);
-        let Some(answer) = answer.filter(|answer| answer.overlap.log_odds > least) else {
-            return;
-        };
-        let answer = self.laid_again(&answer, &few);
-        // Visits to one side are laid along each other by as many nats more as chance may have, and paired worse so.
-        let says_more = accepted.iter().all(|found| answer.evidence() > found.evidence() + SELDOM);
-        // Rows that lie on each other all along and show few of the fruits that they then should have in common are strangers.
-        if says_more && answer.share_of_row() > LEAST_AGAIN {
-            accepted.push(answer);
-            others.extend(laid);
-        }
-    }
-
-    /// An answer laid once more, as holding everywhere, under the noise that suits the pull best: the nearest fruits, which it
-    /// was found by, are often strangers.
-    fn laid_again(&self, found: &Finding, few: &Model) -> Finding<'a> {
-        let sigma = soft::sharpest(self.query, self.map, few, &[found.overlap.pose]);
-        let seed = Hypothesis { pose: found.overlap.pose, sigma, ..found.seed };
-        let mut growth = lay(self.query, self.map, &seed, &Model { sigma, ..*few });
-        growth.whole = true;
-        let mut again = Finding::new(growth, seed);
-        again.overlap.log_odds = again.overlap.log_odds.max(found.overlap.log_odds);
-        self.settle(&mut again);
-        again
     }
 }

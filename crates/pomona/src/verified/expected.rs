@@ -7,16 +7,16 @@
 
 use super::acceptance::VerifiedConfig;
 use super::case::{Search, VerifiedMap};
+use super::congruent::each_alike_among;
 use super::contender::{Contender, by_evidence, distinct};
 use super::decision::{MIN_FRUITS, SURE};
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
-use super::seeds::{Quad, SHORTEST, STARS, Seed, WITHIN};
+use super::seeds::{SHORTEST, Seed, WITHIN};
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
-use nalgebra::Vector3;
 
 /// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
 const FRUITS: usize = 128;
@@ -67,25 +67,10 @@ impl Search<'_> {
         let near = fruits.map(|fruit| self.map.within(&expected.image(&fruit), self.map.spacing));
         let most = 2.0 * (WITHIN * self.model.sigma).powi(2);
         let effort = &mut Effort::default();
-        self.each_alike(&fruits, &near, &mut |target| found.extend(proposer.contender(&target, most, effort)));
-    }
-
-    /// Calls `take` with four fruits of the map, one of each list, that lie to each other as those of the query do.
-    fn each_alike(&self, fruits: &[Vector3<f64>; STARS], near: &[Vec<u32>; STARS], take: &mut impl FnMut(Quad)) {
-        let apart = |one: usize, other: usize| (fruits[one] - fruits[other]).norm();
-        let place = |row: u32| self.map.points[row as usize];
-        let alike = |one: usize, other: usize, rows: [u32; 2]| {
-            let [here, there] = rows.map(place);
-            rows[0] != rows[1] && ((here - there).norm() - apart(one, other)).abs() < WITHIN * self.model.sigma
-        };
-        for &a in &near[0] {
-            for &b in near[1].iter().filter(|&&b| alike(0, 1, [a, b])) {
-                for &c in near[2].iter().filter(|&&c| alike(0, 2, [a, c]) && alike(1, 2, [b, c])) {
-                    let fits = |d: u32| alike(0, 3, [a, d]) && alike(1, 3, [b, d]) && alike(2, 3, [c, d]);
-                    near[3].iter().filter(|&&d| fits(d)).for_each(|&d| take([a, b, c, d]));
-                }
-            }
-        }
+        let lists = near.each_ref().map(Vec::as_slice);
+        each_alike_among(&fruits, self.map, lists, WITHIN * self.model.sigma, &mut |target| {
+            found.extend(proposer.contender(&target, most, effort));
+        });
     }
 }
 
@@ -95,7 +80,7 @@ mod tests {
     use crate::cloud::FruitCloud;
     use crate::config::Config;
     use crate::verified::fixture::visits;
-    use nalgebra::Rotation3;
+    use nalgebra::{Rotation3, Vector3};
 
     fn asked(query: &FruitCloud, map: &FruitCloud, expected: &Similarity) -> Match {
         let [ready, prepared] = [query, map].map(VerifiedMap::without_seeds);

@@ -10,7 +10,7 @@
 //!    fruit is predicted without its own partner (`evidence`), and are twice those of any other pose (`doubts`); or when it
 //!    stands out of all others of the search (`outlier`).
 //! 5. Where no constellation survives, for the noise or for want of fruits in common, the offsets of all fruits of two rows are
-//!    counted under the turns that their axes leave (`offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
+//!    counted under the turns that their axes leave (`laid`, `offsets`, `votes`, `axes`). All fruits at once pull such a pose into place
 //!    (`soft`), and each counts as far as the other visit can have seen it (`sight`).
 //! 6. What is reported is settled: the noise from distances alone (`scatter`) and which way it points from the pairs
 //!    (`direction`), one-to-one pairs with probabilities (`pairing`) and patches fitted to them, in turns (`settlement`).
@@ -39,6 +39,7 @@ mod fixture;
 mod footing;
 mod growth;
 mod hypothesis;
+mod laid;
 mod landscape;
 mod layers;
 mod moved;
@@ -49,6 +50,7 @@ mod pairing;
 mod parts;
 mod patches;
 mod proposal;
+mod rest;
 mod scatter;
 mod search;
 mod seeds;
