@@ -81,6 +81,29 @@ def test_of_a_row_in_one_piece_all_lies_by_one_pose() -> None:
     assert np.array_equal(laid.positions, query.transformed(answer.map_from_query).positions)
 
 
+def young_trees(seed: int) -> list[np.ndarray]:
+    """Two visits to eight trees of a dozen to two dozen fruits, 2.5 m apart, each of which leans by a centimetre between them."""
+    rng = np.random.default_rng(seed)
+    crowns = [rng.normal(0, [0.2, 0.2, 0.32], (rng.integers(12, 25), 3)) + [2.5 * tree, 0, 1.5] for tree in range(8)]
+    rng = np.random.default_rng([seed, 1])
+    fruits = np.vstack(crowns)
+    visits = []
+    for leans_m in (0.0, 0.012):
+        seen = fruits[rng.random(len(fruits)) > 0.3]
+        tree = np.clip(np.round(seen[:, 0] / 2.5).astype(int), 0, 7)
+        visits.append(seen + rng.normal(0, 0.014, seen.shape) + rng.normal(0, leans_m, (8, 3))[tree])
+    return visits
+
+
+@pytest.mark.parametrize("seed", [35, 50, 61, 67])
+def test_trees_that_stand_apart_and_hardly_moved_are_one_part(seed: int) -> None:
+    """The first tree that is found has enough evidence alone; the others are found beyond the gaps, from it or on their own."""
+    first, second = young_trees(seed)
+    answer = match(second, first)
+    assert answer.n_parts == 1
+    np.testing.assert_allclose(answer.map_from_query, np.eye(4), atol=0.05)
+
+
 def test_what_was_not_found_lies_nowhere() -> None:
     query = seen(1, is_torn=False)[0]
     answer = match(query, scene_pair("base", seed=4).map)

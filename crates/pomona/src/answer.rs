@@ -61,7 +61,31 @@ pub struct Match {
     pub stages: Vec<(&'static str, f64)>,
 }
 
+impl Registration {
+    fn exchanged(self) -> Self {
+        Self { map_from_query: self.map_from_query.inverse(), ..self }
+    }
+}
+
 impl Match {
+    /// The same answer where query and map, both in metres, change places.
+    pub(crate) fn exchanged(self) -> Self {
+        let all = |some: Vec<Registration>| some.into_iter().map(Registration::exchanged).collect();
+        let mut pairs = self.pairs;
+        for pair in &mut pairs {
+            std::mem::swap(&mut pair.query, &mut pair.map);
+        }
+        pairs.sort_unstable_by_key(|pair| pair.query);
+        Self {
+            registration: self.registration.map(Registration::exchanged),
+            further: all(self.further),
+            alternatives: all(self.alternatives),
+            pairs,
+            stages: [("exchanged", 1.0)].into_iter().chain(self.stages).collect(),
+            ..self
+        }
+    }
+
     /// A result without a registration.
     pub(crate) fn without_answer(verdict: Verdict, stages: Vec<(&'static str, f64)>) -> Self {
         Self {

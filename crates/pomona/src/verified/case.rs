@@ -30,9 +30,12 @@ pub(crate) struct VerifiedMap {
 
 impl VerifiedMap {
     pub(crate) fn new(map: &FruitCloud, scale: Scale) -> Self {
-        let landscape = Landscape::new(map);
+        Self::of(Landscape::new(map), scale)
+    }
+
+    pub(super) fn of(landscape: Landscape, scale: Scale) -> Self {
         let seeds = SeedIndex::new(&landscape, scale, SHORTEST * SEED_SIGMA * landscape.spacing);
-        Self { landscape, seeds, scale, fruits: map.len() }
+        Self { fruits: landscape.len(), landscape, seeds, scale }
     }
 
     /// Where no seeds are looked up, as poses are proposed.
@@ -122,9 +125,9 @@ impl Finding<'_> {
     }
 }
 
-/// Most evidence first.
+/// Most evidence first: as it grew or as it stands in the end.
 pub(super) fn best_first(findings: &mut [Finding]) {
-    findings.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
+    findings.sort_by(|a, b| b.rated().nats.total_cmp(&a.rated().nats));
 }
 
 #[derive(Clone, Copy)]

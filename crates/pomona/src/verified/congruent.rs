@@ -14,8 +14,13 @@ use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Spacing of the query over that of the map from which on it is sparser: half of the fruits.
+/// Spacing of a visit over that of another from which on it is sparser: half of the fruits.
 const SPARSER: f64 = 1.25;
+
+/// Whether one of two clouds in metres is sparser than the other.
+pub(super) fn is_sparser(one: &Landscape, other: &Landscape, scale: Scale) -> bool {
+    scale == Scale::Metric && one.spacing > SPARSER * other.spacing
+}
 
 /// Seeds times fruits of the map that are tried, and seeds at the most: one takes a microsecond or two a fruit.
 const TRIED: usize = 50_000;
@@ -50,7 +55,7 @@ impl<'a> Search<'a> {
     /// the scale is free.
     fn congruent(&self) -> (Vec<Contender>, Effort) {
         let Self { query, map, .. } = *self;
-        if self.model.scale != Scale::Metric || query.spacing < SPARSER * map.spacing {
+        if !is_sparser(query, map, self.model.scale) {
             return (Vec::new(), Effort::default());
         }
         // The map says what noise is usual: where few fruits are left, how far they hang apart says nothing of it.

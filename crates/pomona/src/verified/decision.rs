@@ -2,6 +2,7 @@
 
 use super::acceptance::{KEPT, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
+use super::congruent::is_sparser;
 use super::contender::Contender;
 use super::doubts::RIVAL_CANDIDATES;
 use super::growth::{grow, hold};
@@ -13,7 +14,7 @@ use super::seeds::Seed;
 use super::vertical::Vertical;
 use crate::answer::{Match, Verdict};
 use crate::cloud::FruitCloud;
-use crate::geometry::Similarity;
+use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 use nalgebra::Vector3;
 
@@ -25,6 +26,9 @@ pub(crate) const MAX_FRUITS: usize = 300_000;
 
 /// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
 pub(super) const RIVAL_SEED: f64 = 0.3;
+
+/// Fruits of the map for one of the query, at the most, where the map is looked for in the query, too: nine in ten were picked.
+const EXCHANGED: usize = 10;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
@@ -46,7 +50,22 @@ pub(crate) fn search(map: &VerifiedMap, query: &FruitCloud, request: &Request, c
     if query.len().min(search.map.len()) < MIN_FRUITS {
         return Match::too_few();
     }
-    search.answer_of(search.run())
+    let answer = search.answer_of(search.run());
+    let (scale, most) = (search.model.scale, EXCHANGED * query.len());
+    let unlike = is_sparser(search.map, &query, scale) || is_sparser(&query, search.map, scale);
+    if answer.verdict == Verdict::NoMatch && unlike && search.map.len() <= most {
+        exchanged(map, query, request, config)
+    } else {
+        answer
+    }
+}
+
+/// Finds the map in the query: of two visits one of which was picked, seeds of the one are not found where those of the other are.
+fn exchanged(map: &VerifiedMap, query: Landscape, request: &Request, config: &VerifiedConfig) -> Match {
+    let prepared = VerifiedMap::of(query, Scale::Metric);
+    let request = Request { up: request.up.map(|[query, map]| [map, query]), ..*request };
+    let search = Search::new(&prepared, &map.landscape, &request, config);
+    search.answer_of(search.run()).exchanged()
 }
 
 /// Pairs of two clouds whose pose is known: the final stage alone.

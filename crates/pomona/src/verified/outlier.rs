@@ -5,7 +5,7 @@
 //! tell: the threshold does not know what rows on rows meet.
 
 use super::acceptance::outlying;
-use super::case::{Finding, Log, Search, best_first};
+use super::case::{Finding, Log, Search};
 use super::contender::first_of_each;
 
 /// Evidence, in nats, that chance is taken to reach in any search: the best wrong poses of small frames have 15 in the median,
@@ -25,7 +25,7 @@ impl<'a> Search<'a> {
         kept: [f64; 2],
         log: &mut Log,
     ) -> Option<Finding<'a>> {
-        best_first(others);
+        others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let distinct = self.distinct(others);
         distinct.first().filter(|&&best| self.model.admits(&others[best].overlap.pose))?;
         let rate = self.config.false_alarm_rate;

@@ -4,58 +4,93 @@
 //! pairs are those of all parts, the pose is that of the part with most evidence.
 
 use super::case::{Finding, Search};
+use super::decision::MIN_FRUITS;
 use super::settlement::{Settled, settle_together};
-use crate::beliefs::Beliefs;
 use std::collections::HashMap;
 
 /// Share of its pairs that the answer may exclude of a part. Of 145 parts of torn rows one has more, .27, and three in four .04 at the
 /// most; wrong poses on wires have .31 to .43, a second tree that looks the same .6 and more.
 const EXCLUDED: f64 = 0.25;
 
+/// Findings that together are one answer.
+struct Joined {
+    parts: Vec<usize>,
+    /// Findings that contradict them.
+    others: Vec<usize>,
+    /// The parts as they stand together; none where there is one.
+    settled: Vec<Settled>,
+    /// Pairs that are expected.
+    pairs: f64,
+}
+
 impl Search<'_> {
     /// Joins the best finding with those that do not contradict it, and these with each other; the others stay behind it.
     ///
-    /// They are settled together: a fruit has one partner at most, and which part it belongs to is told by how many around it find
-    /// partners there. That is kept where more pairs are expected than of the best alone.
+    /// The best is the one with most evidence as it stands in the end, or as it grew: a row that is torn may bend to one pose beyond the
+    /// gap, and a tree grows to more than another that the whole row is found from. What expects more pairs is the answer.
     pub(super) fn join(&self, accepted: &mut Vec<Finding>) {
-        let mut parts: Vec<Finding> = Vec::new();
-        let mut others = Vec::new();
-        for finding in accepted.drain(..) {
-            let is_part = parts.is_empty() || contradicted(&finding, &parts) < EXCLUDED;
-            (if is_part { &mut parts } else { &mut others }).push(finding);
+        if accepted.len() < 2 {
+            return;
         }
-        let together = self.settled_together(&parts);
-        let mut parts = parts.into_iter();
-        if let Some(mut best) = parts.next() {
-            match together {
-                Some((settled, further)) => (best.settled, best.further) = (Some(settled), further),
-                None => others.splice(..0, parts).for_each(drop),
-            }
-            accepted.push(best);
+        let mut orders: [Vec<usize>; 2] = std::array::from_fn(|_| (0..accepted.len()).collect());
+        orders[1].sort_by(|&a, &b| accepted[b].overlap.log_odds.total_cmp(&accepted[a].overlap.log_odds));
+        let different = if orders[0] == orders[1] { 1 } else { 2 };
+        let joined = orders[..different].iter().map(|order| self.joined(accepted, order));
+        let Some(joined) = joined.reduce(|one, other| if other.pairs > one.pairs { other } else { one }) else {
+            return;
+        };
+        let Joined { parts, others, mut settled, .. } = joined;
+        let first =
+            (0..settled.len()).max_by(|&a, &b| settled[a].evidence.total_cmp(&settled[b].evidence)).unwrap_or(0);
+        let mut findings: Vec<Option<Finding>> = accepted.drain(..).map(Some).collect();
+        // The answer of all parts says what each of them says.
+        accepted.extend([parts[first]].iter().chain(&others).filter_map(|&at| findings[at].take()));
+        if let (Some(best), false) = (accepted.first_mut(), settled.is_empty()) {
+            (best.settled, best.further) = (Some(settled.remove(first)), settled);
         }
-        accepted.append(&mut others);
     }
 
-    /// The first part and the further ones, where all of them together expect more pairs than the first alone.
-    fn settled_together(&self, parts: &[Finding]) -> Option<(Settled, Vec<Settled>)> {
-        let settled: Vec<&Settled> = parts.iter().filter_map(|part| part.settled.as_ref()).collect();
-        if settled.len() < 2 {
-            return None;
+    /// The first in this `order` with those that do not contradict it and add pairs.
+    fn joined(&self, findings: &[Finding], order: &[usize]) -> Joined {
+        let mut joined = Joined { parts: Vec::new(), others: Vec::new(), settled: Vec::new(), pairs: 0.0 };
+        for &at in order {
+            let finding = &findings[at];
+            if joined.parts.is_empty() {
+                joined.parts.push(at);
+                joined.pairs = expected(finding.settled.iter());
+            } else if contradicted(finding, joined.parts.iter().map(|&part| &findings[part])) >= EXCLUDED {
+                joined.others.push(at);
+            } else {
+                let settled = self.settled_together(joined.parts.iter().chain([&at]).map(|&part| &findings[part]));
+                let pairs = expected(settled.iter());
+                // What adds less says of other fruits what the parts say.
+                if pairs > joined.pairs + MIN_FRUITS as f64 {
+                    joined.parts.push(at);
+                    (joined.settled, joined.pairs) = (settled, pairs);
+                }
+            }
         }
+        joined
+    }
+
+    /// Parts settled together: a fruit has one partner at most, and which part it belongs to is told by how many around it find
+    /// partners there.
+    fn settled_together<'b>(&self, parts: impl Iterator<Item = &'b Finding<'b>>) -> Vec<Settled> {
         let growths: Vec<_> =
-            parts.iter().zip(&settled).map(|(part, settled)| (&part.growth, settled.direction.as_expected())).collect();
-        let mut together = settle_together(&growths, self.noise_m);
-        let expected = |beliefs: &Beliefs| beliefs.probabilities.iter().sum::<f64>();
-        let all: f64 = together.iter().map(|part| expected(&part.beliefs)).sum();
-        let further = together.split_off(1);
-        together.pop().filter(|_| all > expected(&settled[0].beliefs)).map(|first| (first, further))
+            parts.filter_map(|part| Some((&part.growth, part.settled.as_ref()?.direction.as_expected()))).collect();
+        settle_together(&growths, self.noise_m)
     }
 }
 
+/// Pairs that are expected of parts that stand together.
+fn expected<'b>(parts: impl Iterator<Item = &'b Settled>) -> f64 {
+    parts.flat_map(|settled| &settled.beliefs.probabilities).sum()
+}
+
 /// Share of the pairs of a finding that those of others exclude: they have one of the two fruits with another.
-fn contradicted(finding: &Finding, others: &[Finding]) -> f64 {
+fn contradicted<'b>(finding: &Finding, others: impl Iterator<Item = &'b Finding<'b>>) -> f64 {
     let (mut of_query, mut of_map, mut of_both) = (HashMap::new(), HashMap::new(), HashMap::new());
-    for (edge, probability) in others.iter().flat_map(Finding::links) {
+    for (edge, probability) in others.flat_map(Finding::links) {
         *of_query.entry(edge.query).or_insert(0.0) += probability;
         *of_map.entry(edge.map).or_insert(0.0) += probability;
         *of_both.entry((edge.query, edge.map)).or_insert(0.0) += probability;
