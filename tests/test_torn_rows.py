@@ -82,9 +82,9 @@ def test_of_a_row_in_one_piece_all_lies_by_one_pose() -> None:
 
 
 def young_trees(seed: int) -> list[np.ndarray]:
-    """Two visits to eight trees of a dozen to two dozen fruits, 2.5 m apart, each of which leans by a centimetre between them."""
+    """Two visits to eight trees of a dozen to two dozen fruits, 2.5 m apart, each of which leans by a centimetre."""
     rng = np.random.default_rng(seed)
-    crowns = [rng.normal(0, [0.2, 0.2, 0.32], (rng.integers(12, 25), 3)) + [2.5 * tree, 0, 1.5] for tree in range(8)]
+    crowns = [rng.normal([2.5 * tree, 0, 1.5], [0.2, 0.2, 0.32], (rng.integers(12, 25), 3)) for tree in range(8)]
     rng = np.random.default_rng([seed, 1])
     fruits = np.vstack(crowns)
     visits = []
@@ -97,7 +97,7 @@ def young_trees(seed: int) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("seed", [35, 50, 61, 67])
 def test_trees_that_stand_apart_and_hardly_moved_are_one_part(seed: int) -> None:
-    """The first tree that is found has enough evidence alone; the others are found beyond the gaps, from it or on their own."""
+    """The tree that is found first has enough evidence alone; the others are found beyond gaps, or on their own."""
     first, second = young_trees(seed)
     answer = match(second, first)
     assert answer.n_parts == 1
