@@ -3,8 +3,10 @@
 //! Growth goes from cell to neighbouring cell ([`super::growth`]) and ends where none has fruits. Beyond the gap the pose is known as
 //! well as the fruits before it say, and rows bend. So the fruits next beyond it are laid on the map as those before it say, and
 //! moved by as much as a row may have bent: the offsets to all fruits of the map around vote, the best are refined as seeds are. What
-//! then has more evidence than so many tries give to chance is reached, and growth goes on from there.
+//! then has more evidence than chance reaches in so many tries is reached, and growth goes on from there: a tree that was replaced is
+//! like others, and of many places beside it one suits it.
 
+use super::acceptance::reached;
 use super::cut::Cell;
 use super::doubts::BENT;
 use super::growth::{CONVINCING, Growth};
@@ -142,7 +144,7 @@ impl Growth<'_> {
         let bent = BENT * gap * start.scale;
         let width = WIDTH * sigma;
         let mut starts = vec![(start, place)];
-        let mut tries = 1.0;
+        let mut least = CONVINCING;
         if bent > 0.5 * width {
             let points: Vec<_> =
                 query.within(&place, reach).into_iter().map(|row| query.points[row as usize]).collect();
@@ -150,12 +152,12 @@ impl Growth<'_> {
             starts.extend(
                 offsets.into_iter().map(|by| (Similarity { translation: start.translation + by, ..start }, place)),
             );
-            tries = (2.0 * bent / width).powi(3);
+            least = reached(1.0, (2.0 * bent / width).powi(3), 1.0);
         }
         let model = Model { sigma: *sigma, ..*model };
         let found = *refined([query, map], &model, reach, &starts).first()?;
         let moved = (found.pose.image(&place) - start.image(&place)).norm();
-        let enough = found.log_odds > CONVINCING + tries.ln() && moved < bent + width;
+        let enough = found.log_odds > least && moved < bent + width;
         (enough && model.admits(&found.pose)).then_some(found)
     }
 
