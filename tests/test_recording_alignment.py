@@ -158,6 +158,28 @@ def test_right_pictures_of_other_frames_are_told(pomona, tmp_path: Path, frames:
     assert f"a frame {when}" in printed
 
 
+def along_the_baseline(folder: Path, n_alike: int) -> Recording:
+    """Steps as long as the baseline: each right picture is the next left one; `n_alike` rows show in more than one."""
+    rng = np.random.default_rng(3)
+    posts = cv2.GaussianBlur(rng.integers(0, 255, (n_alike, 800), np.uint8), (0, 0), 2)
+    seen = [cv2.GaussianBlur(rng.integers(0, 255, (180, 320), np.uint8), (0, 0), 2) for _ in range(13)]
+    for frame, picture in enumerate(seen):
+        picture[100 : 100 + n_alike] = posts[:, 12 * frame : 12 * frame + 320]
+    for side, first in (("left", 0), ("right", 1)):
+        (folder / side).mkdir(parents=True)
+        for frame in range(12):
+            cv2.imwrite(str(folder / side / f"{frame:04d}.png"), seen[frame + first])
+    numbers = {"width": 320, "height": 180, "fx": 210, "fy": 210, "cx": 160, "cy": 90, "baseline_m": 0.1}
+    (folder / "calibration.json").write_text(json.dumps(numbers))
+    return open_recording(folder)
+
+
+@pytest.mark.parametrize("n_alike", [4, 16, 20, 60])
+def test_steps_along_the_baseline_do_not_make_pictures_late(tmp_path: Path, n_alike: int) -> None:
+    found = alignment_of(along_the_baseline(tmp_path / "row", n_alike))
+    assert found is None or not found.is_off
+
+
 @pytest.mark.parametrize("name", ["rendered_row/2024-08-09", "rendered_row/2024-08-28", "kitti_stereo"])
 def test_real_pairs_are_of_one_time(shared_data: Path, name: str) -> None:
     found = alignment_of(open_recording(shared_data / name))

@@ -23,7 +23,7 @@ from pomona import _core
 from pomona.errors import PomonaWarning
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
-from pomona.recording.late_eye import frames_late
+from pomona.recording.late_eye import FEWEST, SURE_SHARE, frames_late
 from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.recording.row_corners import row_errors
@@ -49,9 +49,9 @@ BEYOND = 1.25
 AGREEING_PX, AGREEING_SHARE = 1.5, 1 / 3
 """Of corners that are sought everywhere, those of a pair that is one; of pictures of different places 1 in 10 agree."""
 
-AT_ONCE_WIDTHS, SURE_SHARE, SURE = 1 / 1280, 0.6, 40
-"""Of corners that are sought in their rows: how near they agree where both were taken at once, as which part
-of them and how many, so that nothing else is asked."""
+AT_ONCE_WIDTHS, LEAST_AT_ONCE_PX, SURE = 1 / 1280, 0.5, 40
+"""Of corners that are sought in their rows: how near they agree where both were taken at once, which is no nearer
+than a row is found to, and how many of them, so that nothing else is asked."""
 
 ON_SIDE = 1.5
 """Times as many corners that keep their column as corners that keep their row."""
@@ -130,11 +130,12 @@ def alignment_of(recording: Recording) -> Alignment | None:
     found = _corners(recording, rows, row_errors)
     if found is None:
         return None
-    agreeing = partial(_agreeing, centre_px=centre_px, within_px=AT_ONCE_WIDTHS * recording.calibration.width)
+    within_px = max(AT_ONCE_WIDTHS * recording.calibration.width, LEAST_AT_ONCE_PX)
+    agreeing = partial(_agreeing, centre_px=centre_px, within_px=within_px)
     n_agreeing = agreeing(found)
     if n_agreeing >= max(SURE, SURE_SHARE * len(found)):
         return _fitted(found, centre_px)
-    if late := frames_late(recording, rows, n_agreeing, agreeing):
+    if len(found) >= FEWEST and (late := frames_late(recording, rows, n_agreeing, agreeing)):
         return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, frames_late=late)
     anywhere = _corners(recording, rows, far_corners)
     return (None if anywhere is None else _beyond(anywhere, centre_px)) or _fitted(found, centre_px)
@@ -181,9 +182,12 @@ def _beyond(places: Array, centre_px: tuple[float, float]) -> Alignment | None:
 
 
 def _agreeing(corners: Array, centre_px: tuple[float, float], within_px: float = AGREEING_PX) -> int:
+    """Count corners that lie as one fit has them; of too few for a fit, those as much lower as most are."""
+    if not len(corners):
+        return 0
     fit = _fitted(corners, centre_px)
     if fit is None:
-        return 0
+        return int((np.abs(corners[:, 2] - np.median(corners[:, 2])) < within_px).sum())
     x, y = corners[:, 0] - centre_px[0], corners[:, 1] - centre_px[1]
     left_over = corners[:, 2] - fit.lower_px - fit.turned_rad * x - fit.stretch * y
     return int((np.abs(left_over) < within_px).sum())
