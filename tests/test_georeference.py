@@ -219,7 +219,8 @@ def test_fixes_along_the_way(orchard: Path, column: str) -> None:
 def test_layers_on_earth_follow_the_map(orchard: Path) -> None:
     assert run("map", "georeference", orchard, "--points", points_file(orchard), "--epsg", ZONE).returncode == 0
     places = OrchardMap(orchard).fruits().positions
-    more = np.vstack([places, [[6.4, 0.0, 2.0]]])
+    scattered = places + np.random.default_rng(1).normal(0, 0.005, places.shape)
+    more = np.vstack([scattered, [[6.4, 0.0, 2.0]]])
     assert add_session(orchard, Session("new", "2024-08-21", "drawn", FruitCloud(more))).is_added
     np.testing.assert_allclose(
         in_zone(orchard, "fruits_wgs84"), on_earth(OrchardMap(orchard).fruits().positions), atol=0.003

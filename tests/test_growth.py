@@ -356,7 +356,8 @@ def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:
 def test_sizes_that_were_copied_from_one_visit_to_the_next_can_be_told(tmp_path: Path) -> None:
     path = grow_row(tmp_path / "orchard.gpkg", (50,), n_trees=1).path
     fruits = OrchardMap(path).fruits()
-    again = FruitCloud(fruits.positions, diameters_m=fruits.diameters_m)
+    scattered = fruits.positions + np.random.default_rng(1).normal(0, 0.005, fruits.positions.shape)
+    again = FruitCloud(scattered, diameters_m=fruits.diameters_m)
     assert add_session(path, Session("again", "2024-07-01", "drawn", again)).is_added
     grown = grow_season(path)
     assert np.isfinite(grown.foretold.sizes_mm).all()

@@ -212,7 +212,8 @@ def test_what_visits_share_has_an_interval(
 def test_a_last_visit_without_sizes_is_told(pomona: Pomona, grown_row: GrownRow, tmp_path: Path) -> None:
     path = tmp_path / "o.gpkg"
     path.write_bytes(grown_row.path.read_bytes())
-    cloud = FruitCloud(OrchardMap(path).fruits().positions)
+    places = OrchardMap(path).fruits().positions
+    cloud = FruitCloud(places + np.random.default_rng(1).normal(0, 0.005, places.shape))
     assert add_session(path, Session("later", str(grown_row.day(99)), "drawn", cloud)).is_added
     code, printed, told = pomona("growth", path, "-o", tmp_path / "g")
     assert (code, told.count("\n")) == (0, 1)

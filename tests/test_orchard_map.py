@@ -1,6 +1,7 @@
 """Identities over visits: who keeps an id, who gets one, and what a map refuses."""
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,8 +25,13 @@ from pomona.synth.clouds import scene_pair
 
 
 def turned(cloud: FruitCloud, seed: int) -> FruitCloud:
-    """The cloud in a random other frame."""
-    return cloud.transformed(frame_of_its_own(np.random.default_rng(seed)))
+    """The cloud as another visit sees it: in a random other frame, its fruits scattered."""
+    rng = np.random.default_rng(seed)
+    return scattered(cloud.transformed(frame_of_its_own(rng)), rng)
+
+
+def scattered(cloud: FruitCloud, rng: np.random.Generator, scatter_m: float = 0.005) -> FruitCloud:
+    return replace(cloud, positions=cloud.positions + rng.normal(0, scatter_m, cloud.positions.shape))
 
 
 def visit(cloud: FruitCloud, date: str, **about: object) -> Session:
@@ -206,6 +212,46 @@ def test_a_session_is_added_once(grown: Path, scenes: list[FruitCloud]) -> None:
             add_session(grown, session)
         assert str(caught.value) == f"{grown}: {reason}"
     assert grown.read_bytes() == before
+
+
+def nameless_and_backwards(cloud: FruitCloud) -> FruitCloud:
+    return replace(cloud.select(np.arange(len(cloud))[::-1]), ids=None)
+
+
+COPIES: dict[str, Callable[[FruitCloud], FruitCloud]] = {
+    "in another order, without names": nameless_and_backwards,
+    "rounded to millimetres": lambda cloud: replace(cloud, positions=np.round(cloud.positions, 3)),
+    "five fruits fewer": lambda cloud: cloud.select(np.arange(5, len(cloud))),
+    "with numbers of views": lambda cloud: replace(cloud, n_views=np.full(len(cloud), 5)),
+    "in another frame": lambda cloud: cloud.transformed(frame_of_its_own(np.random.default_rng(2))),
+    "with sizes": lambda cloud: replace(cloud, diameters_m=np.full(len(cloud), 0.07)),
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_a_copy_of_a_visit_is_refused(grown: Path, scenes: list[FruitCloud], how: str) -> None:
+    before = grown.read_bytes()
+    with pytest.raises(PomonaError, match=r"session copy is in the map already, as 2024-09-01: .*\d of \d+ fruits lie"):
+        add_session(grown, visit(COPIES[how](scenes[1]), "2024-10-01", name="copy"))
+    assert grown.read_bytes() == before
+
+
+def test_the_same_fruits_in_another_order_are_the_same_session(grown: Path, scenes: list[FruitCloud]) -> None:
+    backwards = scenes[1].select(np.arange(len(scenes[1]))[::-1])
+    with pytest.raises(PomonaError, match="session copy is in the map already, as 2024-09-01: the same fruits"):
+        add_session(grown, visit(backwards, "2024-10-01", name="copy"))
+
+
+def test_fruits_that_grew_in_place_are_of_another_visit(tmp_path: Path, scenes: list[FruitCloud]) -> None:
+    path = tmp_path / "orchard.gpkg"
+    for month, diameter_m in ((8, 0.06), (9, 0.07)):
+        cloud = replace(scenes[0], diameters_m=np.full(len(scenes[0]), diameter_m))
+        assert add_session(path, visit(cloud, f"2024-{month:02d}-01")).is_added
+
+
+def test_a_visit_of_the_next_minute_is_another_one(grown: Path, scenes: list[FruitCloud]) -> None:
+    again = scattered(scenes[1], np.random.default_rng(5), scatter_m=0.001)
+    assert add_session(grown, visit(again, "2024-09-01T10:00:00")).is_added
 
 
 def test_another_session_of_the_same_name_is_told_from_the_same_one(grown: Path, scenes: list[FruitCloud]) -> None:

@@ -108,7 +108,8 @@ def test_what_people_added_stays(orchard: Path) -> None:
     connection.execute("UPDATE sqlite_sequence SET seq = 90 WHERE name = 'fruits'")
     connection.close()
     visit = next_visit(orchard)
-    stray = FruitCloud(np.vstack([visit.cloud.positions, [[40.0, 0.0, 0.0]]]))
+    scattered = visit.cloud.positions + np.random.default_rng(1).normal(0, 0.005, (len(visit.cloud), 3))
+    stray = FruitCloud(np.vstack([scattered, [[40.0, 0.0, 0.0]]]))
     added = add_session(orchard, Session("later", "2024-09-02", "test", stray))
     # The ids up to 90 were given out once, whoever has them now.
     assert added.fruit_ids.max() == 91

@@ -17,6 +17,7 @@ from pomona.orchard.added import Added
 from pomona.orchard.evidence import Evidence, new_visit
 from pomona.orchard.joining import Newcomer, join
 from pomona.orchard.mending import mended
+from pomona.orchard.near_copies import require_no_near_copy
 from pomona.orchard.recognising import recognised
 from pomona.orchard.removing import take_out
 from pomona.orchard.replacing import NotFoundError, holds, there_already
@@ -215,7 +216,9 @@ def _add_where_found(
     content = session.content_sha256
     if len(parts) == 1:
         session, parts = _in_one_piece(connection, session, parts[0], settings)
-    evidence, matches = matches_with_parts(parts, new_visit(session, content), settings)
+    visit = new_visit(session, content)
+    evidence, matches = matches_with_parts(parts, visit, settings)
+    require_no_near_copy(connection, session.name, visit, evidence, matches)
     first = parts[0].found.match
     return _join(connection, session, evidence, matches, Placement(settings, first.log_odds, first.noise_m), content)
 

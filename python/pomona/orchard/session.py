@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pomona import __version__
 from pomona.cloud import FruitCloud
@@ -100,10 +102,10 @@ class Session:
 
     @property
     def content_sha256(self) -> str:
-        """Hash of what was seen, whatever the session is called."""
+        """Hash of what was seen, whatever the session is called and in whatever order its fruits are."""
         digest = hashlib.sha256()
-        cloud = self.cloud
-        views = (None, None) if cloud.views is None else (cloud.views.frames, cloud.views.fruits)
+        cloud = self.cloud.select(_by_place(self.cloud))
+        views = () if cloud.views is None else np.unique((cloud.views.frames, cloud.views.fruits), axis=1)
         for array in (cloud.positions, cloud.diameters_m, cloud.covariances, cloud.n_views, *views):
             # The length in front keeps two different lists of arrays from running into the same bytes.
             content = b"" if array is None else array.tobytes()
@@ -120,6 +122,16 @@ class Session:
     def input_hashes_json(self) -> str:
         """The input hashes as the files hold them."""
         return _json("input_hashes", self.input_hashes)
+
+
+def _by_place(cloud: FruitCloud) -> NDArray[np.int64]:
+    """Return the rows of a cloud in an order that does not depend on theirs."""
+    n = len(cloud)
+    names = np.zeros(n, np.int64) if cloud.ids is None else np.unique(np.array(cloud.ids), return_inverse=True)[1]
+    columns = [cloud.positions, cloud.diameters_m, cloud.covariances, cloud.n_views, names]
+    known = [column for column in columns if column is not None]
+    table = np.concatenate([column.reshape(n, math.prod(column.shape[1:])) for column in known], axis=1)
+    return np.lexsort(table.T[::-1])
 
 
 def _require_kind(name: str, found: object, kind: Any, expected: str) -> None:
