@@ -1,6 +1,7 @@
 """Fruits of rows behind: left out of a row that is scanned, whatever the way of the camera, and nothing else is."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -95,6 +96,16 @@ def test_where_trees_are_missing_the_row_behind_is_no_nearer():
     assert is_behind.tolist() == (seen >= len(row)).tolist()
 
 
+def test_strays_in_a_narrow_alley_do_not_join_the_row_behind():
+    rng = np.random.default_rng(12)
+    strays = hung(rng, [(x, 0.95, 1.6) for x in (0.5, 3.5, 6.5)], per_tree=1)
+    row, behind = hung(rng, a_row()), hung(rng, a_row(1.9, -3, 11), per_tree=60)
+    seen, is_behind = filmed(rng, np.concatenate([row, strays, behind]), along())
+    is_row, hangs_behind = seen < len(row), seen >= len(row) + len(strays)
+    assert not is_behind[is_row].any()
+    assert is_behind[hangs_behind].all()
+
+
 def test_a_row_that_bends_has_no_row_behind_itself():
     rng = np.random.default_rng(7)
     turns = np.linspace(0, np.pi, 40)
@@ -143,7 +154,14 @@ def under_a_pergola():
     return [looking((x, 0, 0.8), (0, 0.3, 1)) for x in np.arange(0, 8, 0.2)]
 
 
+def vases(radius_m=1.5):
+    """Places on the rims of trees that are open within."""
+    turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    return [(x + radius_m * np.cos(t), radius_m * np.sin(t), 1.6) for x in (0, 4, 8) for t in turns]
+
+
 KEPT = {
+    "open vases": (vases(), along(3.0), {"per_tree": 4, "spread_m": (0.15, 0.15, 0.5)}),
     "between two rows": (a_row() + a_row(SPACING_M), between(), {}),
     "both rows, one after the other": (a_row() + a_row(SPACING_M), to_and_fro(), {}),
     "looking ahead": (a_row(0, 0, 16, 3.0) + a_row(SPACING_M, 0, 16, 3.0), ahead(), {}),
@@ -192,6 +210,18 @@ def test_a_scan_counts_its_row_and_says_what_it_left_out(run_here, two_rows, tmp
     found = json.loads(run_here("scan", two_rows, "-o", output, "--json").stdout)
     assert (found["n_fruits"], found["tracks"]) == (12, {"fruit": 12, "behind": 6})
     assert found["boxes"] == {"fruit": 96, "behind": 48}
+
+
+def test_a_dense_row_behind_a_sparse_one_is_told(run_here, tmp_path):
+    few = {f"row{x}": Sphere((0.13 * x - 0.3, 0.1 * (x % 2), 1.0)) for x in range(6)}
+    dense = {f"behind{x}{y}": Sphere((0.2 * x - 0.9, 0.2 * y - 0.7, 2.7)) for x in range(10) for y in range(8)}
+    recording = make_recording(tmp_path / "2024-08-09", STEPS_M, ids=False, fruits=few | dense)
+    done = run_here("scan", recording, "-o", tmp_path / "row.csv")
+    assert done.returncode == 0, done.stderr
+    assert re.search(
+        r"2024-08-09: \d+ of \d+ fruits hang 1\.8 m farther away than the others: a row behind", done.stderr
+    )
+    assert "farther away" not in run_here("scan", recording, "-o", tmp_path / "all.csv", "--all-rows").stderr
 
 
 def test_all_rows_are_counted_where_that_is_asked(run_here, two_rows, tmp_path):

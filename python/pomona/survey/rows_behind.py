@@ -1,7 +1,8 @@
 """Which fruits of a part hang in a row behind the one that is scanned: the detector takes large ones for its fruits.
 
 Fruits that hang together, each near to the next, are a stand: a row, or some of its trees. Between rows is an alley,
-where nothing hangs, so no stand has fruits of both. A stand is behind where the frames that come near to its fruits
+where nothing hangs, so no stand has fruits of both; where a few strays hang there all the same, two layers that are
+clearly apart are two stands. A stand is behind where the frames that come near to its fruits
 show a row an alley nearer to the camera's way. So it does not matter how a row bends, from how far or from which sides
 it is filmed, or what stands behind where a tree is missing; a row that the camera passes elsewhere is judged there.
 `docs/tracking.md` has the equations and figures.
@@ -12,7 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["rows_behind"]
+from pomona.survey.farther_layer import farther_layer
+
+__all__ = ["nearest_m", "rows_behind"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -25,6 +28,9 @@ SPACINGS = 3.0
 
 ROW_SHARE = 1 / 3
 """Of the fruits a metre of what is behind, from which on those before are a row, and not leaves taken for fruits."""
+
+STRAYS = 0.1
+"""Of the fruits of a layer, those that may hang less than an alley from the layer before it."""
 
 NEAREST_M = 0.1
 """Nearer to the way of the camera no fruit is seen."""
@@ -42,12 +48,11 @@ def rows_behind(centres: Array, frames: Rows, fruits: Rows, session_from_camera:
     session_from_camera : (F, 4, 4) float64
         Poses.
     """
-    stands = _stands(centres)
-    balance = np.zeros(stands.max(initial=0) + 1)
-    if len(balance) == 1:
-        return np.zeros(len(centres), bool)
     away_m = _from_way(centres, frames, fruits, session_from_camera[:, :3, 3])
-    is_near = _near_sightings(fruits, away_m, len(centres))
+    least_m = _least(fruits, away_m, len(centres))
+    stands = _in_layers(_stands(centres), centres, least_m)
+    balance = np.zeros(stands.max(initial=0) + 1)
+    is_near = away_m < least_m[fruits] + ALLEY_M
     for rows in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames)) + 1):
         shown, places = np.unique(stands[fruits[rows]], return_inverse=True)
         balance[shown] += np.bincount(places, weights=is_near[rows]) * _more_before(places, away_m[rows])
@@ -107,8 +112,28 @@ def _stands(centres: Array) -> Rows:
     return np.asarray(connected_components(near, directed=False)[1], np.int64)
 
 
-def _near_sightings(fruits: Rows, away_m: Array, n: int) -> NDArray[np.bool_]:
-    """Tell which sightings, (S,), are from where the camera was as near to its fruit, one of `n`, as ever."""
+def _in_layers(stands: Rows, centres: Array, least_m: Array) -> Rows:
+    """Part the stands whose fruits are in two layers, at these distances from the camera's way, but for a few strays."""
+    from scipy.spatial import cKDTree
+
+    parted = 2 * stands
+    for stand in range(stands.max(initial=-1) + 1):
+        rows = np.flatnonzero(stands == stand)
+        is_far = farther_layer(least_m[rows])
+        if is_far.any():
+            across_m = np.asarray(cKDTree(centres[rows[~is_far]]).query(centres[rows[is_far]])[0])
+            # Trees at the end of a row that the camera saw from far alone have the others of the row beside them.
+            parted[rows] += is_far & bool((across_m < ALLEY_M).mean() <= STRAYS)
+    return np.asarray(np.unique(parted, return_inverse=True)[1], np.int64)
+
+
+def nearest_m(centres: Array, frames: Rows, fruits: Rows, session_from_camera: Array) -> Array:
+    """Give how near the camera's way came to each fruit while it was seen, (N,); arguments as of `rows_behind`."""
+    return _least(fruits, _from_way(centres, frames, fruits, session_from_camera[:, :3, 3]), len(centres))
+
+
+def _least(fruits: Rows, away_m: Array, n: int) -> Array:
+    """Give the least of the distances of the sightings, (S,), of each of `n` fruits."""
     least_m = np.full(n, np.inf)
     np.minimum.at(least_m, fruits, away_m)
-    return np.asarray(away_m < least_m[fruits] + ALLEY_M, bool)
+    return least_m

@@ -35,6 +35,7 @@ from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing, looked_ahead
 from pomona.survey.tally import BoxFate, Tally, tell_little
+from pomona.survey.told_layers import tell_farther_layer
 from pomona.survey.tracking import Tracker
 from pomona.trajectory import Trajectory
 
@@ -195,6 +196,8 @@ def scan(
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
+    if not all_rows:
+        tell_farther_layer(recording.path, survey.parts)
     return survey
 
 
