@@ -7,6 +7,7 @@ import functools
 import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,10 @@ def seeds() -> list[bytes]:
         write_session(session, clouds[0], name="a", date="2024-08-01", recording="r", trajectory=trajectory)
         add_session(orchard, load_session(session))
         moved = clouds[0].transformed(np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]]))
-        add_session(orchard, Session("b", "2024-09-01", "r", moved.select(np.arange(50)), trajectory))
+        # Another visit, so off a little: the same to the millimetre is refused.
+        scattered = moved.positions + np.random.default_rng(3).normal(0, 0.005, moved.positions.shape)
+        moved = replace(moved, positions=scattered).select(np.arange(50))
+        add_session(orchard, Session("b", "2024-09-01", "r", moved, trajectory))
         return [session.read_bytes(), orchard.read_bytes()]
 
 

@@ -1,11 +1,13 @@
 """Visits to rows, maps of them, and who is who there."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pomona import FruitCloud
 from pomona.orchard import OrchardMap, Session, add_sessions, write_session
 from pomona.synth.clouds import scene_pair
 
@@ -23,6 +25,11 @@ def write_two_sessions(folder: Path) -> tuple[Path, Path]:
     write_session(folder / "august.gpkg", pair.map, name="august", date="2024-08-01", recording="test")
     write_session(folder / "september.gpkg", pair.query, name="september", date="2024-09-01", recording="test")
     return folder / "august.gpkg", folder / "september.gpkg"
+
+
+def scattered(cloud: FruitCloud, rng: np.random.Generator, scatter_m: float = 0.005) -> FruitCloud:
+    """The fruits as another visit sees them, off a little; a map refuses what is the same to the millimetre."""
+    return replace(cloud, positions=cloud.positions + rng.normal(0, scatter_m, cloud.positions.shape))
 
 
 def grow_map(path: Path, visits: Sequence[Session]) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchard_maker import frame_of_its_own
+from orchard_maker import frame_of_its_own, scattered
 from pomona import FruitCloud, PomonaError, geopackage
 from pomona.orchard import (
     FORMAT_VERSION,
@@ -28,10 +28,6 @@ def turned(cloud: FruitCloud, seed: int) -> FruitCloud:
     """The cloud as another visit sees it: in a random other frame, its fruits scattered."""
     rng = np.random.default_rng(seed)
     return scattered(cloud.transformed(frame_of_its_own(rng)), rng)
-
-
-def scattered(cloud: FruitCloud, rng: np.random.Generator, scatter_m: float = 0.005) -> FruitCloud:
-    return replace(cloud, positions=cloud.positions + rng.normal(0, scatter_m, cloud.positions.shape))
 
 
 def visit(cloud: FruitCloud, date: str, **about: object) -> Session:

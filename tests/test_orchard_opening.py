@@ -13,7 +13,7 @@ import numpy as np
 import pyogrio
 import pytest
 
-from orchard_maker import write_two_sessions
+from orchard_maker import scattered, write_two_sessions
 from pomona import FruitCloud, PomonaError, atomic
 from pomona.orchard import OrchardMap, add_session, load_session, problems, write_session
 from pomona.synth.clouds import scene_pair
@@ -187,7 +187,7 @@ def test_eight_writers_at_once_all_get_in(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     names = [f"visit {number}" for number in range(8)]
     for name in names:
-        seen = cloud.select(np.sort(rng.choice(len(cloud), len(cloud) - 20, replace=False)))
+        seen = scattered(cloud.select(np.sort(rng.choice(len(cloud), len(cloud) - 20, replace=False))), rng)
         write_session(tmp_path / f"{name}.gpkg", seen, name=name, date="2024-08-01", recording="test")
     commands = [[*POMONA, "map", "add", path, tmp_path / f"{name}.gpkg"] for name in names]
     writers = [subprocess.Popen(one, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for one in commands]
@@ -203,7 +203,7 @@ def test_maps_and_sessions_that_come_at_once_are_all_there(orchard: Path, tmp_pa
     cloud, rng = scene_pair("base", seed=3).map, np.random.default_rng(6)
     files = []
     for number in range(4):
-        seen = cloud.select(np.sort(rng.choice(len(cloud), len(cloud) - 20, replace=False)))
+        seen = scattered(cloud.select(np.sort(rng.choice(len(cloud), len(cloud) - 20, replace=False))), rng)
         files.append(tmp_path / f"later {number}.gpkg")
         write_session(files[-1], seen, name=f"later {number}", date=f"2025-08-0{number + 1}", recording="test")
     others = [tmp_path / f"map {number}.gpkg" for number in range(2)]
