@@ -20,7 +20,7 @@ SCATTERS_APART = 5.0
 
 
 def farther_layer(away_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which of the fruits that are so far away, (N,), are in a layer of their own behind others; none of one row."""
+    """Tell which fruits, (N,) and so far away, are in a layer of their own behind others; none of one row."""
     n = len(away_m)
     if n < 2:
         return np.zeros(n, bool)

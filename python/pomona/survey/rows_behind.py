@@ -113,7 +113,7 @@ def _stands(centres: Array) -> Rows:
 
 
 def _in_layers(stands: Rows, centres: Array, least_m: Array) -> Rows:
-    """Part the stands whose fruits are in two layers, at these distances from the camera's way, but for a few strays."""
+    """Part the stands whose fruits, so far from the camera's way, are in two layers but for a few strays."""
     from scipy.spatial import cKDTree
 
     parted = 2 * stands
