@@ -139,7 +139,34 @@ def test_cameras_go_with_the_fruits_next_to_them(found) -> None:
     assert np.quantile(np.abs(np.linalg.norm(after, axis=1) - 1.5), 0.9) < 0.01
     # As in the row they now all look from one side.
     assert np.quantile(np.linalg.norm(after - np.median(after, axis=0), axis=1), 0.8) < 0.1
-    assert whole.configuration["mended"] == {"parts": 2}
+    noted = whole.configuration["mended"]
+    assert noted["parts"] == 2
+    (tear,) = noted["tears"]
+    is_tear = [np.allclose(tear, motion, atol=0.1) for motion in (TEAR, np.linalg.inv(TEAR))]
+    assert any(is_tear)
+
+
+def test_a_second_visit_tells_that_it_is_the_map_that_is_torn(tmp_path: Path) -> None:
+    path = tmp_path / "row.gpkg"
+    told = [add_session(path, visit(number, is_torn=number == 0)) for number in range(3)]
+    assert [len(added.torn_near) for added in told] == [0, 1, 1]
+    assert [added.torn_like for added in told] == [None, None, "1"]
+
+
+def test_a_torn_visit_does_not_make_the_map_torn(tmp_path: Path) -> None:
+    path = tmp_path / "row.gpkg"
+    told = [add_session(path, visit(number, is_torn=number == 1)) for number in range(3)]
+    assert [(len(added.torn_near), added.torn_like) for added in told] == [(0, None), (1, None), (0, None)]
+
+
+def test_the_tear_is_where_the_parts_meet(tmp_path: Path) -> None:
+    path = tmp_path / "row.gpkg"
+    add_session(path, visit(0, is_torn=False))
+    (near,) = add_session(path, visit(1, is_torn=True)).torn_near
+    fruits = OrchardMap(path).fruits()
+    assert fruits.ids is not None
+    place = fruits.positions[fruits.ids.index(near)]
+    assert abs((place - ROW.positions.mean(axis=0)) @ ALONG) < 0.3
 
 
 @pytest.mark.parametrize("torn", [(False, True, False), (True, False, False), (True, True, False)])

@@ -114,6 +114,8 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "n_new": added.n_new,
         "n_missed": added.n_missed,
         "n_parts": 0 if match is None else match.n_parts,
+        "torn_near": list(added.torn_near),
+        "torn_like": added.torn_like,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
         "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
@@ -136,8 +138,20 @@ def _added_as_text(visit: Session, added: Added) -> str:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
     if match.status.value != "Found":
         return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
-    torn = f"; it is torn apart, {match.n_parts} parts, and each lies by its own pose" if match.n_parts > 1 else ""
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
-        f"{added.n_missed} in view and not seen{torn}"
+        f"{added.n_missed} in view and not seen{_torn_as_text(added)}"
     )
+
+
+def _torn_as_text(added: Added) -> str:
+    """Say where a session and the map are torn against each other; which of the two it is one session cannot tell."""
+    if not added.torn_near or added.match is None:
+        return ""
+    near = f"near {'fruit' if len(added.torn_near) == 1 else 'fruits'} {', '.join(added.torn_near)}"
+    if added.torn_like is not None:
+        return (
+            f"; the map is torn apart {near}, {added.torn_like} showed it too: what was added before that one is torn"
+        )
+    parts = f"{added.match.n_parts} parts, and each lies by its own pose"
+    return f"; it and the map are torn against each other {near}, {parts}"

@@ -37,6 +37,10 @@ class Added:
         those where the session lies.
     changes : tuple of Change
         Observations of other sessions that now are of another fruit.
+    torn_near : tuple of str
+        Fruits of the map beside which it and the session are torn against each other, as a camera lost its way.
+    torn_like : str, optional
+        A session of the map that showed the same tear before: then it is the map that is torn.
     was_there : bool
         Whether the map held the very session before, and stays as it was.
     """
@@ -49,4 +53,6 @@ class Added:
     is_added: bool = False
     known: FruitCloud | None = None
     changes: tuple[Change, ...] = ()
+    torn_near: tuple[str, ...] = ()
+    torn_like: str | None = None
     was_there: bool = False

@@ -24,6 +24,7 @@ from pomona.orchard.replacing import NotFoundError, holds, there_already
 from pomona.orchard.seen_parts import SeenPart, matches_with_parts, seen_parts
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, write_changes
+from pomona.orchard.tears import beside_tears, torn_alike
 from pomona.orchard.writing import Placement
 from pomona.settings import Settings
 from pomona.store import schema
@@ -190,6 +191,7 @@ def _add(
         settings = settings or Settings.load(None, {})
         found = recognised(connection, session.cloud, settings)
         parts = seen_parts(connection, session.cloud, found, settings)
+        torn_like = torn_alike(connection, found.match, found.known)
         if parts:
             added = _add_where_found(connection, session, parts, settings)
         elif new_part:
@@ -198,6 +200,9 @@ def _add(
             added = Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, None)
         found = parts[0].found if parts else found
         added = replace(added, match=found.match, known=found.known)
+        if found.match.n_parts > 1:
+            near = tuple(beside_tears(found.match, session.cloud, found.known))
+            added = replace(added, torn_near=near, torn_like=torn_like)
         if replacing and not added.is_added:
             raise NotFoundError(added)
         return added

@@ -8,6 +8,7 @@ import numpy as np
 
 from pomona.answer import Match
 from pomona.orchard.session import Session
+from pomona.orchard.tears import tears_of
 from pomona.torn_rows import laid_in_parts, part_of_places
 from pomona.trajectory import Trajectory
 
@@ -17,14 +18,16 @@ __all__ = ["mended"]
 def mended(session: Session, match: Match) -> Session:
     """Return a session whose parts lie to one another as the map has them; the first stays where it is.
 
-    Cameras go with the fruits next to them. The configuration notes in how many parts it was.
+    Cameras go with the fruits next to them. The configuration notes in how many parts it was, and how these
+    were moved in the map.
     """
+    tears = [tear.tolist() for tear in tears_of(match)]
     session_from_map = np.linalg.inv(match.parts[0])
     return replace(
         session,
         cloud=laid_in_parts(match, session.cloud).transformed(session_from_map),
         trajectory=None if session.trajectory is None else _with_fruits(session.trajectory, session, match),
-        configuration={**session.configuration, "mended": {"parts": match.n_parts}},
+        configuration={**session.configuration, "mended": {"parts": match.n_parts, "tears": tears}},
     )
 
 
