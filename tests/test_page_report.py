@@ -46,6 +46,12 @@ def test_the_same_map_gives_the_same_report(pomona: Pomona, orchard: Path, tmp_p
     assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
 
 
+def test_a_report_is_no_pdf(pomona: Pomona, orchard: Path, tmp_path: Path) -> None:
+    code, _, told = pomona("report", orchard, "-o", tmp_path / "r.pdf")
+    assert (code, told) == (2, f"pomona: {tmp_path / 'r.pdf'}: found suffix '.pdf', expected .html, .htm\n")
+    assert not (tmp_path / "r.pdf").exists()
+
+
 def test_a_report_replaces_reports_alone(pomona: Pomona, orchard: Path, tmp_path: Path) -> None:
     report, page = tmp_path / "report.html", tmp_path / "mine.html"
     page.write_text("<!doctype html><p>my own")

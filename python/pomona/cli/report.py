@@ -28,8 +28,10 @@ def report(
     from pomona.cli.page_wishes import page_wishes, tell_guess
     from pomona.cli.progress import working
     from pomona.cli.visit_warnings import warn_of_visits
+    from pomona.file_names import require_suffix
     from pomona.viewer.season_report import write_report
 
+    require_suffix(output, (".html", ".htm"))
     wishes = page_wishes(harvest, temperature, calipers, classes, target, pack_kg, up)
     warnings: list[str] = []
     with working(f"telling {orchard}"):
