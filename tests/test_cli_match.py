@@ -206,6 +206,7 @@ def test_refuses_what_is_no_cloud_file(visits: Path, tmp_path: Path) -> None:
         (["--method", "magic"], ["--method", "magic", "paper"]),
         (["--scale", "big"], ["--scale", "big"]),
         (["--noise", "-1"], ["--noise"]),
+        (["--noise", "0"], ["--noise: found 0.0, expected a positive number of metres"]),
         (["--noise", "inf"], ["--noise: found inf, expected a positive number of metres"]),
         (["--up", "nan,0,1"], ["--up: found 'nan,0,1', expected three finite numbers X,Y,Z"]),
         (["--up", "0,1"], ["--up", "0,1", "X,Y,Z"]),

@@ -43,7 +43,7 @@ class Unit(StrEnum):
 method_option = typer.Option(None, help="The paper's votes, or constellations verified by log-odds (the default).")
 scale_option = typer.Option(None, help="metric: both clouds are in metres (the default); free: their ratio is unknown.")
 noise_option = typer.Option(
-    None, "--noise", min=0.0, help="Relative noise of the visits per axis, metres; estimated where not given."
+    None, "--noise", metavar="METRES", help="Relative noise of the visits per axis, above 0; estimated where not given."
 )
 up_option = typer.Option(
     None,
