@@ -198,9 +198,10 @@ class Followed:
         way = self._odometry.trajectory()
         if self._stereo and way.median_disparity_px < FAR_PX:
             part = OFF_PX / way.median_disparity_px
-            found = f"found a median disparity of {way.median_disparity_px:.1f} px, expected {FAR_PX:g} px or more"
+            found = f"found a median disparity of {way.median_disparity_px:.1f} px over whole pictures"
             message = (
-                f"{self._path}: {found}: {OFF_PX:g} px that the calibration is off by make {part:.0%} of all lengths"
+                f"{self._path}: {found}, expected {FAR_PX:g} px or more: {OFF_PX:g} px that the calibration is off by "
+                f"make {part:.0%} of lengths there, and less of those of nearer fruits"
             )
             warnings.warn(message, PomonaWarning, stacklevel=2)
         return way
