@@ -35,6 +35,7 @@ def test_a_list_of_points_is_a_cloud() -> None:
         ({"ids": ("a", "\ud800")}, r"ids: row 1 is '\ud800', expected characters of Unicode"),
         ({"ids": 5}, "ids: found 5, expected 2 values, one a fruit"),
         ({"n_views": [1]}, "n_views: found shape (1), expected (2)"),
+        ({"n_views": [1, -1]}, "n_views: row 1 is -1, expected a number of frames"),
         ({"n_views": [1, 2**60]}, f"n_views: row 1 is {2**60}, expected a number of frames"),
         ({"views": [1, 2]}, "views: found [1, 2], expected pomona.Views"),
         ({"views": Views(np.array([0]), np.array([2]))}, "views.fruits: a sighting names a row outside 0..1"),

@@ -125,6 +125,7 @@ def test_a_blank_diameter_is_unknown(tmp_path: Path) -> None:
             "line 2 (row 0), columns cxx,cyy,czz,cxy,cxz,cyz: found a matrix that is not positive semi-definite, "
             "expected a covariance",
         ),
+        ("x,y,z,n_views\n1,2,3,-1\n", "line 2 (row 0), column n_views: found '-1', expected 0 or more"),
         ("x,y,z,n_views\n1,2,3,1.5\n", "line 2 (row 0), column n_views: found '1.5', expected a whole number"),
     ],
 )

@@ -154,7 +154,7 @@ def test_any_id_reads_back_the_same(tmp_path: Path, ids: list[str]) -> None:
 
 
 def test_counts_beyond_32_bits_are_not_cut(tmp_path: Path) -> None:
-    for counts in ([1, 2**31], [-(2**31), 2**53], [0, 2**31 - 1]):
+    for counts in ([1, 2**31], [7, 2**53], [0, 2**31 - 1]):
         FruitCloud(np.eye(2, 3), n_views=np.array(counts)).write(tmp_path / "a.ply")
         back = FruitCloud.read(tmp_path / "a.ply").n_views
         assert back is not None

@@ -73,8 +73,8 @@ def check_names(names: Sequence[str], where: str) -> None:
         raise PomonaError(f"{where}: found a covariance without {','.join(lacking)}, expected {','.join(COVARIANCE)}")
 
 
-def number(name: str, cell: str) -> float:
-    """Read one cell of a column of numbers.
+def number(name: str, cell: str, *, is_whole: bool = False) -> float:
+    """Read one cell of a column of numbers; `is_whole` where the file takes whole ones alone.
 
     Raises
     ------
@@ -91,8 +91,10 @@ def number(name: str, cell: str) -> float:
         raise ValueError("expected a number")
     if not math.isfinite(value):
         raise ValueError("expected a finite number")
-    if name in WHOLE and (not value.is_integer() or abs(value) > MOST_WHOLE):
+    if (is_whole or name in WHOLE) and (not value.is_integer() or abs(value) > MOST_WHOLE):
         raise ValueError("expected a whole number")
+    if name in WHOLE and value < 0:
+        raise ValueError("expected 0 or more")
     if name == "diameter_m" and value <= 0:
         raise ValueError("expected a positive number or nothing")
     if name == "diameter_m" and value > LARGEST_DIAMETER_M:

@@ -131,7 +131,7 @@ def _read_table(file: IO[str], names: list[str], header_lines: int) -> dict[str,
 
 
 def _whole(column: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray((column == np.rint(column)) & (np.abs(column) <= MOST_WHOLE))
+    return np.asarray((column == np.rint(column)) & (column >= 0) & (column <= MOST_WHOLE))
 
 
 def _names_each_once(ids: Any) -> bool:

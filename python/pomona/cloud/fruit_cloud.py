@@ -232,7 +232,7 @@ def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
 
 def _counts(values: ArrayLike, n: int) -> NDArray[np.int64]:
     counts: NDArray[np.int64] = checked_array("n_views", values, np.int64, (n,))
-    wrong = (counts < -MOST_WHOLE) | (counts > MOST_WHOLE)  # no reader of a file believes them
+    wrong = (counts < 0) | (counts > MOST_WHOLE)  # no reader of a file believes them
     if wrong.any():
         row = int(np.argmax(wrong))
         raise PomonaError(f"n_views: row {row} is {counts[row]}, expected a number of frames")

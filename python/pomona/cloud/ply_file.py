@@ -249,7 +249,7 @@ def _first_wrong_cell(path: Path, lines: list[bytes], header: Header) -> PomonaE
             return PomonaError(f"{where}: found {len(cells)} values, expected {len(header.fields)} as in the header")
         for (name, scalar), cell in zip(header.fields, cells, strict=True):
             try:
-                number("n_views" if scalar[0] in "iu" else name, cell)
+                number(name, cell, is_whole=scalar[0] in "iu")
             except ValueError as error:
                 return PomonaError(f"{where}, property {name}: found {shown(cell)}, {error}")
     return PomonaError(f"{path}: the vertices cannot be read as numbers")
@@ -262,7 +262,7 @@ def _require_good(path: Path, name: str, values: NDArray[Any]) -> None:
         wrong = ~are_diameters(values)
         wanted = f"a positive number or nan, at most {LARGEST_DIAMETER_M:g} m"
     elif name in WHOLE:
-        wrong, wanted = (values != np.rint(values)) | (np.abs(values) > MOST_WHOLE), "a whole number"
+        wrong, wanted = (values != np.rint(values)) | (values < 0) | (values > MOST_WHOLE), "a whole number, 0 or more"
     else:
         wrong, wanted = ~np.isfinite(values), "a finite number"
     if wrong.any():

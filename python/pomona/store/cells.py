@@ -267,7 +267,7 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
         "label": _or_null(TEXT),
         "diameter_m": _or_null(DIAMETER),
         **dict.fromkeys(("cxx", "cxy", "cxz", "cyy", "cyz", "czz"), _or_null(SQUARE)),
-        "n_views": _or_null(WHOLE),
+        "n_views": _or_null(COUNT),
         "match_probability": _or_null(SHARE),
         "match_distance_m": _or_null(LENGTH),
         "other_columns": _or_null(HASHES),
