@@ -150,12 +150,14 @@ def test_millimetres_go_into_a_map_only_where_that_is_said(visits: Path, tmp_pat
 def test_doubtful_sessions_go_into_a_map_only_where_that_is_said(visits: Path, tmp_path: Path) -> None:
     cloud = FruitCloud.read(visits / "august.csv")
     wide = replace(cloud, diameters_m=np.full(len(cloud), 70.0))
+    melons = FruitCloud(0.3 * cloud.positions, diameters_m=np.full(len(cloud), 0.3))
     strayed = cloud.positions.copy()
     strayed[5, 2] = 1e6
     doubts = {
         "far": (FruitCloud(1000.0 * cloud.positions), {}, ("--unit", "m"), "neighbouring fruits are"),
         "strayed": (FruitCloud(strayed), {}, ("--unit", "m"), "row 5: found a fruit 1e+06 m from the middle of all"),
         "wide": (wide, {}, ("--unit", "m"), "the median diameter is 70 m"),
+        "melons": (melons, {}, ("--unit", "m"), "the median diameter is 0.3 m and neighbouring fruits are 0.0"),
         "undated": (cloud, {"scan": {"date": GUESSED}}, ("--date", "2024-08-02"), "was guessed from the age of files"),
     }
     for name, (doubtful, configuration, flags, words) in doubts.items():

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PLAUSIBLE_DIAMETER_M",
     "check_places",
+    "doubt_of_diameters",
     "doubt_of_places",
     "likely_unit",
     "look_at",
@@ -46,6 +47,9 @@ FARTHEST_FRUIT_M = 10_000.0
 
 PLAUSIBLE_DIAMETER_M = (0.005, 0.4)
 """From the smallest berry to the largest melon: a median outside speaks of a wrong unit."""
+
+MOST_SPACINGS = 2.0
+"""Median distances from a fruit to the next, as which fruits are wide at most: those of solid ones are a diameter."""
 
 MIN_FRUITS = 5
 """Fewer have no median to speak of."""
@@ -124,6 +128,20 @@ def doubt_of_places(positions: NDArray[np.float64]) -> PlacesDoubt | None:
             found += " (median), expected finer ones: numbers as large as those of UTM lose their ends in 32 bits"
             return PlacesDoubt(found, is_of_unit=False)
     return None
+
+
+def doubt_of_diameters(cloud: FruitCloud) -> str | None:
+    """Say why the diameters of a cloud cannot be those of fruits that hang so, in metres; None where they can."""
+    known_m = np.empty(0) if cloud.diameters_m is None else cloud.diameters_m[~np.isnan(cloud.diameters_m)]
+    if not len(known_m):
+        return None
+    low_m, high_m = PLAUSIBLE_DIAMETER_M
+    found = f"the median diameter is {(median_m := float(np.median(known_m))):.3g} m"
+    if not low_m <= median_m <= high_m:
+        return f"{found}, expected {low_m:g} to {high_m:g} m"
+    if len(cloud) < MIN_FRUITS or median_m <= MOST_SPACINGS * (spacing_m := _spacing_m(cloud.positions)):
+        return None
+    return f"{found} and neighbouring fruits are {spacing_m:.3g} m apart, expected {MOST_SPACINGS:g} times that at most"
 
 
 def check_places(name: str | Path, positions: NDArray[np.float64], *, unit: Unit = "m", remedy: str = "") -> None:

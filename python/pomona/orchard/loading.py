@@ -10,11 +10,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pomona.cloud import FruitCloud, Unit
-from pomona.cloud.files import PLAUSIBLE_DIAMETER_M, check_places
+from pomona.cloud.files import check_places, doubt_of_diameters
 from pomona.cloud.near_names import DIAMETER, near_names
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.file_names import given_path
@@ -56,7 +53,7 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
         session = read(path, day, unit)
         if unit is None:
             check_places(path, session.cloud.positions)
-            _check_diameters(path, session.cloud.diameters_m)
+            _check_diameters(path, session.cloud)
     if path.suffix.lower() != ".gpkg":
         _tell_near_names(path, session.cloud)
     return session
@@ -86,12 +83,9 @@ def _cloud(path: Path, date: str | None, unit: Unit | None) -> Session:
     return Session(path.stem, date, path.name, cloud, input_hashes={path.name: digest})
 
 
-def _check_diameters(path: Path, diameters_m: NDArray[np.float64] | None) -> None:
-    low_m, high_m = PLAUSIBLE_DIAMETER_M
-    known_m = np.empty(0) if diameters_m is None else diameters_m[~np.isnan(diameters_m)]
-    if len(known_m) and not low_m <= (median_m := float(np.median(known_m))) <= high_m:
-        found = f"the median diameter is {median_m:.3g} m, expected {low_m:g} to {high_m:g} m"
-        warnings.warn(f"{path}: {found}; check the unit", PomonaWarning, stacklevel=3)
+def _check_diameters(path: Path, cloud: FruitCloud) -> None:
+    if (doubt := doubt_of_diameters(cloud)) is not None:
+        warnings.warn(f"{path}: {doubt}; check the unit", PomonaWarning, stacklevel=3)
 
 
 def _tell_near_names(path: Path, cloud: FruitCloud) -> None:
