@@ -59,6 +59,12 @@ def test_a_box_partly_outside_is_cut_at_the_edge(tmp_path):
     assert found.boxes_px.tolist() == [[0, 20, 30, 480]]
 
 
+def test_boxes_mostly_outside_are_told(tmp_path):
+    with pytest.warns(PomonaWarning, match=r"line 3: the box 600,20,9000,60 is mostly outside .*, as 1 of 2 boxes are"):
+        found = read(tmp_path, HEADER, "0,5,20,30,50,0.9,a", "0,600,20,9000,60,0.9,b")(Frame(number=0))
+    assert found.boxes_px.tolist() == [[5, 20, 30, 50], [600, 20, 640, 60]]
+
+
 @pytest.mark.parametrize(
     ("lines", "parts"),
     [

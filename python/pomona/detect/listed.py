@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.detect.detections import Detections
-from pomona.errors import PomonaError
+from pomona.errors import PomonaError, PomonaWarning
 from pomona.reading import shown
 from pomona.recording import Calibration
 
 __all__ = ["ListedBox", "by_frame"]
+
+LEAST_INSIDE = 0.5
+"""Of a box, the part in its picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +50,7 @@ class ListedBox:
 def by_frame(
     path: Path, boxes: Iterable[ListedBox], calibration: Calibration, numbers: Sequence[int]
 ) -> dict[int, Detections]:
-    """Sort boxes by frame; a box partly outside the picture is cut at its edge.
+    """Sort boxes by frame; a box partly outside the picture is cut at its edge, and it is told where most are outside.
 
     Raises
     ------
@@ -62,6 +68,7 @@ def by_frame(
         _check(path, box, calibration)
         frames.setdefault(box.frame, []).append(box)
     _require_ids_of_all_or_none(path, frames)
+    _tell_outside(path, [box for found in frames.values() for box in found], calibration)
     return {number: _detections(path, number, found, calibration) for number, found in sorted(frames.items())}
 
 
@@ -79,6 +86,31 @@ def _check(path: Path, box: ListedBox, calibration: Calibration) -> None:
         raise PomonaError(f"{path}: {box.where}: score: found {box.score:g}, expected 0 to 1")
 
 
+def _tell_outside(path: Path, boxes: Sequence[ListedBox], calibration: Calibration) -> None:
+    """Warn of boxes that are cut to less than half: a detector sees nothing out there, so they are of others."""
+    corners_px = np.array([box.corners_px for box in boxes]).reshape(-1, 4)
+    is_cut = _area(_clipped(corners_px, calibration)) < LEAST_INSIDE * _area(corners_px)
+    if is_cut.any():
+        first = boxes[int(is_cut.argmax())]
+        shown_px = ",".join(f"{corner:g}" for corner in first.corners_px)
+        width, height = calibration.size_px
+        warnings.warn(
+            f"{path}: {first.where}: the box {shown_px} is mostly outside the picture of {width}x{height} pixels, and "
+            f"cut at its edge, as {int(is_cut.sum())} of {amount(len(boxes), 'box')} are",
+            PomonaWarning,
+            stacklevel=3,
+        )
+
+
+def _area(corners_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    with np.errstate(over="ignore"):  # numbers of a stranger; what has no end is outside all the same
+        return np.asarray(np.prod(corners_px[:, 2:] - corners_px[:, :2], axis=1), np.float64)
+
+
+def _clipped(corners_px: NDArray[np.float64], calibration: Calibration) -> NDArray[np.float64]:
+    return np.clip(corners_px, 0.0, np.tile(np.array(calibration.size_px, float), 2))
+
+
 def _require_ids_of_all_or_none(path: Path, frames: dict[int, list[ListedBox]]) -> None:
     boxes = [box for found in frames.values() for box in found]
     nameless = next((box for box in boxes if not box.id), None)
@@ -93,7 +125,7 @@ def _detections(path: Path, number: int, boxes: list[ListedBox], calibration: Ca
             places = f"{earlier.where} and {box.where}"
             raise PomonaError(f"{path}: {places}: id: found {shown(box.id)} twice in frame {number}, expected it once")
     return Detections(
-        boxes_px=np.clip([box.corners_px for box in boxes], 0.0, np.tile(np.array(calibration.size_px, float), 2)),
+        boxes_px=_clipped(np.array([box.corners_px for box in boxes]), calibration),
         scores=np.array([box.score for box in boxes]),
         ids=tuple(box.id for box in boxes) if boxes[0].id else None,
     )
