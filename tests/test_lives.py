@@ -99,6 +99,50 @@ def test_a_visit_to_a_part_of_the_row_says_nothing_of_the_others():
     assert found[once].mean() == pytest.approx(1.0 - is_fruit[kept][once].mean(), abs=0.1)
 
 
+def uneven_row(rng, *, false, hidden, n_fruits=900):
+    """What visits of a row see, each with its own share of false points, of fruits of which some hide more."""
+    chances = 1.0 - rng.beta(1.3, 1.3 * (1.0 / hidden - 1.0), n_fruits)
+    fruits = rng.random((n_fruits, len(false))) < chances[:, None]
+    fruits = fruits[fruits.any(axis=1)]
+    points = np.repeat(np.arange(len(false)), np.rint(np.array(false) * fruits.sum(axis=0)).astype(int))
+    seen = np.concatenate([fruits, points[:, None] == np.arange(len(false))])
+    return seen, np.arange(len(seen)) < len(fruits)
+
+
+@pytest.mark.parametrize("false", [(0.04, 0.04, 0.04, 0.04, 0.4), (0.04, 0.04, 0.04, 0.4, 0.04)])
+def test_one_visit_may_have_far_more_false_points_than_the_others(false):
+    """Hundreds of points appear at once where the visits before saw none, and nothing else that hid."""
+    seen, is_fruit = uneven_row(np.random.default_rng(21), false=false, hidden=0.15)
+    worst = int(np.argmax(false))
+    found, once = lives(seen).false, seen.sum(axis=1) == 1
+    assert found[once & seen[:, worst]].mean() > 0.75
+    assert found.sum() == pytest.approx((~is_fruit).sum(), rel=0.2)
+
+
+def test_what_a_visit_looks_at_as_the_first_is_not_false_for_being_new():
+    rng = np.random.default_rng(22)
+    seen, is_fruit = uneven_row(rng, false=(0.04,) * 4, hidden=0.15, n_fruits=600)
+    in_view = np.ones(seen.shape, bool)
+    in_view[rng.random(len(seen)) < 0.5, :3] = False
+    met = (seen & in_view).any(axis=1)
+    told = replace(looks_at((seen & in_view)[met]), in_view=in_view[met])
+    elsewhere = ~in_view[met, 0]
+    found = lives_of(histories_of(told, fortnights(4))).false[elsewhere]
+    assert found.mean() == pytest.approx(1.0 - is_fruit[met][elsewhere].mean(), abs=0.06)
+
+
+def test_when_leaves_fall_what_hid_appears_and_is_no_false_point():
+    """The visit sees more fruits that looks had missed, those that others had seen among them."""
+    rng = np.random.default_rng(23)
+    chances = np.where(rng.random(600) < 0.4, 0.35, 0.95)[:, None] * np.ones(4)
+    chances[:, 3] = 0.95
+    seen = rng.random((600, 4)) < chances
+    seen = seen[seen.any(axis=1)]
+    new = seen[:, 3] & (seen.sum(axis=1) == 1)
+    assert new.sum() > 40
+    assert lives(seen).false[new].mean() < 0.2
+
+
 def test_as_many_are_gone_as_have_gone_though_many_hide():
     """The share that goes and the chances of seeing are learnt from the same looks: none takes from the other."""
     rng = np.random.default_rng(8)

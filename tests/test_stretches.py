@@ -103,6 +103,17 @@ def test_a_visit_of_two_pieces_does_not_empty_what_is_between() -> None:
     assert row.said_gone(between) == 0.0
 
 
+def test_whether_three_of_eight_trees_were_picked_or_left_out_stays_open() -> None:
+    """Both are told as likely as they are, so intervals of counts hold both; the trees beside hang."""
+    row = Row.of(3)
+    between = (row.trees > 2) & (row.trees < 6)
+    row.hangs[between, 2] = False
+    found, numbers = row.concluded()
+    hangs = np.array(found.state_probabilities)
+    assert 0.4 < hangs[numbers[between & (numbers >= 0)]].mean() < 0.75
+    assert hangs[numbers[~between & (numbers >= 0) & row.hangs[:, 2]]].mean() > 0.85
+
+
 def test_two_visits_do_not_leave_out_the_same_by_chance() -> None:
     row = Row.of(4)
     between = (row.trees > 2) & (row.trees < 6)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.identity.first_views import N_BINS, N_SETTINGS, UNCOUNTED, ViewDensities
 from pomona.identity.local_shares import shares_of_places
-from pomona.identity.looks import SHARES_OF_VIEWS, Looks, visibility_classes
+from pomona.identity.looks import MISSES, SHARES_OF_VIEWS, Looks, visibility_classes
 
 __all__ = ["CHANCES_OF_SEEING", "SHARE_GONE", "Histories", "HistoryOdds", "histories_of"]
 
@@ -32,6 +32,16 @@ IN_PART_SPREAD = 1.0
 
 OWN_SPREAD = 0.4
 """Of the logit of each class about what level and slope say of it."""
+
+LEAVES_SPREAD = 0.15
+"""Of the logit of a visit's chances to see what looks before had missed: leaves fall, or have grown. Most visits are
+alike, and one may be far off: half width of a Cauchy distribution."""
+
+FALSE_SPREAD = 0.3
+"""The same of the logarithm of a visit's false points: light, dust and detectors make them, visit by visit."""
+
+FARTHEST_OFF = 30.0
+"""Of a visit from the others, half widths."""
 
 SHARE_GONE = 0.02
 """Of the fruits that go between two visits a week apart or more, before the season says its own."""
@@ -129,27 +139,30 @@ class HistoryOdds:
         self.closed_views = np.stack([_in_bins(views, ~late), _in_bins(views, late), np.zeros(N_BINS)])
         places, self.n_at = np.unique(np.concatenate([one.in_view, one.unseen], axis=1), axis=0, return_counts=True)
         self.place_in_view, self.place_classes = places[:, : self.n_visits] > 0, places[:, self.n_visits :]
-        self.n_looks = self.place_in_view.sum(axis=1)
         self.goes = np.diff(np.floor(one.days)) > 0
         self.share_gone = np.where(self.goes, SHARE_GONE * np.minimum(np.diff(one.days) / WEEK, 1.0), 0.0)
         logits = np.log(CHANCES_OF_SEEING / (1.0 - CHANCES_OF_SEEING))
         self.told = logits - logits[0]
         self.in_part = np.arange(len(logits)) >= len(logits) - len(_BY_VIEWS)
+        self.of_visits = slice(3 + len(self.told), 3 + len(self.told) + 2 * self.n_visits)
+        self.was_missed = self.in_part | ((np.arange(len(logits)) > 0) & (np.arange(len(logits)) <= MISSES))
 
     def start(self) -> NDArray[np.float64]:
         """Return what is believed beforehand: level, slope, the classes' own, views, logits of what goes."""
         believed = np.where(self.goes, self.share_gone, SHARE_GONE)
         return np.concatenate([np.zeros(self.n_own), np.log(believed / (1.0 - believed))])
 
-    @property
-    def bounds(self) -> list[tuple[float, float]]:
-        """How far from that each of it may be."""
-        return [(-FARTHEST, FARTHEST)] * self.n_own + [FARTHEST_LEAVING] * (self.n_visits - 1)
+    def bounds(self, *, alike: bool) -> list[tuple[float, float]]:
+        """Return how far from that each of it may be; visits that are `alike` do not differ."""
+        own = [(-FARTHEST, FARTHEST)] * self.n_own
+        most = 0.0 if alike else FARTHEST_OFF
+        own[self.of_visits] = [(-most, most)] * (2 * self.n_visits)
+        return own + [FARTHEST_LEAVING] * (self.n_visits - 1)
 
     @property
     def n_own(self) -> int:
         """How many settings there are before those of what goes."""
-        return 3 + len(self.told) + N_SETTINGS
+        return int(3 + len(self.told) + 2 * self.n_visits + N_SETTINGS)
 
     def __call__(self, told: NDArray[np.float64], share_false: float) -> tuple[float, NDArray[np.float64]]:
         """Return minus the log posterior and its gradient."""
@@ -157,13 +170,13 @@ class HistoryOdds:
 
         n_own = self.n_own
         chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
-        density, rate = 1.0 - chances / MOST_SEEING, _rate(share_false, chances)
-        ends, log_real, log_false, false = self._weighed(views, chances, leaving, rate)
+        rates = self._rates(told, share_false)
+        ends, log_real, log_false, false = self._weighed(views, chances, leaving, rates)
         unseen_ends, log_unseen = _endings(leaving, np.full(len(self.n_at), -1), self._misses_at(chances))
-        met = -np.expm1(log_unseen) + rate * self.n_looks
+        met = -np.expm1(log_unseen) + self.place_in_view @ rates
         real, missing = 1.0 - false, self.n_at * np.exp(log_unseen) / met
         value = np.logaddexp(log_real, log_false).sum() - self.n_at @ np.log(met)
-        value += self.closed_hits @ np.log(chances) + self.closed_misses @ np.log1p(-chances)
+        value += (self.closed_hits * np.log(chances) + self.closed_misses * np.log1p(-chances)).sum()
         value += self.n_closed * np.log1p(-leaving).sum()
         # Expected counts: of looks that saw and that missed, of fruits that went and that stayed.
         hits = self.closed_hits + _counts(self.classes, self.seen * real[:, None])
@@ -173,14 +186,17 @@ class HistoryOdds:
         misses += _counts(self.place_classes, self.place_in_view * _hanging(unseen_ends) * missing[:, None])
         went = real @ ends[:, :-1] + missing @ unseen_ends[:, :-1]
         stayed = self.n_closed + real @ _hanging(ends) + missing @ _hanging(unseen_ends)
-        of_chance = hits - misses * chances / (1.0 - chances)
-        of_chance[0] += false.sum() - rate * (self.n_at * self.n_looks / met).sum()
-        of_logit = of_chance * density
+        of_logit = (hits - misses * chances / (1.0 - chances)) * (1.0 - chances / MOST_SEEING)
+        of_rates = np.bincount(self.last, false, self.n_visits) - rates * (self.n_at / met @ self.place_in_view)
+        of_classes = of_logit.sum(axis=0)
+        of_classes[0] += of_rates.sum() * (1.0 - self._first_chance(told) / MOST_SEEING)
         of_chances = np.concatenate(
             [
-                [LEVEL_SPREAD * of_logit.sum(), SLOPE_SPREAD * of_logit @ self.told],
-                [IN_PART_SPREAD * of_logit @ self.in_part],
-                OWN_SPREAD * of_logit,
+                [LEVEL_SPREAD * of_classes.sum(), SLOPE_SPREAD * of_classes @ self.told],
+                [IN_PART_SPREAD * of_classes @ self.in_part],
+                OWN_SPREAD * of_classes,
+                LEAVES_SPREAD * of_logit @ self.was_missed,
+                FALSE_SPREAD * of_rates,
             ]
         )
         seen_first = self.closed_views + self._first_sights(real, false)
@@ -188,18 +204,21 @@ class HistoryOdds:
         went_before, stayed_before = BELIEF_GONE * self.share_gone, BELIEF_GONE * (1.0 - self.share_gone)
         went, stayed, goes = went[1:] + went_before, stayed[1:] + stayed_before, leaving[1:]
         value += (xlogy(went_before, goes) + stayed_before * np.log1p(-goes)).sum()
-        value -= 0.5 * told[:n_own] @ told[:n_own]
+        normal, off = told[:n_own].copy(), told[self.of_visits]
+        normal[self.of_visits] = 0.0
+        value -= 0.5 * normal @ normal + np.log1p(off**2).sum()
         of_leaving = self.goes * (went * (1.0 - goes) - stayed * goes)
         gradient = np.concatenate([of_chances, views.slopes(seen_first), of_leaving])
-        gradient[:n_own] -= told[:n_own]
+        gradient[:n_own] -= normal
+        gradient[self.of_visits] -= 2.0 * off / (1.0 + off**2)
         return -value, -gradient
 
     def lives(self, told: NDArray[np.float64], share_false: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return for each fruit, (K,), that it has gone, if it is one, and that it never was one."""
         chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
-        rate = _rate(share_false, chances)
-        ends, _, _, false = self._weighed(views, chances, leaving, rate)
-        ends, _, _, false = self._weighed(views, chances, self._leaving_places(leaving, ends, false), rate)
+        rates = self._rates(told, share_false)
+        ends, _, _, false = self._weighed(views, chances, leaving, rates)
+        ends, _, _, false = self._weighed(views, chances, self._leaving_places(leaving, ends, false), rates)
         gone, never = np.zeros(len(self.is_open)), np.zeros(len(self.is_open))
         gone[self.is_open], never[self.is_open] = 1.0 - ends[:, -1], false
         return gone, never
@@ -222,20 +241,25 @@ class HistoryOdds:
     def room(self, told: NDArray[np.float64], share_false: float) -> float:
         """Return `ViewDensities.room` at the top of the log posterior."""
         chances, views = self._chances(told), self._views(told)
-        false = self._weighed(views, chances, self._leaving(told), _rate(share_false, chances))[3]
+        false = self._weighed(views, chances, self._leaving(told), self._rates(told, share_false))[3]
         return views.room(*(_in_bins(self.first_views, each) for each in (false, false * (1.0 - false))))
 
     def _weighed(
-        self, views: ViewDensities, chances: NDArray[np.float64], leaving: NDArray[np.float64], rate: float
+        self,
+        views: ViewDensities,
+        chances: NDArray[np.float64],
+        leaving: NDArray[np.float64],
+        rates: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Weigh each open fruit, (K,), by the share that goes before each visit, (V,) or of each, (K, V).
 
         Return when it goes, as `_endings`; the logarithms of what speaks for a fruit and for none; that it is none.
         """
-        looks = np.where(self.seen, np.log(chances)[self.classes], np.log1p(-chances)[self.classes])
+        logs, rows = np.stack([np.log1p(-chances), np.log(chances)]), np.arange(self.n_visits)
+        looks = logs[self.seen.astype(np.int64), rows, self.classes]
         ends, log_real = _endings(leaving, self.last, np.where(self.in_view, looks, 0.0))
         log_real = log_real + views.logs[self.is_late, self.first_views]
-        log_false = np.where(self.is_single, np.log(rate) + views.logs[2, self.first_views], -np.inf)
+        log_false = np.where(self.is_single, np.log(rates)[self.last] + views.logs[2, self.first_views], -np.inf)
         return ends, log_real, log_false, 1.0 / (1.0 + np.exp(log_real - log_false))
 
     def _first_sights(self, real: NDArray[np.float64], false: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -244,13 +268,24 @@ class HistoryOdds:
         return np.stack([_in_bins(self.first_views, each) for each in weights])
 
     def _misses_at(self, chances: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.where(self.place_in_view, np.log1p(-chances)[self.place_classes], 0.0)
+        missing = np.log1p(-chances)[np.arange(self.n_visits), self.place_classes]
+        return np.where(self.place_in_view, missing, 0.0)
 
     def _chances(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the chance of seeing a fruit of each class, (C,)."""
+        """Return the chance of each visit to see a fruit of each class, (V, C)."""
         common = LEVEL + LEVEL_SPREAD * told[0] + (SLOPE + SLOPE_SPREAD * told[1]) * self.told
-        own = OWN_SPREAD * told[3 : 3 + len(self.told)] + IN_PART_SPREAD * told[2] * self.in_part
-        return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - own)))
+        own = OWN_SPREAD * told[3:][: len(self.told)] + IN_PART_SPREAD * told[2] * self.in_part
+        of_visits = LEAVES_SPREAD * told[3 + len(self.told) :][: self.n_visits, None] * self.was_missed
+        return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - own - of_visits)))
+
+    def _first_chance(self, told: NDArray[np.float64]) -> float:
+        """Return the chance of a usual visit to see a fruit at a first look."""
+        return float(MOST_SEEING / (1.0 + np.exp(-LEVEL - LEVEL_SPREAD * told[0] - OWN_SPREAD * told[3])))
+
+    def _rates(self, told: NDArray[np.float64], share_false: float) -> NDArray[np.float64]:
+        """Return how many false points each visit has beside each fruit that hangs, (V,)."""
+        of_visits = FALSE_SPREAD * told[3 + len(self.told) + self.n_visits :][: self.n_visits]
+        return np.asarray(share_false / (1.0 - share_false) * self._first_chance(told) * np.exp(of_visits))
 
     def _leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the share that goes before each visit, (V,); none before the first, nor between two of one date."""
@@ -260,14 +295,12 @@ class HistoryOdds:
         return ViewDensities.of(told[self.n_own - N_SETTINGS : self.n_own])
 
 
-def _rate(share_false: float, chances: NDArray[np.float64]) -> float:
-    """Return how many false points a visit has beside each fruit that hangs."""
-    return float(share_false / (1.0 - share_false) * chances[0])
-
-
 def _counts(classes: NDArray[np.int64], weights: NDArray[np.generic]) -> NDArray[np.float64]:
-    counted = np.bincount(classes.ravel(), weights.ravel().astype(np.float64), len(CHANCES_OF_SEEING))
-    return counted.astype(np.float64)
+    """Return the sum of the weights of looks, (K, V), of each visit and class, (V, C)."""
+    n_visits, n_classes = classes.shape[1], len(CHANCES_OF_SEEING)
+    cells = classes + n_classes * np.arange(n_visits)
+    counted = np.bincount(cells.ravel(), weights.ravel().astype(np.float64), n_visits * n_classes)
+    return counted.reshape(n_visits, n_classes).astype(np.float64)
 
 
 def _in_bins(bins: NDArray[np.int64], weights: NDArray[np.generic]) -> NDArray[np.float64]:

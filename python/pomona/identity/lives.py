@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.identity.histories import Histories, HistoryOdds
-from pomona.identity.stretches import LIKELY
 
 __all__ = ["SHARE_FALSE", "Lives", "lives_of", "states_of"]
 
@@ -26,6 +25,10 @@ USUAL_FALSE = 3
 
 HARDLY = 12.0
 """Logarithm of odds from which a share, and what lies beyond it, counts no more."""
+
+UNEVEN = 12.0
+"""Nats by which visits that differ have to explain all better than visits that are alike: most are, and classes of
+fruits that hide are no exact model, so a few nats are no proof."""
 
 FINE = 400
 """Steps in which the interpolated posterior is summed up."""
@@ -58,9 +61,8 @@ class Lives:
     false: NDArray[np.float64]
 
     def with_emptied(self, emptied: NDArray[np.float64]) -> Lives:
-        """Return it with what hung where stretches were emptied, (K, V) as `Looks.emptied`, taken likelier than not."""
-        taken = emptied.max(axis=1, initial=0.0)
-        return Lives(np.where(taken > LIKELY, np.maximum(self.gone, taken), self.gone), self.false)
+        """Return it with what hung where stretches may have been emptied, (K, V) as `Looks.emptied`, gone as surely."""
+        return Lives(np.maximum(self.gone, emptied.max(axis=1, initial=0.0)), self.false)
 
 
 def lives_of(histories: Histories) -> Lives:
@@ -75,7 +77,9 @@ def lives_of(histories: Histories) -> Lives:
     In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
     odds = HistoryOdds(histories)
-    fits = _fits(odds)
+    fits, uneven = (_fits(odds, alike=alike) for alike in (True, False))
+    if max(one for one, _ in uneven.values()) - max(one for one, _ in fits.values()) > UNEVEN:
+        fits = uneven
     weights = _weights({number: log_posterior for number, (log_posterior, _) in fits.items()})
     gone, false = np.zeros(len(histories.seen)), np.zeros(len(histories.seen))
     for number, weight in weights.items():
@@ -85,26 +89,29 @@ def lives_of(histories: Histories) -> Lives:
     return Lives(gone, false)
 
 
-def _fits(odds: HistoryOdds) -> dict[int, tuple[float, NDArray[np.float64]]]:
+def _fits(odds: HistoryOdds, *, alike: bool) -> dict[int, tuple[float, NDArray[np.float64]]]:
     """Return the log posterior of the shares that count, by number, and what fits each best."""
-    usual = _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start())
+    usual = _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start(), alike=alike)
     fits = {USUAL_FALSE: usual}
     best = usual[0]
     for numbers in (range(USUAL_FALSE - 1, -1, -1), range(USUAL_FALSE + 1, len(SHARES_FALSE))):
         told = usual[1]
         for number in numbers:
-            fits[number] = _climbed(odds, SHARES_FALSE[number], told)
+            fits[number] = _climbed(odds, SHARES_FALSE[number], told, alike=alike)
             best, told = max(best, fits[number][0]), fits[number][1]
             if fits[number][0] < best - HARDLY:
                 break
     return dict(sorted(fits.items()))
 
 
-def _climbed(odds: HistoryOdds, share: float, told: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+def _climbed(
+    odds: HistoryOdds, share: float, told: NDArray[np.float64], *, alike: bool
+) -> tuple[float, NDArray[np.float64]]:
     """Return the log posterior of a share, by the top at this share from `told` on, and where that is."""
     from scipy.optimize import minimize
 
-    top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=odds.bounds, options={"ftol": 1e-8})
+    bounds = odds.bounds(alike=alike)
+    top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8})
     belief = SHARE_FALSE * BELIEF_FALSE * np.log(share) + ((1.0 - SHARE_FALSE) * BELIEF_FALSE - 1.0) * np.log1p(-share)
     return float(belief - top.fun - odds.room(top.x, share)), top.x
 

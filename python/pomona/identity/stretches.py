@@ -20,7 +20,10 @@ STRIPPED = 0.02
 """Beforehand, that what hung in a gap was taken."""
 
 USUAL_SHARE = 0.15
-"""Of a visit's length: mean of what is stripped, exponential. A tree of six, and seldom a half."""
+"""Of a visit's length: mean of what is stripped where single trees are grubbed up, exponential."""
+
+BY_TREES = 0.25
+"""How often it is single trees. Else it is any share alike: pickers go along a row as far as the day lets them."""
 
 LEFT_OUT = 0.02
 """Beforehand, that a visit is of two pieces and left out what is between: any share of its length, alike."""
@@ -84,7 +87,7 @@ def emptied_stretches(
     A visit with fruits of one height and depth on both sides of a gap went by, or is of two pieces. With $L$ the share
     of its length that the gap takes and $n$ the fruits in it that were seen last, the odds that they were taken are
 
-    $$\frac{.02\, e^{-L / .15} / .15}{\prod .02 + m^{n / 2}}$$
+    $$\frac{.02\, (.75 + .25\, e^{-L / .15} / .15)}{\prod .02 + m^{n / 2}}$$
 
     against that each visit since left out this very stretch, or that leaves hide all of it, with $m$ the share of
     other fruits that the visit misses. Fruits do not come back: of the visits before one that has three fruits there
@@ -112,8 +115,10 @@ def emptied_stretches(
             share[gap.place] = max(share[gap.place], gap.share)
             left_out[gap.place] *= LEFT_OUT
             hidden[gap.place] = min(hidden[gap.place], missed[number] ** (n_inside / HIDE_TOGETHER))
-    taken = STRIPPED / USUAL_SHARE * np.exp(-share / USUAL_SHARE)
+    taken = STRIPPED * (1.0 - BY_TREES + BY_TREES * np.exp(-share / USUAL_SHARE) / USUAL_SHARE)
     chances = taken / (taken + left_out + hidden)
+    # Few fruits that leaves may hide at once are no stretch.
+    chances = np.where((chances > LIKELY) | (hidden < left_out), chances, 0.0)
     told = np.zeros(seen.shape)
     last_seen = len(visits) - 1 - seen[:, ::-1].argmax(axis=1)
     for number, (visit, along) in enumerate(zip(visits, rows, strict=True)):
