@@ -1,4 +1,4 @@
-"""Trees that were replaced between two visits: their fruits are not those of the old ones, however alike the trees are."""
+"""Trees that were replaced between two visits: their fruits are not the old ones', however alike the trees are."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,8 @@ def visits(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     new = [stem(rng) if is_new else fruits for fruits, is_new in zip(old, replaced, strict=True)]
     seen = []
     for stems in (old, new):
-        fruits = np.vstack([fruits + [SPACING_M * tree, 0, 0] for tree, fruits in enumerate(stems)])
+        places = np.arange(len(stems))[:, None] * [SPACING_M, 0.0, 0.0]
+        fruits = np.vstack([fruits + place for place, fruits in zip(places, stems, strict=True)])
         fruits = fruits[rng.random(len(fruits)) > 0.25]
         seen.append(fruits + rng.normal(0, 0.014, fruits.shape))
     return *seen, replaced
