@@ -110,10 +110,11 @@ class HistoryOdds:
     $\mathrm{logit}\, c_j = a + b\, x_j + d\, y_j + e_j$, with $x_j$ as in the drawn orchards, $y_j$ 1 where some looks
     missed the fruit and others saw it, the level $a$, the slope $b$ and what is the class's own, $e_j$; before visit
     $v$ the share $h_v$ goes. So a history has the probability $P$, and some visit sees a fruit there with $S$. Beside
-    each that hangs a visit has $\rho = c_0 f / (1 - f)$ false points, which no other visit sees: $f$ is their share of
-    what a first look sees. Of what was seen at a place, $n$ looks,
+    each that hangs a visit has $\rho_v = e^{g_v} c_0 f / (1 - f)$ false points, which no other visit sees: $f$ is their
+    share of what a first look sees, and $g_v$ is 0 where visits are alike. What looks before had missed a visit sees
+    with $\mathrm{logit}\, c_j + l_v$. Of what was seen at a place by visit $w$, of those that looked there,
 
-    $$L = \prod \frac{q\, P + u\, \rho\, [\mathrm{one\ visit\ alone\ saw\ it}]}{S + \rho\, n}$$
+    $$L = \prod \frac{q\, P + u\, \rho_w\, [\mathrm{it\ alone\ saw\ it}]}{S + \sum_v \rho_v}$$
 
     is the likelihood, with the densities $q$ and $u$ of how well first sights see fruits and false points
     (`ViewDensities`). How many fruits hang that nobody saw is not asked: places are given.
