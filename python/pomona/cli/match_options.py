@@ -40,10 +40,21 @@ class Unit(StrEnum):
     free = "free"
 
 
+def _is_noise(value: float | None) -> float | None:
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise PomonaError(f"--noise: found {value}, expected a positive number of metres")
+    return value
+
+
 method_option = typer.Option(None, help="The paper's votes, or constellations verified by log-odds (the default).")
 scale_option = typer.Option(None, help="metric: both clouds are in metres (the default); free: their ratio is unknown.")
+# Looked at with the flags themselves, so that a farm's plan is refused before anything is scanned for it.
 noise_option = typer.Option(
-    None, "--noise", metavar="METRES", help="Relative noise of the visits per axis, above 0; estimated where not given."
+    None,
+    "--noise",
+    metavar="METRES",
+    callback=_is_noise,
+    help="Relative noise of the visits per axis, above 0; estimated where not given.",
 )
 up_option = typer.Option(
     None,
