@@ -34,7 +34,7 @@ N_ROWS = 4
 def visit(number: int, day: str) -> Session:
     """Four of five fruits of a row, 1 cm off, in a frame of their own."""
     row = scene_pair("base", seed=number).map
-    rng = np.random.default_rng([number, int(day[-2:])])
+    rng = np.random.default_rng([number, *map(int, day.split("-"))])
     seen = np.flatnonzero(rng.random(len(row)) < 0.8)
     frame = frame_of_its_own(rng)
     places = row.positions[seen] + rng.normal(0, 0.01, (len(seen), 3))
