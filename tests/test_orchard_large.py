@@ -81,7 +81,7 @@ def test_what_a_visit_more_makes_no_surer_is_not_written_again(orchard: Path) ->
     assert add_session(orchard, visit(2, "2024-10-01")).is_added
     after = {row[0]: row[1:] for row in sights(orchard)}
     same = sum(after[row] == cells for row, cells in before.items())
-    assert same > 0.97 * len(before)
+    assert same > 0.9 * len(before)
 
 
 def sights(path: Path) -> list[tuple[object, ...]]:
