@@ -192,6 +192,21 @@ def test_a_mirrored_row_of_which_a_part_fits_is_not_found() -> None:
     assert dict(match.stages)["mirrored"] == 1.0
 
 
+@pytest.mark.parametrize(("clips", "seed"), [(10, 27), (12, 16), (16, 16), (16, 35), (20, 19)])
+def test_things_at_equal_steps_on_a_line_are_no_answer(clips: int, seed: int) -> None:
+    """Unrelated walls of 150 fruits; both visits took the clips of a wire, half a metre apart, for fruits too."""
+    rng = np.random.default_rng([seed, clips])
+    visits = []
+    for _ in range(2):
+        fruits = np.column_stack(
+            [rng.uniform(0, 0.5 * clips, 150), 0.25 * rng.normal(size=150), rng.uniform(0.5, 2.5, 150)]
+        )
+        along = 0.5 * np.flatnonzero(rng.random(clips) < 1.0) + rng.uniform(0, 0.5)
+        line = np.column_stack([along, np.zeros(clips), np.full(clips, 0.4)]) + 0.01 * rng.normal(size=(clips, 3))
+        visits.append(np.vstack([fruits, line]))
+    assert pomona.match(*visits).status == "NoMatch"
+
+
 @pytest.mark.parametrize("seed", [5, 12, 14])
 def test_a_planting_that_meets_itself_everywhere_is_not_found(seed: int) -> None:
     """Two rows without a common fruit: each step from spur to spur is as good as the next."""

@@ -104,6 +104,21 @@ def test_trees_that_stand_apart_and_hardly_moved_are_one_part(seed: int) -> None
     np.testing.assert_allclose(answer.map_from_query, np.eye(4), atol=0.05)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_branch_that_was_tied_elsewhere_is_a_part_amid_the_row(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    places = rng.uniform([0.0, -0.5, 0.0], [10.0, 0.5, 2.0], (400, 3))
+    moved = abs(places[:, 0] - 5.0) < 0.5
+    visits = [places + rng.normal(0, 0.01, places.shape) for _ in range(2)]
+    visits[0][moved] += [0.5, 0.2, 0.2]
+    shown = [np.flatnonzero(rng.random(len(places)) < 0.9) for _ in range(2)]
+    answer = match(*(FruitCloud(visit[rows]) for visit, rows in zip(visits, shown, strict=True)))
+    right = {shown[0][i] for i, j in answer.pairs if shown[0][i] == shown[1][j]}
+    common = np.intersect1d(*shown)
+    assert answer.n_parts == 2
+    assert np.mean([fruit in right for fruit in common[moved[common]]]) > 0.9
+
+
 def test_what_was_not_found_lies_nowhere() -> None:
     query = seen(1, is_torn=False)[0]
     answer = match(query, scene_pair("base", seed=4).map)

@@ -97,11 +97,6 @@ impl Finding<'_> {
         self.of_all_parts().map(|settled| settled.evidence).reduce(|all, part| all + part).unwrap_or(f64::NEG_INFINITY)
     }
 
-    /// Whether a fruit of the query lies in what it explains.
-    pub(super) fn has(&self, row: usize) -> bool {
-        self.settled.as_ref().map_or(&self.overlap, |settled| &settled.overlap).predictions[row].is_some()
-    }
-
     /// As it stands in the end, with its further parts.
     pub(super) fn of_all_parts(&self) -> impl Iterator<Item = &Settled> {
         self.settled.iter().chain(&self.further)

@@ -2,6 +2,7 @@
 
 use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Log, Search};
+use super::decision::CLEAR;
 use super::doubts::Rated;
 use super::overlap::Overlap;
 use super::settlement::Settled;
@@ -23,7 +24,8 @@ impl<'a> Search<'a> {
 
     /// What rules the best finding out, by the name of its stage.
     fn doubt_of(&self, best: &Finding, log: &Log) -> Option<&'static str> {
-        if best.fits_moved(log) {
+        let needed = log.threshold.max(self.threshold(log.effort.stands.share_left()));
+        if best.fits_moved(CLEAR * needed) {
             return Some("moved");
         }
         self.fits_better_mirrored(best, log).then_some("mirrored")
@@ -42,7 +44,7 @@ impl<'a> Search<'a> {
         };
         let overlap = Overlap { log_odds: found.overlap.log_odds, ..settled.overlap.clone() };
         let best = Rated { overlap: &overlap, nats: found.overlap.log_odds.max(found.evidence()) };
-        let pairs = self.pairs(found);
+        let mut pairs = self.pairs(found);
         let is_new = |other: &Finding| found.further.iter().all(|part| !self.shows(&part.overlap, &other.overlap));
         let outdone = others.iter().any(|other| is_new(other) && self.outdoes(best, other.rated(), pattern));
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
@@ -53,6 +55,11 @@ impl<'a> Search<'a> {
             .filter(|other| is_new(other) && self.excludes(best, other.rated(), pattern))
             .map(|finding| self.registration(&finding.overlap))
             .collect();
+        // What was measured does not tell the poses apart: the pairs are those of one of them.
+        let poses = (1 + rivals.len()) as f64;
+        for pair in &mut pairs {
+            pair.probability /= poses;
+        }
         Match {
             verdict: if rivals.is_empty() { Verdict::Found } else { Verdict::Ambiguous },
             registration: Some(self.registration(&overlap)),

@@ -23,8 +23,12 @@ pub(super) fn is_sparser(one: &Landscape, other: &Landscape, scale: Scale) -> bo
 }
 
 /// Seeds times fruits of the map that are tried, and seeds at the most: one takes a microsecond or two a fruit.
-const TRIED: usize = 50_000;
-const MOST: usize = 48;
+const TRIED: usize = 200_000;
+const MOST: usize = 128;
+
+/// Fruits of the query times poses that are refined: of thousands that a sparse visit lets pass at first the right one is seldom
+/// among the best, and few fruits are refined fast.
+const REFINED: usize = 100_000;
 
 /// Length of a seed in standard deviations of the noise, at the least.
 const LEAST: f64 = 10.0;
@@ -32,16 +36,13 @@ const LEAST: f64 = 10.0;
 /// And in spacings of the map, at the most: a few fruits strewn over a long row would be laid on all of it for minutes.
 const LONGEST: f64 = 6.0;
 
-/// Candidates of seeds of a sparse query that are refined.
-const LAID_SPARSE: usize = 64;
-
 impl<'a> Search<'a> {
     /// Lays seeds of a sparse query on all fruits of the map, where its index has none of them.
     pub(super) fn lay_sparse_seeds(&self, findings: &mut Findings<'a>) {
         let (mut candidates, effort) = self.congruent();
         findings.log.effort = findings.log.effort + effort;
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, LAID_SPARSE);
+        let best = distinct(self.query, self.map.spacing, &candidates, (REFINED / self.query.len()).max(1));
         let hypotheses = self.refined(&best);
         findings.log.refined += hypotheses.len();
         self.grow_distinct(&hypotheses, findings);

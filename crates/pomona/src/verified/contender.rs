@@ -20,6 +20,9 @@ pub(super) fn by_evidence(a: &Contender, b: &Contender) -> std::cmp::Ordering {
     b.log_odds.total_cmp(&a.log_odds).then(a.key.cmp(&b.key))
 }
 
+/// Candidates that are refined of those that a search proposes at a time.
+pub(super) const REFINED: usize = 48;
+
 /// The best `keep` candidates of those given best first, one of each pose.
 pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Contender], keep: usize) -> Vec<Contender> {
     let (spacings, turn_rad) = SAME;

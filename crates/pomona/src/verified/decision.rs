@@ -4,7 +4,6 @@ use super::acceptance::{KEPT, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::congruent::is_sparser;
 use super::contender::Contender;
-use super::doubts::RIVAL_CANDIDATES;
 use super::growth::{grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
@@ -99,8 +98,8 @@ impl<'a> Search<'a> {
     /// Rounds of seeds until a pose is accepted, and the offsets where they find none.
     fn run(&self) -> Findings<'a> {
         let mut findings = Findings::none(Effort::default(), self.threshold(Vertical::share_of_turns()));
-        for (seeds, keep) in self.rounds() {
-            let rest = self.try_seeds(&seeds, keep, &mut findings);
+        for seeds in self.rounds() {
+            let rest = self.try_seeds(&seeds, &mut findings);
             self.sift(&mut findings);
             if !findings.accepted.is_empty() {
                 self.doubt(&mut findings, &rest);
@@ -131,16 +130,16 @@ impl<'a> Search<'a> {
     fn upside_down_poses(&self) -> Vec<Finding<'a>> {
         let Some(inverted) = self.upside_down() else { return Vec::new() };
         let mut findings = Findings::none(Effort::default(), 0.0);
-        for (seeds, keep) in inverted.rounds() {
-            inverted.try_seeds(&seeds, keep, &mut findings);
+        for seeds in inverted.rounds() {
+            inverted.try_seeds(&seeds, &mut findings);
         }
         findings.accepted.retain(|finding| inverted.is_pose(finding));
         findings.accepted
     }
 
     /// Grows the best of what seeds propose; returns the candidates that were not refined.
-    pub(super) fn try_seeds(&self, seeds: &[Seed], keep: usize, findings: &mut Findings<'a>) -> Vec<Contender> {
-        let (hypotheses, rest) = self.ask(seeds, keep, &mut findings.log);
+    pub(super) fn try_seeds(&self, seeds: &[Seed], findings: &mut Findings<'a>) -> Vec<Contender> {
+        let (hypotheses, rest) = self.ask(seeds, &mut findings.log);
         self.grow_distinct(&hypotheses, findings);
         rest
     }
@@ -168,7 +167,7 @@ impl<'a> Search<'a> {
         accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
-    /// Looks for rivals of what was found, and for better optima near it.
+    /// Looks for rivals of what was found.
     pub(super) fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
         self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
@@ -176,12 +175,8 @@ impl<'a> Search<'a> {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - findings.log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
-            self.try_seeds(&more, RIVAL_CANDIDATES, findings);
+            self.try_seeds(&more, findings);
         }
-        self.sift(findings);
-        let least = SURE * findings.log.threshold;
-        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < least;
-        findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
         self.sift(findings);
     }
 

@@ -8,7 +8,7 @@
 use super::acceptance::VerifiedConfig;
 use super::case::{Search, VerifiedMap};
 use super::congruent::each_alike_among;
-use super::contender::{Contender, by_evidence, distinct};
+use super::contender::{Contender, REFINED, by_evidence, distinct};
 use super::decision::{MIN_FRUITS, SURE};
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
@@ -18,9 +18,8 @@ use crate::answer::{Match, Verdict};
 use crate::geometry::{Scale, Similarity};
 use crate::matching::Request;
 
-/// Fruits whose seeds are laid on the map, at the most; and poses that are refined.
+/// Fruits whose seeds are laid on the map, at the most.
 const FRUITS: usize = 128;
-const REFINED: usize = 32;
 
 /// Finds the query in the map where it is expected; `NoMatch` where that leaves a doubt. Both are there without seeds.
 pub(crate) fn search_expected(

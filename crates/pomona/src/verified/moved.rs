@@ -3,8 +3,7 @@
 //! Where fruits hang at equal distances, or along thin wires, a wrong pose lays them on each other nearly as well as the best
 //! one, and so it does a little further along. Where a pose is right, nothing is left of its evidence there.
 
-use super::case::{Finding, Log};
-use super::decision::CLEAR;
+use super::case::Finding;
 use super::doubts::is_most;
 use super::evidence::evidence;
 use super::layers::BEYOND_A_CLUSTER;
@@ -25,22 +24,28 @@ const PATTERN_SHARE_LAID: f64 = 0.4;
 const FARTHEST: f64 = 16.0;
 
 impl Finding<'_> {
-    /// Whether a settled finding, moved along the row or up, keeps much of its evidence. What is clear is not doubted.
-    pub(super) fn fits_moved(&self, log: &Log) -> bool {
-        let Some(settled) = self.settled.as_ref().filter(|_| self.overlap.log_odds < CLEAR * log.threshold) else {
-            return false;
-        };
+    /// Whether a settled finding with less evidence than is `clear`, nats, keeps much of it where it is moved along its pairs.
+    pub(super) fn fits_moved(&self, clear: f64) -> bool {
+        let Some(settled) = self.settled.as_ref().filter(|_| self.overlap.log_odds < clear) else { return false };
+        // What hangs at equal distances may be few of the fruits, and along none of the axes of all.
+        let pairs: Vec<Vector3<f64>> = settled
+            .beliefs
+            .links()
+            .filter(|(_, probability)| *probability > 0.5)
+            .map(|(edge, _)| self.growth.patches.map.points[edge.map as usize])
+            .collect();
+        let Some(principal) = Principal::of(pairs.iter()) else { return false };
         let Overlap { pose, sigma, predictions, .. } = settled.overlap.clone();
         let direction = settled.direction.clone();
         let laid = Patchwork { pose, sigma, direction, predictions, ..self.growth.patches.clone() };
         let share = if laid.model.row.is_some() { PATTERN_SHARE_LAID } else { PATTERN_SHARE };
-        most_moved(&laid) > share * settled.evidence
+        most_moved(&laid, &principal) > share * settled.evidence
     }
 }
 
-/// Most evidence of a settled pose moved along either longer axis of its overlap, every prediction by as much, in steps of their
+/// Most evidence of a settled pose moved along either longer of the `principal` axes, every prediction by as much, in steps of their
 /// noise; as far as most of what the map has shown is still expected.
-fn most_moved(laid: &Patchwork) -> f64 {
+fn most_moved(laid: &Patchwork, principal: &Principal) -> f64 {
     let expected = due(laid);
     let of = |by: &Vector3<f64>| {
         let mut there = laid.clone();
@@ -48,7 +53,7 @@ fn most_moved(laid: &Patchwork) -> f64 {
         there.predictions.iter_mut().flatten().for_each(|at| at.place += by);
         if is_most(due(&there) / expected) { evidence(&there) } else { f64::NEG_INFINITY }
     };
-    shifts(laid).par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
+    shifts(laid, principal).par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
 }
 
 /// Fruits that the map should have shown.
@@ -56,12 +61,11 @@ fn due(laid: &Patchwork) -> f64 {
     laid.due().iter().sum()
 }
 
-/// Ways to move the overlap along its two longer axes, either way: further than a cluster is wide, by half its extent at the most.
-fn shifts(laid: &Patchwork) -> Vec<Vector3<f64>> {
+/// Ways to move the overlap along the two longer axes, either way: further than a cluster is wide, by half its extent at the most.
+fn shifts(laid: &Patchwork, principal: &Principal) -> Vec<Vector3<f64>> {
     let landings: Vec<_> = laid.predictions.iter().flatten().collect();
     let count = landings.len() as f64;
     let step = (landings.iter().map(|at| at.variance).sum::<f64>() / count).sqrt();
-    let Some(principal) = Principal::of(landings.iter().map(|at| &at.place)) else { return Vec::new() };
     let [along, up, _] = principal.ways();
     let steps = |way: Vector3<f64>| {
         let places = landings.iter().map(|at| at.place.dot(&way));
@@ -92,7 +96,8 @@ mod tests {
         laid.cells.iter_mut().for_each(|cell| cell.reached = true);
         let land = |p: &Vector3<f64>| Some(Landing { place: pose.image(p), variance: 0.02 * 0.02 });
         laid.predictions = query.points.iter().map(land).collect();
-        most_moved(&laid) / evidence(&laid)
+        let principal = Principal::of(map.points.iter()).expect("places that extend");
+        most_moved(&laid, &principal) / evidence(&laid)
     }
 
     #[test]

@@ -12,9 +12,6 @@ use super::contender::first_of_each;
 /// and below this they are not yet in the tail.
 const REACHED: f64 = 12.0;
 
-/// Poses that are polished before they are compared: the best and what may come to be second.
-const COMPARED: usize = 3;
-
 impl<'a> Search<'a> {
     /// Takes the best pose out of those that were not accepted, where it stands out of the others, has the `least` evidence and
     /// keeps the shares `kept` of what is asked for.
@@ -28,15 +25,13 @@ impl<'a> Search<'a> {
         others.sort_by(|a, b| b.overlap.log_odds.total_cmp(&a.overlap.log_odds));
         let distinct = self.distinct(others);
         distinct.first().filter(|&&best| self.model.admits(&others[best].overlap.pose))?;
-        let rate = self.config.false_alarm_rate;
-        // Half of the distance that is asked for: most poses that do not stand out need no closer look.
-        if evidence(others, distinct[0]) <= outlying(rate.sqrt(), self.second(others, &distinct)) {
+        let stands_out = outlying(self.config.false_alarm_rate, self.second(others, &distinct));
+        let best = evidence(others, distinct[0]);
+        if best <= stands_out {
             return None;
         }
-        distinct.iter().take(COMPARED).for_each(|&at| self.polish(&mut others[at]));
-        let second = self.second(others, &distinct);
-        log.best = log.best.max(evidence(others, distinct[0]));
-        log.threshold = outlying(rate, second).max(least);
+        log.best = log.best.max(best);
+        log.threshold = stands_out.max(least);
         self.holds(&mut others[distinct[0]], kept, log).then(|| others.swap_remove(distinct[0]))
     }
 

@@ -1,31 +1,29 @@
 //! What the first answer leaves over.
 //!
 //! A search ends with the first round of seeds that finds an answer, and a further part of a row that is torn apart, or a rival, may
-//! need a later one.
+//! need a later one. It may lie beyond what the answer reaches, or amid it: a branch that was tied elsewhere, a tree that leans.
 
-use super::case::{Findings, Search};
+use super::case::{Finding, Findings, Search};
+use super::decision::MIN_FRUITS;
 use super::proposal::Effort;
 
-/// Fruits of the query that no finding explains, where others are looked for: fewer are hardly found anywhere.
-const LEAST_REST: usize = 12;
+/// Nearest neighbours of a fruit that have no partner either where a further part may lie. Of fruits that hide one by one, or behind a
+/// leaf, hardly any is alone among so many; a stretch that lies elsewhere has some in its middle.
+const AROUND: usize = 4;
 
 /// Mean probability of the pairs of a further part, at the least: 0.9 and more where it is one, 0.5 to 0.65 where fruits on shells or
 /// wires lie on others.
 const BELIEVED: f64 = 0.75;
 
 impl<'a> Search<'a> {
-    /// Looks for further parts of a row that is torn apart, or rivals, where fruits of the query lie that no finding explains.
+    /// Looks for further parts of a row that is torn apart, or rivals, where fruits of the query lie that are without partners together.
     pub(super) fn look_at_the_rest(&self, findings: &mut Findings<'a>) {
-        loop {
-            let rest: Vec<bool> =
-                (0..self.query.len()).map(|row| !findings.accepted.iter().any(|found| found.has(row))).collect();
-            if findings.accepted.is_empty() || rest.iter().filter(|rest| **rest).count() < LEAST_REST {
-                return;
-            }
+        while !findings.accepted.is_empty() {
+            let Some(alone) = self.alone(findings) else { return };
             let mut more = Findings::none(Effort::default(), findings.log.threshold);
-            for (mut seeds, keep) in self.rounds() {
-                seeds.retain(|(quad, _)| quad.iter().all(|&row| rest[row as usize]));
-                self.try_seeds(&seeds, keep, &mut more);
+            for mut seeds in self.rounds() {
+                seeds.retain(|(quad, _)| quad.iter().all(|&row| alone[row as usize]));
+                self.try_seeds(&seeds, &mut more);
                 self.sift(&mut more);
                 if !more.accepted.is_empty() {
                     break;
@@ -40,5 +38,20 @@ impl<'a> Search<'a> {
             }
             findings.accepted.append(&mut more.accepted);
         }
+    }
+
+    /// Fruits of the query that are likelier without a partner than with one; `None` where hardly any are so together.
+    fn alone(&self, findings: &Findings) -> Option<Vec<bool>> {
+        let mut paired = vec![0.0; self.query.len()];
+        for (edge, probability) in findings.accepted.iter().flat_map(Finding::links) {
+            paired[edge.query as usize] += probability;
+        }
+        let alone: Vec<bool> = paired.iter().map(|paired| *paired < 0.5).collect();
+        let amid = |row: &usize| {
+            let around = self.query.neighbours(*row).iter().take(AROUND);
+            alone[*row] && around.copied().all(|other| alone[other as usize])
+        };
+        let together = (0..self.query.len()).filter(amid).take(MIN_FRUITS).count();
+        (together == MIN_FRUITS).then_some(alone)
     }
 }

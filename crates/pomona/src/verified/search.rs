@@ -1,7 +1,7 @@
 //! From seeds to hypotheses: rounds of query seeds, their candidates in the map, the best of them refined.
 
 use super::case::{Log, Search, VerifiedMap};
-use super::contender::{Contender, by_evidence, distinct};
+use super::contender::{Contender, REFINED, by_evidence, distinct};
 use super::hypothesis::{Hypothesis, refined};
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
@@ -10,22 +10,12 @@ use crate::geometry::Scale;
 use crate::random::shuffled;
 use rayon::prelude::*;
 
-/// Candidates that are refined in each round of the search (see [`Search::seeds_of`]).
-const ROUNDS: [usize; 4] = [32, 32, 48, 64];
-
-/// One in so many of the longest seeds is tried in the third round.
-const THIRD_ROUND: usize = 5;
-
 /// Fruits whose seeds make the first round, at the most: where the visits overlap well, few are enough in a cloud of
 /// any size. Also the seeds that are tried at the least before an answer stands alone.
 pub(super) const FIRST_FRUITS: usize = 256;
 
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
-
-/// Times more seeds where the vertical is known, which rules most candidates out before they cost much: they show the
-/// other poses that an answer has to stand out of.
-const UPRIGHT_SEEDS: u64 = 2;
 
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
 fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
@@ -44,43 +34,32 @@ fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
 }
 
 impl Search<'_> {
-    /// The rounds of a search, each made when it is asked for: their seeds, and how many of their candidates are
-    /// refined.
-    pub(super) fn rounds(&self) -> impl Iterator<Item = (Vec<Seed>, usize)> {
-        let mut long = Vec::new();
-        (0..).zip(ROUNDS).map(move |(round, keep)| (self.seeds_of(round, &mut long), keep))
-    }
-
-    /// Seeds of a round: one of some fruits, another of every fruit, then the longest of all, some and the rest.
-    fn seeds_of(&self, round: usize, long: &mut Vec<Seed>) -> Vec<Seed> {
-        match round {
+    /// The rounds of a search, each made when it is asked for: seeds of some fruits, another of every fruit, then the longest of all.
+    pub(super) fn rounds(&self) -> impl Iterator<Item = Vec<Seed>> {
+        let some = |round: usize| match round {
             0 => of_some_fruits(self.query, self.query.len().div_ceil(FIRST_FRUITS) as u64, 0..1),
             1 => of_some_fruits(self.query, 1, 1..2),
-            2 => {
-                let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
-                let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
-                *long = self.longest_seeds(usize::try_from(count).unwrap_or(usize::MAX));
-                long.split_off(long.len() - long.len() / THIRD_ROUND)
-            }
-            _ => std::mem::take(long),
-        }
+            _ => self.longest_seeds(),
+        };
+        (0..3).map(some)
     }
 
     /// The longest seeds of the query that the map can have: what is longer than nearly all of its own, as where fruits were picked
     /// before the query, has others between its fruits there.
-    fn longest_seeds(&self, count: usize) -> Vec<Seed> {
-        longest(self.query, count, self.prepared.seeds.longest)
+    fn longest_seeds(&self) -> Vec<Seed> {
+        let count = self.config.seeds_per_fruit.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
+        longest(self.query, usize::try_from(count).unwrap_or(usize::MAX), self.prepared.seeds.longest)
     }
 
-    /// Candidates of all seeds: the best `keep` of them refined, and the others in order.
-    pub(super) fn ask(&self, seeds: &[Seed], keep: usize, log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
+    /// Candidates of all seeds: the best of them refined, and the others in order.
+    pub(super) fn ask(&self, seeds: &[Seed], log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
         let of_each: Vec<(Vec<Contender>, Effort)> = seeds.par_iter().map(|&seed| self.candidates_of(seed)).collect();
         log.seeds += seeds.len();
         log.effort = log.effort + of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
         log.threshold = self.threshold(log.effort.stands.share_left());
         let mut candidates: Vec<Contender> = of_each.into_iter().flat_map(|(found, _)| found).collect();
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, keep);
+        let best = distinct(self.query, self.map.spacing, &candidates, REFINED);
         candidates.retain(|one| best.iter().all(|other| other.key != one.key));
         let hypotheses = self.refined(&best);
         log.refined += hypotheses.len();
