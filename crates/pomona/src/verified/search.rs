@@ -79,18 +79,12 @@ impl Search<'_> {
         if length < SHORTEST * sigma {
             return (found, effort);
         }
-        // Standard deviations that the two seeds may differ by.
-        let (long, widest) = LONG;
-        let apart = match model.scale {
-            Scale::Metric => WITHIN * (length / (long * sigma)).clamp(1.0, widest),
-            Scale::Free => WITHIN,
-        };
         let (mut runs, mut hits, common) = (Vec::new(), Vec::new(), common_in(index.quads.len()));
         near_ties(&query.points, seed.0, WITHIN * sigma, &mut |quad, code| {
             effort.codes += 1;
             let (code, radius) = match model.scale {
-                Scale::Metric => (code, apart * sigma),
-                Scale::Free => (without_scale(&code), apart * sigma / length),
+                Scale::Metric => (code, WITHIN * sigma),
+                Scale::Free => (without_scale(&code), WITHIN * sigma / length),
             };
             hits.clear();
             index.codes.within(&code, radius as f32, &mut runs, |hit| hits.push(hit));
@@ -100,7 +94,7 @@ impl Search<'_> {
                 return;
             }
             let Some(proposer) = Proposer::new(query, map, &model, quad) else { return };
-            let most = 2.0 * (apart * model.sigma).powi(2);
+            let most = 2.0 * (WITHIN * model.sigma).powi(2);
             let targets = hits.iter().map(|&hit| &index.quads[hit as usize]);
             found.extend(targets.filter_map(|target| proposer.contender(target, most, &mut effort)));
         });
@@ -113,13 +107,6 @@ impl Search<'_> {
         refined([self.query, self.map], &self.model, REACH * self.query.spacing, &starts)
     }
 }
-
-/// Seeds longer than this, in standard deviations, are searched as much more widely as they are longer, up to so many
-/// times.
-///
-/// They bend more between visits, and where the noise is larger than expected they are found still. It costs little
-/// where the length tells: a long seed has few lookalikes.
-const LONG: (f64, f64) = (24.0, 2.0);
 
 /// Neighbours of a code that every cluster shows, in a map of no more seeds than this: some eight trees.
 const COMMON: (f64, f64) = (48.0, 5e4);
