@@ -6,6 +6,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pomona import _core
 from pomona.identity import Conclusion, SeenVisit, VisitPair, conclude
@@ -211,6 +212,20 @@ def test_cameras_tell_where_a_visit_looked_and_from_where() -> None:
     assert by_cameras.tolist() == [True, False, False]
     towards = towards_camera(seeing, of_visit, np.eye(3))
     np.testing.assert_allclose(towards[0], (0, -1, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("roll", [0.0, 90.0], ids=["lying", "standing"])
+def test_fruits_high_and_low_say_nothing_of_what_lies_beyond_the_end_of_a_drive(roll: float) -> None:
+    places = row(400)
+    cameras = np.array([looking_along_y(x) for x in np.arange(0.0, 3.01, 0.12)])
+    cameras[:, :3, :3] = cameras[:, :3, :3] @ Rotation.from_euler("z", roll, degrees=True).as_matrix()
+    own = places[places[:, 0] < 3.3]
+    assert np.abs(own[:, 2] - 1.5).max() > 0.9
+    beyond = np.array([[x, 0.2, 1.5] for x in (2.9, 3.2, 3.6, 4.2)])
+    of_visit = AskedPlaces(beyond, NearFruits(own), np.full(4, -1))
+    by_cameras = looked_at_by_cameras(visit(0, own, cameras=cameras), of_visit)
+    assert by_cameras is not None
+    assert by_cameras.tolist() == [True, True, False, False]
 
 
 def test_lines_of_sight_tell_the_side_where_there_are_no_cameras() -> None:

@@ -82,16 +82,17 @@ def on_days(sights: Sights, labels: NDArray[np.int64]) -> NDArray[np.int64]:
 def looked_at_by_cameras(visit: SeenVisit, asked: AskedPlaces) -> NDArray[np.bool_] | None:
     """Tell before which places, (K,), a camera came as straight, and as near, as before most fruits of the visit.
 
-    None where the visit has no cameras, or they do not explain its own fruits.
+    Straight in the camera's x and y apart, as a picture is a rectangle: fruits high and low on a tree say how far a
+    picture reaches up and down, and nothing of what lies beyond the end of a drive. None where the visit has no
+    cameras, or they do not explain its own fruits.
     """
     if visit.cameras is None or not len(visit.cameras):
         return None
     straightest = _straightest(visit.cameras, asked.fruits.positions)
-    widest, farthest_m = (np.quantile(each, AS_MOST, method="lower") for each in straightest)
-    if not np.isfinite(widest):
+    farthest = np.quantile(straightest, AS_MOST, axis=1, method="lower")
+    if not np.isfinite(farthest).all():
         return None
-    tangents, depths_m = _straightest(visit.cameras, asked.places)
-    return np.asarray((tangents <= widest) & (depths_m <= farthest_m))
+    return np.asarray((_straightest(visit.cameras, asked.places) <= farthest[:, None]).all(axis=0))
 
 
 def reaches_m(own: NearFruits, spacings_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -111,18 +112,17 @@ def has_fruits_near(asked: AskedPlaces, reach_m: NDArray[np.float64]) -> NDArray
     return np.asarray(asked.nearest[0][:, NEIGHBOURS - 1] <= reach_m)
 
 
-def _straightest(
-    cameras: NDArray[np.float64], places: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return tangent and depth of each place in the camera that has it most in its middle, (K,) each."""
-    best, depths = np.full(len(places), np.inf), np.full(len(places), np.inf)
+def _straightest(cameras: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return |x| / z, |y| / z and z of each place in the camera that has it nearest to its axis, (3, K)."""
+    least, best = np.full(len(places), np.inf), np.full((3, len(places)), np.inf)
     for camera in cameras:
         x, y, z = camera[:3, :3].T @ (places - camera[:3, 3]).T
         with np.errstate(divide="ignore", invalid="ignore"):
-            tangents = np.where(z > 0, np.maximum(np.abs(x), np.abs(y)) / z, np.inf)
-        depths = np.where(tangents < best, z, depths)
-        best = np.minimum(best, tangents)
-    return best, depths
+            across, along = np.abs(x) / z, np.abs(y) / z
+        off_axis = np.where(z > 0, across**2 + along**2, np.inf)
+        best = np.where(off_axis < least, (across, along, z), best)
+        least = np.minimum(least, off_axis)
+    return best
 
 
 def towards_camera(visit: SeenVisit, asked: AskedPlaces, axes: NDArray[np.float64]) -> NDArray[np.float64]:
