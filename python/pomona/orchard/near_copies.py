@@ -1,14 +1,16 @@
-"""Whether a session is one that the map has: fruits that lie to each other, and measure, as one visit saw them.
+"""Whether a session is one that the map has: fruits that lie to each other, and are missed, as one visit saw them.
 
-Who saves a table again changes its order, its frame, its last digits or a few of its rows; its hash says nothing then.
-Two visits never see a row alike: their fruits scatter by centimetres. Fruits are compared with the ones beside them,
-which asks for no pose, and holds where either visit is torn apart and was mended.
+Who saves a table again changes its order, its frame, its last digits, its sizes or a few of its rows, and its hash says
+nothing then. Two visits scatter by centimetres, or by millimetres within an hour, and each misses fruits that the other
+sees and sees what is none; a copy has the fruits of one visit, its false points too, and has them nearer than fruits
+are measured. So three things are asked, each of which a copy has to the least that can be: how far fruits lie as they
+do in the other visit, and how many each of both has alone. Places alone tell; sizes may be measured anew.
 """
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,47 +22,104 @@ from pomona.store.failures import WrongContentError
 __all__ = ["require_no_near_copy"]
 
 Array = NDArray[np.float64]
-
-SAME_M = 1e-3
-"""Between what two copies tell of a length: one may be rounded to millimetres."""
+Rows = NDArray[np.int64]
 
 BESIDE = 3
-"""Fruits next to one to which its distances are compared; most have to be the same, as one of them may be changed."""
+"""Fruits next to one to which its distances are compared: that asks for no pose, and holds where a visit is torn. Most
+have to be the same, as one of them may be changed."""
 
-LEAST, SHARE = 10, 0.9
-"""Matched fruits that say something, and those of them that a copy has as they were."""
+LEAST = 10
+"""Matched fruits that say something."""
+
+SCATTER_M = 0.02
+"""By so much distances between neighbours differ from visit to visit, in the middle, where the map cannot say: 17 to
+25 mm in drawn orchards."""
+
+TIMES = 0.7
+"""Spread of its logarithm, a factor of two: visits an hour apart with a sensor that errs by 2.5 mm have 4 mm."""
+
+ALONE = (1.5, 8.5)
+"""Beta distribution of the share of fruits that one of two visits alone has: .15 in the mean, under .02 once in 20."""
+
+REAL = 1e-4
+"""A visit that is as like as one in so many real ones is a copy."""
 
 
 def require_no_near_copy(
     connection: sqlite3.Connection, name: str, visit: KnownVisit, evidence: Evidence, matches: Mapping[int, VisitPair]
 ) -> None:
-    """Refuse a visit, called `name`, that saw what one that it matches saw, to the millimetre."""
+    """Refuse a visit, called `name`, that is more like one that it matches than two visits are."""
     for number, pair in sorted(matches.items()):
+        if len(pair.rows) < LEAST:
+            continue
         other = evidence.visits[number]
         own = int(visit.seen.key > other.seen.key)
-        n_same = _n_same(visit, pair.rows[:, own], other, pair.rows[:, 1 - own])
-        if n_same > SHARE * max(len(pair.rows), LEAST):
+        visits, rows = (visit, other), (pair.rows[:, own], pair.rows[:, 1 - own])
+        scatter_m = _scatter_m(visits, rows)
+        usual_m = min(_usual_scatters_m(evidence, number), default=SCATTER_M)
+        alone = [_alone(*both) for both in zip(visits, rows, strict=True)]
+        if _chance_of_real(scatter_m / usual_m, alone) < REAL:
             (there,) = connection.execute("SELECT name FROM sessions WHERE id = ?", (other.session_id,)).fetchone()
             raise WrongContentError(
-                f"session {name} is in the map already, as {there}: {n_same} of {len(pair.rows)} fruits lie as they do "
-                f"there, to {1e3 * SAME_M:g} mm, expected those of another visit"
+                f"session {name} is in the map already, as {there}: {len(pair.rows)} of {alone[0][1]} fruits lie as "
+                f"they do there, to {1e3 * scatter_m:.1f} mm, expected those of another visit, which are some "
+                f"{1e3 * usual_m:.0f} mm off and not all the same"
             )
 
 
-def _n_same(visit: KnownVisit, rows: NDArray[np.int64], other: KnownVisit, other_rows: NDArray[np.int64]) -> int:
-    """Count the matched fruits that lie to those beside them, and measure, as in the other visit."""
+def _usual_scatters_m(evidence: Evidence, number: int) -> Iterator[float]:
+    """Give by how much a visit and each other one of the map that it matches differ."""
+    for pair in evidence.pairs:
+        if number in (pair.first, pair.second) and len(pair.rows) >= LEAST:
+            visits = evidence.visits[pair.first], evidence.visits[pair.second]
+            yield _scatter_m(visits, (pair.rows[:, 0], pair.rows[:, 1]))
+
+
+def _scatter_m(visits: tuple[KnownVisit, KnownVisit], rows: tuple[Rows, Rows]) -> float:
+    """Return by how much distances between neighbours among matched fruits differ, in the middle."""
     from scipy.spatial import cKDTree
 
-    if len(rows) < LEAST:
-        return 0
-    places, others = visit.cloud.positions[rows], other.cloud.positions[other_rows]
+    places, others = (visit.cloud.positions[own] for visit, own in zip(visits, rows, strict=True))
     beside = np.asarray(cKDTree(places).query(places, k=BESIDE + 1)[1])[:, 1:]
-    differences_m = np.abs(_to(places, beside) - _to(others, beside))
-    grown_m = np.abs(visit.seen.diameters_m[rows] - other.seen.diameters_m[other_rows])
-    is_same = (np.median(differences_m, axis=1) <= SAME_M) & ~(grown_m > SAME_M)
-    return int(is_same.sum())
+    return float(np.median(np.median(np.abs(_to(places, beside) - _to(others, beside)), axis=1)))
 
 
-def _to(places: Array, beside: NDArray[np.int64]) -> Array:
+def _to(places: Array, beside: Rows) -> Array:
     """Give the distance from each place to those beside it, (N, K)."""
     return np.asarray(np.linalg.norm(places[beside] - places[:, None], axis=2), np.float64)
+
+
+def _alone(visit: KnownVisit, rows: Rows) -> tuple[int, int]:
+    """Count the fruits that the other visit has not, and all, where it looked: where it has the fruit next to each."""
+    from scipy.spatial import cKDTree
+
+    places = visit.cloud.positions
+    is_matched = np.zeros(len(places), bool)
+    is_matched[rows] = True
+    beside = np.asarray(cKDTree(places).query(places, k=2)[1])[:, 1]
+    n_alone = int((~is_matched & is_matched[beside]).sum())
+    return n_alone, n_alone + len(rows)
+
+
+def _chance_of_real(scatter: float, alone: list[tuple[int, int]]) -> float:
+    """Return the chance that a real visit is as like another: `scatter` in what is usual, fruits alone of all.
+
+    By the scatter alone, as rows may be added to a copy and taken away, or by the product of all three chances
+    (Fisher). One of the two is enough: hence twice the less.
+    """
+    from scipy.special import ndtr
+
+    near = float(ndtr(np.log(max(scatter, 1e-9)) / TIMES))
+    log_product = np.log(near) + sum(np.log(_chance_of_fewer(*counts)) for counts in alone)
+    return 2.0 * min(near, float(np.exp(log_product) * (1.0 - log_product + 0.5 * log_product**2)))
+
+
+def _chance_of_fewer(count: int, n: int) -> float:
+    """Return the chance that no more than so many of n are alone: the beta-binomial distribution."""
+    from scipy.special import betaln
+
+    each = np.arange(count + 1.0)
+    first, second = ALONE
+    log_ways = -np.log(n + 1.0) - betaln(n - each + 1.0, each + 1.0)
+    log_chances = log_ways + betaln(each + first, n - each + second) - betaln(first, second)
+    return min(float(np.exp(log_chances).sum()), 1.0)
