@@ -345,7 +345,8 @@ def test_an_error_that_all_visits_share_is_in_the_intervals(row_growth: SeasonGr
 def test_two_visits_of_one_day_have_an_error_each(tmp_path: Path) -> None:
     row = grow_row(tmp_path / "twice.gpkg", days=(50, 65), scales=(1.0, 1.0))
     again = OrchardMap(row.path).fruits()
-    cloud = FruitCloud(again.positions, diameters_m=1.05 * row.curves.diameters_m(65.2))
+    scattered = again.positions + np.random.default_rng(1).normal(0, 0.003, again.positions.shape)
+    cloud = FruitCloud(scattered, diameters_m=1.05 * row.curves.diameters_m(65.2))
     assert add_session(row.path, Session("evening", f"{row.day(65)}T18:00:00", "drawn", cloud)).is_added
     found = grow_season(row.path)
     assert len(found.fruits.days) == 3
