@@ -44,8 +44,12 @@ def grow_row(
     slowed_from: float = 0.0,
     labels: str = "apple {}",
     name: str = "{}",
+    dated: Sequence[int] = (),
 ) -> GrownRow:
-    """Make a map of visits so many days after bloom; fruits that drop grow at a quarter of their rate from a day on."""
+    """Make a map of visits so many days after bloom; fruits that drop grow at a quarter of their rate from a day on.
+
+    `dated` are days that were noted instead of the true ones.
+    """
     rng = np.random.default_rng(seed)
     n = n_trees * FRUITS_OF_TREE
     slowed = np.full(n, np.inf)
@@ -54,10 +58,10 @@ def grow_row(
     curves = FruitCurves(rng.normal(0.073, 0.005, n), np.full(n, 135.0), onsets, slowed, 0.9)
     along = np.repeat(np.arange(n_trees), FRUITS_OF_TREE) * 1.5 + rng.uniform(-0.3, 0.3, n)
     places = np.column_stack([along, rng.uniform(-0.2, 0.2, n), rng.uniform(0.5, 2.5, n)])
-    for after_bloom, scale in zip(days, scales, strict=False):
+    for after_bloom, noted, scale in zip(days, dated or days, scales, strict=False):
         true_mm = 1000.0 * curves.diameters_m(after_bloom)
         measured_m = (true_mm * scale + rng.normal(0.0, noise_mm, n)) / 1000.0
-        day = (BLOOM + timedelta(days=after_bloom)).isoformat()
+        day = (BLOOM + timedelta(days=noted)).isoformat()
         ids = tuple(labels.format(row) for row in range(n))
         cloud = FruitCloud(places + rng.normal(0.0, 0.003, places.shape), ids=ids, diameters_m=measured_m)
         added = add_session(path, Session(name.format(day), day, "drawn", cloud))

@@ -194,6 +194,17 @@ def test_a_visit_of_another_scale_is_named(
     assert f"sizes of {day} are likely off together" in pomona("thinning", row.path)[2]
 
 
+def test_dates_that_fruits_deny_are_doubted(pomona: Pomona, tmp_path: Path) -> None:
+    row = grow_row(tmp_path / "o.gpkg", (50, 95, 80, 65), n_trees=2, dated=(50, 65, 80, 95))
+    code, printed, told = pomona("growth", row.path, "-o", tmp_path / "g", "--json")
+    assert code == 0
+    for day, odd in json.loads(printed)["odd_visits"].items():
+        word = "are likely" if odd["probability"] > 0.5 else "may be"
+        assert re.search(f"sizes of {day} {word} off together: .*; its unit, its camera, its date", told)
+    assert f"fruits are 15 % smaller on {row.day(95)} than on {row.day(80)} (60 in both), and none shrinks" in told
+    assert f"than on {row.day(50)}" not in told
+
+
 def test_what_visits_share_has_an_interval(
     pomona: Pomona, grown_row: GrownRow, row_growth: SeasonGrowth, tmp_path: Path
 ) -> None:

@@ -1,22 +1,33 @@
-"""What a user of growth must know of the visits: those without sizes, those whose sizes are off together."""
+"""What a user of growth must know of the visits: those without sizes, whose sizes are off, in an order fruits deny."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from pomona.growth.measured import MeasuredFruits
 from pomona.growth.season_growth import SeasonGrowth
 
 __all__ = ["called", "of_late_visits", "of_visits"]
 
+_SHRUNK, _LEAST = 0.9, 10
+"""Size of a fruit, in the middle of so many, against the visit before, from which on it is told: scales of visits err
+by 2 %, and fruits lose less than that on a dry day."""
+
 
 def of_visits(growth: SeasonGrowth) -> list[str]:
     """Say in a line each what is wrong with visits."""
     fruits = growth.fruits
+    likely = [odd.visit for odd in growth.odd_visits if odd.probability > 0.5]
     off = [
-        f"sizes of {called(fruits, odd.visit)} are likely off together: {100 * (odd.scale - 1):+.0f} % against the "
-        f"other visits (probability {odd.probability:.2f}); its unit, its camera?"
+        f"sizes of {called(fruits, odd.visit)} {'are likely' if odd.visit in likely else 'may be'} off together: "
+        f"{100 * (odd.scale - 1):+.0f} % against the other visits (probability {odd.probability:.2f}); its unit, its "
+        "camera, its date?"
         for odd in growth.odd_visits
     ]
-    return [*of_late_visits(fruits, "growth is told"), *off]
+    return [*of_late_visits(fruits, "growth is told"), *off, *_of_shrunk(fruits, likely)]
 
 
 def of_late_visits(fruits: MeasuredFruits, told: str) -> list[str]:
@@ -24,6 +35,25 @@ def of_late_visits(fruits: MeasuredFruits, told: str) -> list[str]:
     last = fruits.days[-1]
     later = [str(day) for day in fruits.days_without_sizes if day > last]
     return [f"no sizes on {', '.join(later)}, {told} of {last}"] if later else []
+
+
+def _of_shrunk(fruits: MeasuredFruits, off: Sequence[int]) -> list[str]:
+    """Say where fruits are smaller than on the visit before: growth has an order, and dates can be mixed up.
+
+    Not of visits that are likely `off`, which says why.
+    """
+    lines = []
+    for before, after in pairwise(range(len(fruits.moments))):
+        ratios = fruits.diameters_mm[:, after] / fruits.diameters_mm[:, before]
+        ratios = ratios[~np.isnan(ratios)]
+        if before in off or after in off or len(ratios) < _LEAST:
+            continue
+        if (ratio := float(np.median(ratios))) < _SHRUNK:
+            lines.append(
+                f"fruits are {100 * (1 - ratio):.0f} % smaller on {called(fruits, after)} than on "
+                f"{called(fruits, before)} ({len(ratios)} in both), and none shrinks; are both dates right?"
+            )
+    return lines
 
 
 def called(fruits: MeasuredFruits, visit: int) -> str:

@@ -25,6 +25,7 @@ from pomona.orchard.seen_parts import SeenPart, matches_with_parts, seen_parts
 from pomona.orchard.session import Session
 from pomona.orchard.settling import Settlement, write_changes
 from pomona.orchard.tears import beside_tears, torn_alike
+from pomona.orchard.visit_days import require_visit_day
 from pomona.orchard.writing import Placement
 from pomona.settings import Settings
 from pomona.store import schema
@@ -79,13 +80,15 @@ def add_session(
     Raises
     ------
     PomonaError
-        When the file is not a map of ours, holds the session already or cannot be written.
+        When the file is not a map of ours, holds the session already or cannot be written, or the session's date is
+        still to come.
     """
     path = Path(path)
     if path.suffix.lower() != ".gpkg":
         raise PomonaError(f"{path}: found suffix {path.suffix!r}, expected .gpkg for a map")
     if not len(session.cloud):
         raise PomonaError(f"session {session.name}: has no fruits, expected at least one")
+    require_visit_day(session.date, f"session {session.name}")
     if session.is_scale_free:
         found = "was triangulated without a scale, and a map is in metres"
         raise PomonaError(f"session {session.name}: {found}: triangulate it again with --map")

@@ -17,6 +17,7 @@ from pomona.errors import PomonaError, PomonaWarning
 from pomona.file_names import given_path
 from pomona.orchard.session import Session
 from pomona.orchard.stored_sessions import read_session
+from pomona.orchard.visit_days import require_visit_day
 from pomona.reading import shown
 from pomona.store.values import iso_date
 
@@ -39,18 +40,20 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
     Raises
     ------
     PomonaError
-        When the file cannot be read, has no date that anybody has noted, or has no distances or diameters of fruits
-        and nobody says that they are right: ``unit="m"``.
+        When the file cannot be read, has no date that anybody has noted or one that is still to come, or has no
+        distances or diameters of fruits and nobody says that they are right: ``unit="m"``.
 
     Warns
     -----
     PomonaWarning
         When a column of a cloud is kept as text whose name nearly is one that counts, as `diameter_mm`.
     """
-    path, day = given_path(path), None if date is None else iso_date(date)
+    path = given_path(path)
+    day = None if date is None else iso_date(date, f"{path}: date")
     read = _session if path.suffix.lower() == ".gpkg" else _cloud
     with _doubts_refused(is_said=unit is not None):
         session = read(path, day, unit)
+        require_visit_day(session.date, f"{path}: date")
         if unit is None:
             check_places(path, session.cloud.positions)
             _check_diameters(path, session.cloud)
