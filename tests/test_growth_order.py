@@ -90,7 +90,8 @@ def test_visits_may_be_added_in_any_order(row: GrownRow, tmp_path: Path) -> None
         sizes_mm[5] += BORDER_MM * (day == row.days[-1])
         labels = tuple(f"apple {number}" for number in range(n))
         seen = rng.permutation(n)[: n - 6]
-        cloud = FruitCloud(places, ids=labels, diameters_m=sizes_mm / 1000.0).select(seen)
+        scattered = places + rng.normal(0.0, 0.005, places.shape)
+        cloud = FruitCloud(scattered, ids=labels, diameters_m=sizes_mm / 1000.0).select(seen)
         sessions.append(Session(str(row.day(day)), str(row.day(day)), "drawn", cloud))
     told = []
     for number, order in enumerate(permutations(sessions)):

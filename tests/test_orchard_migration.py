@@ -55,8 +55,9 @@ def identities(seen: Observations) -> dict[tuple[str, str | None], int]:
 
 
 def next_visit(orchard: Path) -> Session:
-    fruits = OrchardMap(orchard).fruits()
-    return Session("2024-09-01", "2024-09-01", "test", FruitCloud(fruits.positions[5:], diameters_m=np.full(55, 0.08)))
+    places = OrchardMap(orchard).fruits().positions[5:]
+    scattered = places + np.random.default_rng(1).normal(0.0, 0.005, places.shape)
+    return Session("2024-09-01", "2024-09-01", "test", FruitCloud(scattered, diameters_m=np.full(55, 0.08)))
 
 
 def test_a_reader_leaves_the_file_as_it_is(orchard: Path) -> None:

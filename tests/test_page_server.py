@@ -216,8 +216,9 @@ def test_a_map_that_is_gone_is_told_by_its_name(tmp_path: Path) -> None:
 
 def add_with_crop(path: Path) -> None:
     fruits = OrchardMap(path).fruits()
-    grown_m = fruits.diameters_m + np.random.default_rng(1).normal(0.008, 0.001, len(fruits))
-    cloud = FruitCloud(fruits.positions, diameters_m=grown_m)
+    rng = np.random.default_rng(1)
+    grown_m = fruits.diameters_m + rng.normal(0.008, 0.001, len(fruits))
+    cloud = FruitCloud(fruits.positions + rng.normal(0.0, 0.005, (len(fruits), 3)), diameters_m=grown_m)
     session = Session("later", date(2024, 7, 1).isoformat(), "drawn", cloud, crops={3: FruitCrop(0, webp(7))})
     assert add_session(path, session).is_added
 

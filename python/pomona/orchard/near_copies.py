@@ -35,8 +35,12 @@ SCATTER_M = 0.02
 """By so much distances between neighbours differ from visit to visit, in the middle, where the map cannot say: 17 to
 25 mm in drawn orchards."""
 
+ONE_DAY_M = 0.004
+"""The same for two visits of one day, when nothing grows or bends: with a sensor that errs by 2.5 mm. Apples that a
+laboratory recorded again after minutes have 0.9 to 2.1 mm."""
+
 TIMES = 0.7
-"""Spread of its logarithm, a factor of two: visits an hour apart with a sensor that errs by 2.5 mm have 4 mm."""
+"""Spread of the logarithm of either, a factor of two."""
 
 ALONE = (1.5, 8.5)
 """Beta distribution of the share of fruits that one of two visits alone has: .15 in the mean, under .02 once in 20."""
@@ -56,7 +60,8 @@ def require_no_near_copy(
         own = int(visit.seen.key > other.seen.key)
         visits, rows = (visit, other), (pair.rows[:, own], pair.rows[:, 1 - own])
         scatter_m = _scatter_m(visits, rows)
-        usual_m = min(_usual_scatters_m(evidence, number), default=SCATTER_M)
+        is_one_day = _are_of_one_day(visit, other)
+        usual_m = min(_scatters_m(evidence, number, is_one_day), default=ONE_DAY_M if is_one_day else SCATTER_M)
         alone = [_alone(*both) for both in zip(visits, rows, strict=True)]
         if _chance_of_real(scatter_m / usual_m, alone) < REAL:
             (there,) = connection.execute("SELECT name FROM sessions WHERE id = ?", (other.session_id,)).fetchone()
@@ -67,11 +72,15 @@ def require_no_near_copy(
             )
 
 
-def _usual_scatters_m(evidence: Evidence, number: int) -> Iterator[float]:
-    """Give by how much a visit and each other one of the map that it matches differ."""
+def _are_of_one_day(visit: KnownVisit, other: KnownVisit) -> bool:
+    return int(visit.seen.day // 1) == int(other.seen.day // 1)
+
+
+def _scatters_m(evidence: Evidence, number: int, is_one_day: bool) -> Iterator[float]:
+    """Give by how much a visit differs from the others of the map that it matches, of its own day or of other days."""
     for pair in evidence.pairs:
-        if number in (pair.first, pair.second) and len(pair.rows) >= LEAST:
-            visits = evidence.visits[pair.first], evidence.visits[pair.second]
+        visits = evidence.visits[pair.first], evidence.visits[pair.second]
+        if number in (pair.first, pair.second) and len(pair.rows) >= LEAST and _are_of_one_day(*visits) == is_one_day:
             yield _scatter_m(visits, (pair.rows[:, 0], pair.rows[:, 1]))
 
 
