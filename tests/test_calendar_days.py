@@ -68,3 +68,15 @@ def test_today_may_be_tomorrow_in_the_orchard() -> None:
     require_visit_day(f"{date.today()}T23:59:59", "session row")
     with pytest.raises(PomonaError, match="session row: found the date"):
         require_visit_day((date.today() + timedelta(days=2)).isoformat(), "session row")
+
+
+def test_a_clock_that_was_never_set_refuses_no_day(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Unset(date):
+        @classmethod
+        def today(cls) -> "Unset":
+            return cls(1970, 1, 1)
+
+    monkeypatch.setattr("pomona.orchard.visit_days.date", Unset)
+    require_visit_day("2026-08-09", "session row")
+    with pytest.raises(PomonaError, match="expected a day from 2000-01-01"):
+        require_visit_day("1999-12-31", "session row")

@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
         accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
-    /// Looks for rivals of what was found.
+    /// Looks for rivals of what was found, and for better optima near it.
     pub(super) fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
         self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
@@ -177,6 +177,10 @@ impl<'a> Search<'a> {
             let more = of_some_fruits(self.query, stride, 2..2 + turns);
             self.try_seeds(&more, findings);
         }
+        self.sift(findings);
+        let least = SURE * findings.log.threshold;
+        let unsure = |finding: &&mut Finding| finding.overlap.log_odds < least;
+        findings.accepted.iter_mut().filter(unsure).for_each(|finding| self.polish(finding));
         self.sift(findings);
     }
 

@@ -17,6 +17,9 @@ pub(super) const FIRST_FRUITS: usize = 256;
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
 const FEW_SEEDS: u64 = 1500;
 
+/// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
+const UPRIGHT_SEEDS: u64 = 2;
+
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
 fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
     let near = query.neighbours(row as usize);
@@ -47,7 +50,8 @@ impl Search<'_> {
     /// The longest seeds of the query that the map can have: what is longer than nearly all of its own, as where fruits were picked
     /// before the query, has others between its fruits there.
     fn longest_seeds(&self) -> Vec<Seed> {
-        let count = self.config.seeds_per_fruit.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
+        let each = self.config.seeds_per_fruit.saturating_mul(self.model.vertical.map_or(1, |_| UPRIGHT_SEEDS));
+        let count = each.saturating_mul(self.query.len() as u64).max(FEW_SEEDS);
         longest(self.query, usize::try_from(count).unwrap_or(usize::MAX), self.prepared.seeds.longest)
     }
 
