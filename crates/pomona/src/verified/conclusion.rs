@@ -2,7 +2,7 @@
 
 use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Log, Search};
-use super::decision::CLEAR;
+use super::decision::SURE;
 use super::doubts::Rated;
 use super::overlap::Overlap;
 use super::settlement::Settled;
@@ -25,7 +25,7 @@ impl<'a> Search<'a> {
     /// What rules the best finding out, by the name of its stage.
     fn doubt_of(&self, best: &Finding, log: &Log) -> Option<&'static str> {
         let needed = log.threshold.max(self.threshold(log.effort.stands.share_left()));
-        if best.fits_moved(CLEAR * needed) {
+        if best.fits_moved(SURE * needed) {
             return Some("moved");
         }
         self.fits_better_mirrored(best, log).then_some("mirrored")

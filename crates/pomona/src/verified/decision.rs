@@ -33,13 +33,13 @@ const EXCHANGED: usize = 10;
 const GROWN: usize = 6;
 
 /// Rows found with less than this many times the evidence needed are laid along rows too, for of few fruits in common seeds show a
-/// part; and may be no more than what the planting gives to wrong poses.
-pub(super) const CLEAR: f64 = 2.0;
+/// part.
+const CLEAR: f64 = 2.0;
 
 /// Poses that a search by seeds has to have grown before one can stand out: fewer do not say what chance reaches.
 const SHOWN: usize = 4;
 
-/// A pose with this many times the evidence needed is no local optimum, has no rival and is no mirror image.
+/// A pose with this many times the evidence needed is no local optimum, no pattern of the planting and no mirror image.
 pub(super) const SURE: f64 = 6.0;
 
 /// Finds the query in the map.
