@@ -23,7 +23,8 @@ pub(super) const MIN_FRUITS: usize = 5;
 /// Fruits of a map at the most whose seeds are all kept: some 7 kB a fruit; and of a query.
 pub(crate) const MAX_FRUITS: usize = 300_000;
 
-/// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival.
+/// A hypothesis with less than this share of the evidence around the seed of an accepted pose grows to no rival, and with less of what
+/// is needed to no further part.
 pub(super) const RIVAL_SEED: f64 = 0.3;
 
 /// Fruits of the map for one of the query, at the most, where the map is looked for in the query, too: nine in ten were picked.

@@ -4,11 +4,11 @@
 //! need a later one. It may lie beyond what the answer reaches, or amid it: a branch that was tied elsewhere, a tree that leans.
 
 use super::case::{Finding, Findings, Search};
-use super::decision::MIN_FRUITS;
+use super::decision::{MIN_FRUITS, RIVAL_SEED};
+use super::hypothesis::GATE;
 use super::proposal::Effort;
 
-/// Nearest neighbours of a fruit that have no partner either where a further part may lie. Of fruits that hide one by one, or behind a
-/// leaf, hardly any is alone among so many; a stretch that lies elsewhere has some in its middle.
+/// Nearest neighbours of a fruit that have no partner either where a further part may lie.
 const AROUND: usize = 4;
 
 /// Mean probability of the pairs of a further part, at the least: 0.9 and more where it is one, 0.5 to 0.65 where fruits on shells or
@@ -23,7 +23,9 @@ impl<'a> Search<'a> {
             let mut more = Findings::none(Effort::default(), findings.log.threshold);
             for mut seeds in self.rounds() {
                 seeds.retain(|(quad, _)| quad.iter().all(|&row| alone[row as usize]));
-                self.try_seeds(&seeds, &mut more);
+                let (mut hypotheses, _) = self.ask(&seeds, &mut more.log);
+                hypotheses.retain(|seed| seed.log_odds > RIVAL_SEED * findings.log.threshold);
+                self.grow_distinct(&hypotheses, &mut more);
                 self.sift(&mut more);
                 if !more.accepted.is_empty() {
                     break;
@@ -40,7 +42,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Fruits of the query that are likelier without a partner than with one; `None` where hardly any are so together.
+    /// Fruits of the query that are likelier without a partner than with one; `None` where no more of them are together than would be
+    /// where each hides for itself.
     fn alone(&self, findings: &Findings) -> Option<Vec<bool>> {
         let mut paired = vec![0.0; self.query.len()];
         for (edge, probability) in findings.accepted.iter().flat_map(Finding::links) {
@@ -51,7 +54,10 @@ impl<'a> Search<'a> {
             let around = self.query.neighbours(*row).iter().take(AROUND);
             alone[*row] && around.copied().all(|other| alone[other as usize])
         };
-        let together = (0..self.query.len()).filter(amid).take(MIN_FRUITS).count();
-        (together == MIN_FRUITS).then_some(alone)
+        let together = (0..self.query.len()).filter(amid).count();
+        let share = alone.iter().filter(|alone| **alone).count() as f64 / alone.len() as f64;
+        let by_chance = alone.len() as f64 * share.powi(1 + AROUND as i32);
+        let most = by_chance + GATE * by_chance.sqrt();
+        (together >= MIN_FRUITS && together as f64 > most).then_some(alone)
     }
 }
