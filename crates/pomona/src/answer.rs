@@ -22,8 +22,8 @@ pub struct Pair {
     pub query: usize,
     /// Row in the map.
     pub map: usize,
-    /// Probability that the two are one fruit; of an ambiguous answer as likely by its pose as by each of the others. Paper: of the residual under the noise, against a stranger at the density of
-    /// fruits about it.
+    /// Probability that the two are one fruit; an ambiguous answer's are shared among its poses. Paper: of the residual under
+    /// the noise, against a stranger at the density of fruits about it.
     pub probability: f64,
     /// Distance after the registration that the pair belongs to, metres of the map.
     pub distance_m: f64,

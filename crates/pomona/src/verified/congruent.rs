@@ -28,7 +28,7 @@ const MOST: usize = 128;
 
 /// Fruits of the query times poses that are refined: of thousands that a sparse visit lets pass at first the right one is seldom
 /// among the best, and few fruits are refined fast.
-const REFINED: usize = 100_000;
+const FRUITS_REFINED: usize = 100_000;
 
 /// Length of a seed in standard deviations of the noise, at the least.
 const LEAST: f64 = 10.0;
@@ -42,7 +42,7 @@ impl<'a> Search<'a> {
         let (mut candidates, effort) = self.congruent();
         findings.log.effort = findings.log.effort + effort;
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, (REFINED / self.query.len()).max(1));
+        let best = distinct(self.query, self.map.spacing, &candidates, (FRUITS_REFINED / self.query.len()).max(1));
         let hypotheses = self.refined(&best);
         findings.log.refined += hypotheses.len();
         self.grow_distinct(&hypotheses, findings);
