@@ -159,8 +159,7 @@ impl Companions {
     ///
     /// Where the other knows of none so far away, its own spread stands.
     pub(super) fn spread_as(&self, other: &Self, scale: f64, share: f64) -> Self {
-        let reach = Self::BINS as f64 * self.bin.min(other.bin * scale);
-        let [own, others] = [self.up_to(reach), other.up_to(reach / scale)];
+        let (reach, [own, others]) = self.beside(other, scale);
         if own == 0.0 || others == 0.0 {
             return self.clone();
         }
@@ -169,6 +168,18 @@ impl Companions {
             if distance > reach { *here } else { here + share * (other.up_to(distance / scale) * own / others - here) }
         };
         Self { bin: self.bin, within: self.within.iter().enumerate().map(both).collect() }
+    }
+
+    /// Fruits around a fruit of the cloud that shows fewer, over those of the other; 1 where either shows none.
+    pub(super) fn as_many_as(&self, other: &Self, scale: f64) -> f64 {
+        let (_, [own, others]) = self.beside(other, scale);
+        if own > 0.0 && others > 0.0 { (own / others).min(others / own) } else { 1.0 }
+    }
+
+    /// How far both know of others, and how many either knows of up to there.
+    fn beside(&self, other: &Self, scale: f64) -> (f64, [f64; 2]) {
+        let reach = Self::BINS as f64 * self.bin.min(other.bin * scale);
+        (reach, [self.up_to(reach), other.up_to(reach / scale)])
     }
 
     /// Mean number of fruits between two distances from a fruit.

@@ -18,6 +18,9 @@ const GATE: f64 = 7.0;
 /// pair far off is believed only where nothing else is near.
 const LOOSE: (f64, f64) = (0.01, 3.0);
 
+/// Fruits of a visit that tell half of how those around a fruit are spread.
+const FEW: f64 = 100.0;
+
 /// Pairs less likely than this against both being alone are left out.
 const LEAST_RATIO: f64 = 1e-3;
 
@@ -63,10 +66,17 @@ impl Meeting {
 
 impl Patchwork<'_> {
     /// Fruits of the map that chance puts around a fruit: as many as the map shows around its own, spread as both visits show them.
+    ///
+    /// Noise blurs what a visit shows around its own fruits by twice its own variance, and what the other shows around them by that of
+    /// both, which lies midway. Where one shows fewer, its fruits were thinned or picked and are spread otherwise than those of the map;
+    /// and a few fruits tell no spread, so each counts as much as any other.
     pub(super) fn companions(&self) -> Companions {
-        let Self { query, map, .. } = self;
-        let share = query.len() as f64 / (query.len() + map.len()).max(1) as f64;
-        map.companions.spread_as(&query.companions, self.pose.scale, share)
+        let Self { query, map, pose, .. } = self;
+        let [here, there] = [query.len(), map.len()].map(|fruits| fruits.max(1) as f64);
+        let each_alike = here / (here + there);
+        let midway = 0.5 * map.companions.as_many_as(&query.companions, pose.scale);
+        let told = 1.0 / (1.0 + FEW * (1.0 / here + 1.0 / there));
+        map.companions.spread_as(&query.companions, pose.scale, each_alike + told * (midway - each_alike))
     }
 
     /// What `kept` makes of every meeting within the gate, by rows of the query.
