@@ -8,7 +8,7 @@ import pytest
 
 from orchard_maker import frame_of_its_own, who_is_who
 from pomona import FruitCloud
-from pomona.orchard import Session, add_session, problems, remove_session, seen_parts
+from pomona.orchard import Session, add_session, problems, recognising, remove_session, seen_parts
 from pomona.orchard.adding import _beside, _join
 from pomona.orchard.evidence import Evidence
 from pomona.orchard.parts import parts_of_map
@@ -57,6 +57,20 @@ def n_parts(path: Path) -> int:
         return len(parts_of_map(connection))
 
 
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Fruits of each look for what a visit saw beyond a part, or in parts by themselves."""
+    asked: list[int] = []
+    looked_for = seen_parts.recognised
+
+    def recognised(connection: object, cloud: FruitCloud, *rest: object) -> object:
+        asked.append(len(cloud))
+        return looked_for(connection, cloud, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(seen_parts, "recognised", recognised)
+    return asked
+
+
 def test_a_visit_that_saw_two_parts_makes_one_of_them(visits: list[Session], tmp_path: Path) -> None:
     path = two_parts(tmp_path / "orchard.gpkg", visits)
     assert n_parts(path) == 2
@@ -82,22 +96,26 @@ def test_what_one_visit_joined_comes_apart_without_it(visits: list[Session], tmp
 
 
 def test_the_little_end_of_a_row_joins_its_part(
-    most_and_little: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    most_and_little: list[Session], tmp_path: Path, asked: list[int]
 ) -> None:
     path = two_parts(tmp_path / "orchard.gpkg", most_and_little)
-    asked: list[int] = []
-    looked_for = seen_parts.recognised
-
-    def recognised(connection: object, cloud: FruitCloud, *rest: object) -> object:
-        asked.append(len(cloud))
-        return looked_for(connection, cloud, *rest)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(seen_parts, "recognised", recognised)
     assert add_session(path, visit(3, 0.1, 0.6)).is_added
     assert asked == []
     assert add_session(path, most_and_little[2]).is_added
     # The end is found beside the rest, as a part of its own: so each part of the map is asked by itself.
     assert asked == 2 * [len(most_and_little[2].cloud)]
+    assert n_parts(path) == 1
+    assert problems(path) == []
+
+
+def test_what_a_visit_saw_beyond_one_part_of_a_large_map_is_looked_for_in_the_others(
+    visits: list[Session], tmp_path: Path, asked: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Of a large map only what lies around a part is matched with.
+    monkeypatch.setattr(recognising, "LARGE", 100)
+    path = two_parts(tmp_path / "orchard.gpkg", visits)
+    assert add_session(path, visits[2]).is_added
+    assert 0.4 < asked[0] / len(visits[2].cloud) < 0.6, asked
     assert n_parts(path) == 1
     assert problems(path) == []
 

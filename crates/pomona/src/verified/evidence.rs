@@ -15,17 +15,22 @@
 //! when it grew, below zero where nothing was selected.
 
 use super::hypothesis::{DETECTION, SHARES, TURNS};
-use super::pairing::Meeting;
+use super::pairing::{GATE, Meeting};
 use super::patches::Patchwork;
 use super::shares::{fewer, of_either};
 use crate::beliefs::Beliefs;
 
 /// Evidence of an overlap, nats.
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
+    evidence_within(GATE, laid)
+}
+
+/// The same of pairs within so many standard deviations alone.
+pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> f64 {
     let map = laid.map;
     let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
     let here = laid.due();
-    let met = laid.meetings(|meeting| Some(*meeting));
+    let met = laid.meetings(gate, |meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
     let mut evidence = 0.0;

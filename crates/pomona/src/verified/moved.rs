@@ -5,10 +5,10 @@
 
 use super::case::Finding;
 use super::doubts::is_most;
-use super::evidence::evidence;
+use super::evidence::evidence_within;
 use super::layers::BEYOND_A_CLUSTER;
 use super::overlap::Overlap;
-use super::patches::Patchwork;
+use super::patches::{Landing, Patchwork};
 use crate::principal::Principal;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -19,6 +19,9 @@ const PATTERN_SHARE: f64 = 0.3;
 
 /// The same of rows laid along rows, whose evidence is what few fruits in common say: 2 true ones have it, and 14 of 31 wrong ones.
 const PATTERN_SHARE_LAID: f64 = 0.4;
+
+/// Standard deviations within which pairs of a pose that is moved count: beyond, all of them together say a few nats, and are five in six.
+const NEAR: f64 = 4.0;
 
 /// Spacings that a pose is moved at the most: in a long row a pattern shows within a few trees.
 const FARTHEST: f64 = 16.0;
@@ -47,13 +50,14 @@ impl Finding<'_> {
 /// noise; as far as most of what the map has shown is still expected.
 fn most_moved(laid: &Patchwork, principal: &Principal) -> f64 {
     let expected = due(laid);
-    let of = |by: &Vector3<f64>| {
-        let mut there = laid.clone();
-        there.pose.translation += by;
-        there.predictions.iter_mut().flatten().for_each(|at| at.place += by);
-        if is_most(due(&there) / expected) { evidence(&there) } else { f64::NEG_INFINITY }
+    let of = |there: &mut Patchwork, by: &Vector3<f64>| {
+        there.pose.translation = laid.pose.translation + by;
+        let moved = |at: &Landing| Landing { place: at.place + by, ..*at };
+        there.predictions = laid.predictions.iter().map(|at| at.as_ref().map(moved)).collect();
+        if is_most(due(there) / expected) { evidence_within(NEAR, there) } else { f64::NEG_INFINITY }
     };
-    shifts(laid, principal).par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
+    let shifts = shifts(laid, principal);
+    shifts.par_iter().map_init(|| laid.clone(), of).reduce(|| f64::NEG_INFINITY, f64::max)
 }
 
 /// Fruits that the map should have shown.
@@ -85,7 +89,6 @@ mod tests {
     use crate::verified::fixture::{Dice, visits};
     use crate::verified::hypothesis::{DETECTION, Model};
     use crate::verified::landscape::Landscape;
-    use crate::verified::patches::Landing;
 
     /// Most evidence of the query, laid where it was drawn and then moved, over what it has there.
     fn share_kept([query, map]: [FruitCloud; 2]) -> f64 {
@@ -97,7 +100,7 @@ mod tests {
         let land = |p: &Vector3<f64>| Some(Landing { place: pose.image(p), variance: 0.02 * 0.02 });
         laid.predictions = query.points.iter().map(land).collect();
         let principal = Principal::of(map.points.iter()).expect("places that extend");
-        most_moved(&laid, &principal) / evidence(&laid)
+        most_moved(&laid, &principal) / evidence_within(NEAR, &laid)
     }
 
     #[test]

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Standard deviations that an edge reaches: as far as a branch may have moved for itself. Five lose three of a hundred
 /// pairs of a real tree that bent under its load (`benchmarks season`, nothing hidden).
-const GATE: f64 = 7.0;
+pub(super) const GATE: f64 = 7.0;
 
 /// Share of the fruits that moved otherwise than their neighbours, and how many times wider they scatter.
 ///
@@ -33,7 +33,7 @@ impl Patchwork<'_> {
     pub(super) fn edges(&self, shares: &[f64], back: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
         let Self { query, map, .. } = *self;
         let companions = self.companions();
-        self.meetings(|meeting: &Meeting| {
+        self.meetings(GATE, |meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
@@ -79,13 +79,13 @@ impl Patchwork<'_> {
         map.companions.spread_as(&query.companions, pose.scale, each_alike + told * (midway - each_alike))
     }
 
-    /// What `kept` makes of every meeting within the gate, by rows of the query.
-    pub(super) fn meetings<T: Send>(&self, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
-        let of = |row: usize| self.meetings_of(row).into_iter().filter_map(|meeting| kept(&meeting));
+    /// What `kept` makes of every meeting within so many standard deviations, by rows of the query.
+    pub(super) fn meetings<T: Send>(&self, gate: f64, kept: impl Fn(&Meeting) -> Option<T> + Sync) -> Vec<T> {
+        let of = |row: usize| self.meetings_of(row, gate).into_iter().filter_map(|meeting| kept(&meeting));
         (0..self.predictions.len()).into_par_iter().with_min_len(SHARE_OF_ROWS).flat_map_iter(of).collect()
     }
 
-    fn meetings_of(&self, row: usize) -> Vec<Meeting> {
+    fn meetings_of(&self, row: usize, gate: f64) -> Vec<Meeting> {
         let (map, pose) = (self.map, &self.pose);
         let Some(Landing { place, variance }) = self.predictions[row] else { return Vec::new() };
         let (support, shape) = (self.shown(row, &place), self.direction.without(row));
@@ -93,7 +93,7 @@ impl Patchwork<'_> {
         let own = self.query.covariances.as_ref().map(|all| pose.image_of_covariance(&all[row]));
         // No axis has more than the trace, three times the mean.
         let widest = if own.is_some() && map.covariances.is_some() { 3.0 } else { longest(&shape) };
-        let reach = GATE * (widest * variance).sqrt();
+        let reach = gate * (widest * variance).sqrt();
         // Cells of the grid have more than what is within reach, which no covariance brings within the gate.
         let mut partners = Vec::new();
         map.near(&place, reach, |partner| {
@@ -110,7 +110,7 @@ impl Patchwork<'_> {
             let own = told.map(|told| Spread::new(&(as_told(&told, variance, &shape) * variance), variance));
             let (mahalanobis2, density) = own.as_ref().unwrap_or(&common).at(&offset);
             let distance = offset.norm();
-            (mahalanobis2 <= GATE * GATE).then_some(Meeting {
+            (mahalanobis2 <= gate * gate).then_some(Meeting {
                 query: row as u32,
                 map: partner,
                 distance,
