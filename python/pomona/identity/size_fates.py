@@ -1,0 +1,186 @@
+r"""What the sizes of one track are if it grows, grows slowly, has stopped, or is a thing that stays as it is.
+
+The logarithms of the sizes of a track are $y_v = s_v + c_v + a + x\, d_v + e_v$ at the visits $v$ that measured it:
+$s_v$ the scale of a visit, $c_v$ a curve, $a \sim N(0, \sigma_a)$ its own level, $x$ how far it goes along $d_v$, and
+$e_v \sim N(0, \sigma_v)$. Of a track no size is off, or one. With $g_v$ the growth of the planting,
+
+- it *grows*: $c = g$, $d = g - \bar g$, $x \sim N(0, \sigma_b)$;
+- it is *slow*, by anything from nothing to all of the growth: $c = g_1$, $d = g - g_1$, $x$ even from 0 to 1;
+- it has *stopped* after visit $z$ and some of the next gain, or, with $z = 0$, before the first: $c = g_{\min(v, z)}$;
+- it is a *thing* as large as fruits on any day: $c = g_1$, $d = g_V - g_1$, $x$ even from 0 to 1.
+
+Without growth all of them are the same, so nothing is told; and a thing as large as fruits are at first may well be a
+fruit that stopped early, where one as large as they are at last is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["GROWS", "N_BEFORE_STOPS", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
+
+Numbers = NDArray[np.float64]
+
+GROWS, SLOW, THING, STANDS = range(4)
+"""Fates; those behind them have stopped after the first visit, the second and so on."""
+
+N_BEFORE_STOPS = 4
+
+OFF = 0.02
+"""Share of sizes that are not those of the track: of half a fruit behind a leaf, of the neighbour."""
+
+OFF_BY = 0.5
+"""Of the logarithm of such a size: half to twice of what it should be."""
+
+UNIFORM_SPREAD = 12.0**-0.5
+"""Standard deviation of what is anywhere from 0 to 1."""
+
+LEAST = 1e-9
+"""Information on how far a track goes, where its visits say nothing of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Growing:
+    """How a planting grows over V visits, in logarithms of diameters.
+
+    Attributes
+    ----------
+    growth : (V,)
+        Middle of the sizes of fruits that grow, scales of visits apart.
+    scales : (V,)
+        Of the visits, about 0.
+    noises : (V,)
+        Standard deviation of a size.
+    level_spread, rate_spread : float
+        Of fruits' own levels, and of how much more or less than all they grow, as a share.
+    """
+
+    growth: Numbers
+    scales: Numbers
+    noises: Numbers
+    level_spread: float
+    rate_spread: float
+
+    @property
+    def directions(self) -> Numbers:
+        """Along which fruits grow more or less than all, (V,)."""
+        return np.asarray(self.growth - self.growth.mean())
+
+    def fates(self) -> tuple[Numbers, Numbers]:
+        """Return the curves and the directions of all fates, (M, V) both."""
+        growth, n = self.growth, len(self.growth)
+        stops, visits = np.arange(1, n)[:, None], np.arange(n)
+        gains = np.maximum(np.diff(growth), 0.0)[:, None] * (visits >= stops)
+        first = np.full(n, growth[0])
+        curves = np.vstack([growth, first, first, first, growth[np.minimum(visits, stops - 1)] + 0.5 * gains])
+        everywhere = np.full(n, growth[-1] - growth[0])
+        along = np.vstack([self.directions, growth - growth[0], everywhere, np.zeros(n), UNIFORM_SPREAD * gains])
+        return curves, along
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over the sizes of a track, all of them and without each in turn, (N, M, 1 + V) each, level summed over."""
+
+    density: Numbers
+    information: Numbers
+    said: Numbers
+
+
+def fate_densities(log_sizes: Numbers, growing: Growing) -> Numbers:
+    """Return the logarithm of the density of the sizes of each track, (N, M, 1 + V), for each of the M fates.
+
+    With no size off, and with that of each visit.
+
+    Parameters
+    ----------
+    log_sizes : (N, V) float64
+        NaN where a visit did not measure the track.
+    growing : Growing
+    """
+    curves, along = growing.fates()
+    sums = _summed(log_sizes, growing, curves, along)
+    return np.asarray(sums.density + _along(sums, growing.rate_spread))
+
+
+def _summed(log_sizes: Numbers, growing: Growing, curves: Numbers, along: Numbers) -> _Sums:
+    seen = ~np.isnan(log_sizes)
+    weights = (seen / growing.noises**2)[:, None, :]
+    off = np.where(seen, log_sizes - growing.scales, 0.0)[:, None, :] - curves
+    of_level = growing.level_spread**-2
+    weight, gone = _without_each(weights), _without_each(weights * along)
+    said, along_said = _without_each(weights * off), _without_each(weights * along * off)
+    together = of_level + weight
+    logs = np.where(seen, 0.5 * np.log(weights[:, 0] / (2.0 * np.pi) + ~seen), 0.0)
+    sizes = np.where(seen, np.log1p(-OFF), 0.0).sum(axis=1)[:, None] + np.pad(
+        np.where(seen, np.log(OFF / (1.0 - OFF) / (np.sqrt(2.0 * np.pi) * OFF_BY)), -np.inf), ((0, 0), (1, 0))
+    )
+    density = _without_each(logs)[:, None, :] + sizes[:, None, :] - 0.5 * np.log(together / of_level)
+    density = density - 0.5 * (_without_each(weights * off**2) - said**2 / together)
+    return _Sums(density, _without_each(weights * along**2) - gone**2 / together, along_said - gone * said / together)
+
+
+def _along(sums: _Sums, rate_spread: float) -> Numbers:
+    """Return what going along the directions adds to the logarithm of the densities, (N, M, 1 + V)."""
+    from scipy.special import log_ndtr
+
+    added = np.empty(sums.density.shape)
+    even = [SLOW, THING]
+    normal = np.setdiff1d(np.arange(added.shape[1]), even)
+    own = np.where(normal == GROWS, rate_spread**-2, 1.0)[:, None]
+    information, said = sums.information[:, normal], sums.said[:, normal]
+    added[:, normal] = 0.5 * said**2 / (own + information) - 0.5 * np.log1p(information / own)
+    information, said = np.maximum(sums.information[:, even], LEAST), sums.said[:, even]
+    root = np.sqrt(information)
+    ends = -said / root, root - said / root
+    # In the lower tail, where a difference of two of them is not lost.
+    upper = ends[0] + ends[1] > 0.0
+    low, high = np.where(upper, -ends[1], ends[0]), np.where(upper, -ends[0], ends[1])
+    logs = log_ndtr(low), log_ndtr(high)
+    inside = logs[1] + np.log(-np.expm1(np.minimum(logs[0] - logs[1], -LEAST)))
+    added[:, even] = 0.5 * said**2 / information + 0.5 * np.log(2.0 * np.pi / information) + inside
+    return added
+
+
+def _without_each(terms: Numbers) -> Numbers:
+    """Return the sum over the last axis, and beside it the sums without each of its terms."""
+    total = terms.sum(axis=-1, keepdims=True)
+    return np.asarray(np.concatenate([total, total - terms], axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class OwnNumbers:
+    """Level and rate of N tracks if they grow, given all sizes, and all but each.
+
+    Attributes
+    ----------
+    off : (N, 1 + V, V)
+        Of each size from what they say.
+    variances : (N, 1 + V, V)
+        Of what they say.
+    squares : (2, N, 1 + V)
+        Mean squares of level and rate.
+    """
+
+    off: Numbers
+    variances: Numbers
+    squares: Numbers
+
+
+def own_numbers(log_sizes: Numbers, growing: Growing) -> OwnNumbers:
+    """Tell the own level and rate of tracks that grow; see `fate_densities`."""
+    seen, along = ~np.isnan(log_sizes), growing.directions
+    weights = seen / growing.noises**2
+    off = np.where(seen, log_sizes - growing.scales - growing.growth, 0.0)
+    weight, gone, around = (_without_each(weights * along**power) for power in range(3))
+    said, along_said = _without_each(weights * off), _without_each(weights * along * off)
+    weight, around = weight + growing.level_spread**-2, around + growing.rate_spread**-2
+    room = weight * around - gone**2
+    level, rate = (around * said - gone * along_said) / room, (weight * along_said - gone * said) / room
+    foretold = level[:, :, None] + rate[:, :, None] * along
+    variances = (around[:, :, None] - 2.0 * gone[:, :, None] * along + weight[:, :, None] * along**2) / room[:, :, None]
+    squares = np.stack([level**2 + around / room, rate**2 + weight / room])
+    return OwnNumbers(off[:, None, :] - foretold, variances, squares)

@@ -1,0 +1,179 @@
+"""Which tracks are no fruits but things that stay as they are: knots, clips, tags, drippers, seen on every visit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pomona.identity.size_fates import (
+    GROWS,
+    N_BEFORE_STOPS,
+    SLOW,
+    STANDS,
+    THING,
+    Growing,
+    fate_densities,
+    own_numbers,
+)
+
+__all__ = ["still_chances"]
+
+Numbers = NDArray[np.float64]
+
+FEWEST_TRACKS, FEWEST_DAYS = 20, 3
+"""Fewer say nothing: of two days a fruitlet that will drop stands as still as a thing."""
+
+BELIEVED = np.array([0.91, 0.04, 0.03, 0.02])
+"""Shares of tracks that grow, are slow, are things and have stopped, before the season says its own."""
+
+BELIEF = 12.0
+"""Tracks that this belief is worth: one detector has no clips, another takes every dripper for a fruit."""
+
+EARLY = 0.5
+"""Of fruits that stop, those that stood still from the first visit on: fruitlets that will drop, and pests of bloom."""
+
+PROOF = 12.0
+"""Nats by which things that stay have to explain all sizes better than slow and stopped fruits alone: fates are no
+exact model of either, so a few nats are no proof."""
+
+SCALE_SPREAD = 0.05
+"""Of the logarithm of a visit's scale: of a camera that was set up anew."""
+
+LEAST_NOISE, LEAST_SPREAD = 0.01, 0.03
+"""No camera is better, and no fruits are more alike."""
+
+USUAL_NOISE, NOISE_BELIEF = 0.05, 6.0
+"""Of a size, and tracks that this is worth."""
+
+MOST_TRACKS = 600
+"""By which it is learnt; more of them move no share by a hundredth."""
+
+ROUNDS, CLOSE = 40, 0.1
+"""Of expectation-maximisation at most, and nats that the last of them gained."""
+
+LEAST_HANGING = 1e-6
+"""Chance that a track still hangs, where nothing of it was seen for long."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Season:
+    """What is learnt: the growth, and the shares of tracks that grow, are slow, are things and have stopped, (4,)."""
+
+    growing: Growing
+    shares: Numbers
+
+
+def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Numbers:
+    """Return the probability of each track, (K,), that it is a thing that stays; 0 where sizes do not tell.
+
+    Parameters
+    ----------
+    log_sizes : (K, V) float64
+        Logarithms of diameters in one unit, NaN where unknown; visits in the order of days.
+    days : (V,) float64
+        Of the visits.
+    hanging : (K,) float64
+        Probability that it still hangs, by what visits missed: things do not go.
+    """
+    chances, seen = np.zeros(len(log_sizes)), ~np.isnan(log_sizes)
+    measured = seen.any(axis=0)
+    log_sizes, seen, days = log_sizes[:, measured], seen[:, measured], np.floor(days[measured])
+    latest = np.where(seen, days, -np.inf).max(axis=1, initial=-np.inf)
+    told = np.flatnonzero(latest > np.where(seen, days, np.inf).min(axis=1, initial=np.inf))
+    if len(told) < FEWEST_TRACKS or len(np.unique(days)) < FEWEST_DAYS:
+        return chances
+    own, stays = log_sizes[told], np.log(np.maximum(hanging[told], LEAST_HANGING))
+    some = np.linspace(0, len(told) - 1, min(len(told), MOST_TRACKS)).astype(np.int64)
+    learnt = own[some], stays[some], days
+    with_things, gained = _learnt(*learnt, _start(own))
+    none = with_things.shares * (np.arange(4) != THING)
+    _, without = _learnt(*learnt, replace(with_things, shares=none / none.sum()))
+    if gained - without > PROOF:
+        chances[told] = _weighed(own, stays, days, with_things)[0][:, THING].sum(axis=1)
+    return chances
+
+
+def _start(log_sizes: Numbers) -> _Season:
+    """Return the growth from visit to visit of the tracks that two of them saw, and what is believed."""
+    n = log_sizes.shape[1]
+    growth = np.zeros(n)
+    for visit in range(1, n):
+        both = np.isfinite(log_sizes[:, visit]) & np.isfinite(log_sizes[:, :visit]).any(axis=1)
+        grown = log_sizes[both, visit, None] - log_sizes[both, :visit] + growth[:visit]
+        growth[visit] = np.nanmedian(grown) if both.any() else growth[visit - 1]
+    growth += np.nanmedian(log_sizes - growth)
+    spread = 1.4826 * np.nanmedian(np.abs(log_sizes - growth))
+    return _Season(Growing(growth, np.zeros(n), np.full(n, USUAL_NOISE), max(spread, LEAST_SPREAD), 0.1), BELIEVED)
+
+
+def _learnt(log_sizes: Numbers, stays: Numbers, days: Numbers, season: _Season) -> tuple[_Season, float]:
+    """Return what explains the sizes best, from a start on, and how well it does: nats."""
+    before = -np.inf
+    for _ in range(ROUNDS):
+        of_fates, gained = _weighed(log_sizes, stays, days, season)
+        gained -= 0.5 * float(((season.growing.scales / SCALE_SPREAD) ** 2).sum())
+        if gained < before + CLOSE:
+            break
+        before, season = gained, _better(log_sizes, season, of_fates)
+    return season, gained
+
+
+def _weighed(log_sizes: Numbers, stays: Numbers, days: Numbers, season: _Season) -> tuple[Numbers, float]:
+    """Return the probabilities of the fates of each track, (N, M, 1 + V), and the log-likelihood of all."""
+    logs = fate_densities(log_sizes, season.growing) + _log_priors(days, season.shares)[:, None]
+    logs[:, THING] += stays[:, None]
+    most = logs.max(axis=(1, 2), keepdims=True)
+    weights = np.exp(logs - most)
+    total = weights.sum(axis=(1, 2), keepdims=True)
+    return weights / total, float((most + np.log(total)).sum())
+
+
+def _log_priors(days: Numbers, shares: Numbers) -> Numbers:
+    """Return the logarithm of the probability of each fate, (M,)."""
+    between = np.diff(days)
+    stopped = np.concatenate([[EARLY], (1.0 - EARLY) * between / between.sum()]) * shares[3]
+    with np.errstate(divide="ignore"):
+        return np.log(np.concatenate([shares[:STANDS], stopped]))
+
+
+def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
+    """Return what explains the sizes better, given the probabilities of the fates, (N, M, 1 + V)."""
+    counts = of_fates.sum(axis=(0, 2))
+    has_things = season.shares[THING] > 0.0
+    counts = np.array([counts[GROWS], counts[SLOW], counts[THING], counts[STANDS:].sum()])
+    believed = BELIEF * BELIEVED * (has_things | (np.arange(4) != THING))
+    shares = (counts + believed) / (counts + believed).sum()
+    return _Season(_regrown(log_sizes, season.growing, of_fates), shares)
+
+
+def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Growing:
+    seen, grows = ~np.isnan(log_sizes), of_fates[:, GROWS]
+    own = own_numbers(log_sizes, growing)
+    # A size that is off says nothing.
+    counted = grows[:, :, None] * seen[:, None, :] * ~np.eye(seen.shape[1] + 1, seen.shape[1], -1, dtype=bool)
+    n = counted.sum(axis=(0, 1))
+    moved = (counted * own.off).sum(axis=(0, 1)) / np.maximum(n, 1.0)
+    squares = (counted * ((own.off - moved) ** 2 + own.variances)).sum(axis=(0, 1))
+    noises = np.sqrt((squares + NOISE_BELIEF * USUAL_NOISE**2) / (n + NOISE_BELIEF))
+    spreads = np.sqrt((grows * own.squares).sum(axis=(1, 2)) / grows.sum())
+    scales = _rescaled(log_sizes, growing, of_fates)
+    return Growing(
+        growth=growing.growth + moved + growing.scales - scales,
+        scales=scales,
+        noises=np.maximum(noises, LEAST_NOISE),
+        level_spread=max(float(spreads[0]), LEAST_SPREAD),
+        rate_spread=max(float(spreads[1]), LEAST_SPREAD),
+    )
+
+
+def _rescaled(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Numbers:
+    """Return the scales of the visits, (V,), as those say that do not grow."""
+    seen = ~np.isnan(log_sizes)
+    stands = of_fates[:, [THING, STANDS]].sum(axis=1)
+    weights = np.where(seen, stands.sum(axis=1)[:, None] - stands[:, 1:], 0.0) / growing.noises**2
+    sizes = np.where(seen, log_sizes, 0.0)
+    off = np.where(seen, sizes - growing.scales, 0.0)
+    level = (weights * off).sum(axis=1) / np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
+    return np.asarray((weights * (sizes - level[:, None])).sum(axis=0) / (weights.sum(axis=0) + SCALE_SPREAD**-2))
