@@ -105,7 +105,7 @@ def conclude(
 def _log_sizes(sights: Sights, labels: NDArray[np.int64], frames: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the logarithms of the diameters of each fruit, (K, V), in the unit of the map; NaN where unknown."""
     log_sizes = np.full((labels.max(initial=-1) + 1, len(frames)), np.nan)
-    log_sizes[labels, sights.visits] = sights.log_sizes
+    log_sizes[labels, sights.visits] = np.where(np.isfinite(sights.log_sizes), sights.log_sizes, np.nan)
     return np.asarray(log_sizes + np.log(np.linalg.det(frames[:, :3, :3])) / 3.0)
 
 

@@ -20,14 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GROWS", "N_BEFORE_STOPS", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
+__all__ = ["GROWS", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
 
 Numbers = NDArray[np.float64]
 
 GROWS, SLOW, THING, STANDS = range(4)
-"""Fates; those behind them have stopped after the first visit, the second and so on."""
-
-N_BEFORE_STOPS = 4
+"""Fates; `STANDS` has stopped before the first visit, those behind it after the first, the second and so on."""
 
 OFF = 0.02
 """Share of sizes that are not those of the track: of half a fruit behind a leaf, of the neighbour."""
@@ -127,9 +125,9 @@ def _along(sums: _Sums, rate_spread: float) -> Numbers:
     """Return what going along the directions adds to the logarithm of the densities, (N, M, 1 + V)."""
     from scipy.special import log_ndtr
 
-    added = np.empty(sums.density.shape)
-    even = [SLOW, THING]
-    normal = np.setdiff1d(np.arange(added.shape[1]), even)
+    added, fates = np.empty_like(sums.density), np.arange(sums.density.shape[1])
+    is_even = (fates == SLOW) | (fates == THING)
+    even, normal = fates[is_even], fates[~is_even]
     own = np.where(normal == GROWS, rate_spread**-2, 1.0)[:, None]
     information, said = sums.information[:, normal], sums.said[:, normal]
     added[:, normal] = 0.5 * said**2 / (own + information) - 0.5 * np.log1p(information / own)

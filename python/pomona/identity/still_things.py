@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from pomona.identity.size_fates import (
     GROWS,
-    N_BEFORE_STOPS,
     SLOW,
     STANDS,
     THING,
@@ -47,8 +46,11 @@ LEAST_NOISE, LEAST_SPREAD = 0.01, 0.03
 USUAL_NOISE, NOISE_BELIEF = 0.05, 6.0
 """Of a size, and tracks that this is worth."""
 
-MOST_TRACKS = 600
-"""By which it is learnt; more of them move no share by a hundredth."""
+MOST_CELLS, LEAST_TRACKS = 200_000, 100
+"""Tracks times fates times visits by which it is learnt; of 600 tracks on ten visits and more of fewer."""
+
+AT_ONCE = 500
+"""Tracks that are weighed together."""
 
 ROUNDS, CLOSE = 40, 0.1
 """Of expectation-maximisation at most, and nats that the last of them gained."""
@@ -85,13 +87,16 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
     if len(told) < FEWEST_TRACKS or len(np.unique(days)) < FEWEST_DAYS:
         return chances
     own, stays = log_sizes[told], np.log(np.maximum(hanging[told], LEAST_HANGING))
-    some = np.linspace(0, len(told) - 1, min(len(told), MOST_TRACKS)).astype(np.int64)
+    most = max(LEAST_TRACKS, MOST_CELLS // (len(days) + STANDS) ** 2)
+    some = np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64)
     learnt = own[some], stays[some], days
     with_things, gained = _learnt(*learnt, _start(own))
     none = with_things.shares * (np.arange(4) != THING)
     _, without = _learnt(*learnt, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
-        chances[told] = _weighed(own, stays, days, with_things)[0][:, THING].sum(axis=1)
+        for start in range(0, len(told), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            chances[told[part]] = _weighed(own[part], stays[part], days, with_things)[0][:, THING].sum(axis=1)
     return chances
 
 
@@ -134,8 +139,8 @@ def _log_priors(days: Numbers, shares: Numbers) -> Numbers:
     """Return the logarithm of the probability of each fate, (M,)."""
     between = np.diff(days)
     stopped = np.concatenate([[EARLY], (1.0 - EARLY) * between / between.sum()]) * shares[3]
-    with np.errstate(divide="ignore"):
-        return np.log(np.concatenate([shares[:STANDS], stopped]))
+    with np.errstate(divide="ignore"):  # none stops between two visits of one day
+        return np.asarray(np.log(np.concatenate([shares[:STANDS], stopped])))
 
 
 def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
