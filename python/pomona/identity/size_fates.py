@@ -88,7 +88,7 @@ class _Sums:
     said: Numbers
 
 
-def fate_densities(log_sizes: Numbers, growing: Growing) -> Numbers:
+def fate_densities(log_sizes: Numbers, drops: Numbers, growing: Growing) -> Numbers:
     """Return the logarithm of the density of the sizes of each track, (N, M, 1 + V), for each of the M fates.
 
     With no size off, and with that of each visit.
@@ -97,10 +97,15 @@ def fate_densities(log_sizes: Numbers, growing: Growing) -> Numbers:
     ----------
     log_sizes : (N, V) float64
         NaN where a visit did not measure the track.
+    drops : (N,) float64
+        Nats against a fruit that stands still to hang for as long as the track was seen; against one that is slow by
+        $x$ they are $1 - x$ as many.
     growing : Growing
     """
     curves, along = growing.fates()
     sums = _summed(log_sizes, growing, curves, along)
+    sums.density[:, [SLOW, STANDS]] -= drops[:, None, None]
+    sums.said[:, SLOW] += drops[:, None]
     return np.asarray(sums.density + _along(sums, growing.rate_spread))
 
 

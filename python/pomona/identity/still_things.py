@@ -33,6 +33,10 @@ BELIEF = 12.0
 EARLY = 0.5
 """Of fruits that stop, those that stood still from the first visit on: fruitlets that will drop, and pests of bloom."""
 
+DROPS_AFTER_DAYS, HANG_ON = 12.0, 0.05
+"""Fruitlets slow down some twelve days before they drop (the growth-rate rule of thinning): so long all that stand
+still hang, then half of them drop in as many days each, and a few hang on for good."""
+
 PROOF = 12.0
 """Nats by which things that stay have to explain all sizes better than slow and stopped fruits alone: fates are no
 exact model of either, so a few nats are no proof."""
@@ -60,6 +64,33 @@ LEAST_HANGING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+class _Tracks:
+    """N tracks that two days measured.
+
+    Attributes
+    ----------
+    log_sizes : (N, V) float64
+        NaN where unknown.
+    days : (V,) float64
+    stays : (N,) float64
+        Logarithm of the chance that what visits saw and missed is that of a thing, which does not go.
+    drops : (N,) float64
+        Nats against a fruit that stands still to hang for as long as it was seen.
+    """
+
+    log_sizes: Numbers
+    days: Numbers
+    stays: Numbers
+    drops: Numbers
+
+    def __len__(self) -> int:
+        return len(self.log_sizes)
+
+    def chosen(self, rows: NDArray[np.int64]) -> _Tracks:
+        return _Tracks(self.log_sizes[rows], self.days, self.stays[rows], self.drops[rows])
+
+
+@dataclass(frozen=True, eq=False)
 class _Season:
     """What is learnt: the growth, and the shares of tracks that grow, are slow, are things and have stopped, (4,)."""
 
@@ -79,25 +110,33 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
     hanging : (K,) float64
         Probability that it still hangs, by what visits missed: things do not go.
     """
-    chances, seen = np.zeros(len(log_sizes)), ~np.isnan(log_sizes)
-    measured = seen.any(axis=0)
-    log_sizes, seen, days = log_sizes[:, measured], seen[:, measured], np.floor(days[measured])
-    latest = np.where(seen, days, -np.inf).max(axis=1, initial=-np.inf)
-    told = np.flatnonzero(latest > np.where(seen, days, np.inf).min(axis=1, initial=np.inf))
-    if len(told) < FEWEST_TRACKS or len(np.unique(days)) < FEWEST_DAYS:
+    chances = np.zeros(len(log_sizes))
+    measured = ~np.isnan(log_sizes).all(axis=0)
+    told, tracks = _told_tracks(log_sizes[:, measured], np.floor(days[measured]), hanging)
+    if len(told) < FEWEST_TRACKS or len(np.unique(tracks.days)) < FEWEST_DAYS:
         return chances
-    own, stays = log_sizes[told], np.log(np.maximum(hanging[told], LEAST_HANGING))
-    most = max(LEAST_TRACKS, MOST_CELLS // (len(days) + STANDS) ** 2)
-    some = np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64)
-    learnt = own[some], stays[some], days
-    with_things, gained = _learnt(*learnt, _start(own))
+    most = max(LEAST_TRACKS, MOST_CELLS // (len(tracks.days) + STANDS) ** 2)
+    some = tracks.chosen(np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64))
+    with_things, gained = _learnt(some, _start(tracks.log_sizes))
     none = with_things.shares * (np.arange(4) != THING)
-    _, without = _learnt(*learnt, replace(with_things, shares=none / none.sum()))
+    _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
         for start in range(0, len(told), AT_ONCE):
-            part = slice(start, start + AT_ONCE)
-            chances[told[part]] = _weighed(own[part], stays[part], days, with_things)[0][:, THING].sum(axis=1)
+            part = np.arange(start, min(start + AT_ONCE, len(told)))
+            chances[told[part]] = _weighed(tracks.chosen(part), with_things)[0][:, THING].sum(axis=1)
     return chances
+
+
+def _told_tracks(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> tuple[NDArray[np.int64], _Tracks]:
+    """Return the rows of the tracks of which two days have sizes, and what is known of these."""
+    seen = ~np.isnan(log_sizes)
+    spans = np.where(seen, days, -np.inf).max(axis=1, initial=-np.inf)
+    spans = spans - np.where(seen, days, np.inf).min(axis=1, initial=np.inf)
+    told = np.flatnonzero(spans > 0.0)
+    stays = np.log(np.maximum(hanging[told], LEAST_HANGING))
+    halved = np.maximum(spans[told] / DROPS_AFTER_DAYS - 1.0, 0.0)
+    drops = -np.log(HANG_ON + (1.0 - HANG_ON) * 0.5**halved)
+    return told, _Tracks(log_sizes[told], days, stays, drops)
 
 
 def _start(log_sizes: Numbers) -> _Season:
@@ -113,22 +152,23 @@ def _start(log_sizes: Numbers) -> _Season:
     return _Season(Growing(growth, np.zeros(n), np.full(n, USUAL_NOISE), max(spread, LEAST_SPREAD), 0.1), BELIEVED)
 
 
-def _learnt(log_sizes: Numbers, stays: Numbers, days: Numbers, season: _Season) -> tuple[_Season, float]:
+def _learnt(tracks: _Tracks, season: _Season) -> tuple[_Season, float]:
     """Return what explains the sizes best, from a start on, and how well it does: nats."""
     before = -np.inf
     for _ in range(ROUNDS):
-        of_fates, gained = _weighed(log_sizes, stays, days, season)
+        of_fates, gained = _weighed(tracks, season)
         gained -= 0.5 * float(((season.growing.scales / SCALE_SPREAD) ** 2).sum())
         if gained < before + CLOSE:
             break
-        before, season = gained, _better(log_sizes, season, of_fates)
+        before, season = gained, _better(tracks.log_sizes, season, of_fates)
     return season, gained
 
 
-def _weighed(log_sizes: Numbers, stays: Numbers, days: Numbers, season: _Season) -> tuple[Numbers, float]:
+def _weighed(tracks: _Tracks, season: _Season) -> tuple[Numbers, float]:
     """Return the probabilities of the fates of each track, (N, M, 1 + V), and the log-likelihood of all."""
-    logs = fate_densities(log_sizes, season.growing) + _log_priors(days, season.shares)[:, None]
-    logs[:, THING] += stays[:, None]
+    logs = fate_densities(tracks.log_sizes, tracks.drops, season.growing)
+    logs += _log_priors(tracks.days, season.shares)[:, None]
+    logs[:, THING] += tracks.stays[:, None]
     most = logs.max(axis=(1, 2), keepdims=True)
     weights = np.exp(logs - most)
     total = weights.sum(axis=(1, 2), keepdims=True)
