@@ -7,15 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.size_fates import (
-    GROWS,
-    SLOW,
-    STANDS,
-    THING,
-    Growing,
-    fate_densities,
-    own_numbers,
-)
+from pomona.identity.size_fates import GROWS, STANDS, THING, Growing, fate_densities, own_numbers
 
 __all__ = ["still_chances"]
 
@@ -24,14 +16,12 @@ Numbers = NDArray[np.float64]
 FEWEST_TRACKS, FEWEST_DAYS = 20, 3
 """Fewer say nothing: of two days a fruitlet that will drop stands as still as a thing."""
 
-BELIEVED = np.array([0.91, 0.04, 0.03, 0.02])
-"""Shares of tracks that grow, are slow, are things and have stopped, before the season says its own."""
+BELIEVED = np.array([0.89, 0.04, 0.03, 0.02, 0.02])
+"""Shares of tracks that grow, are slow, are things, stand still from the first visit on, and have stopped later, before
+the season says its own."""
 
 BELIEF = 12.0
 """Tracks that this belief is worth: one detector has no clips, another takes every dripper for a fruit."""
-
-EARLY = 0.5
-"""Of fruits that stop, those that stood still from the first visit on: fruitlets that will drop, and pests of bloom."""
 
 DROPS_AFTER_DAYS, HANG_ON = 12.0, 0.05
 """Fruitlets slow down some twelve days before they drop (the growth-rate rule of thinning): so long all that stand
@@ -92,7 +82,7 @@ class _Tracks:
 
 @dataclass(frozen=True, eq=False)
 class _Season:
-    """What is learnt: the growth, and the shares of tracks that grow, are slow, are things and have stopped, (4,)."""
+    """What is learnt: the growth, and shares as `BELIEVED`, (5,)."""
 
     growing: Growing
     shares: Numbers
@@ -118,7 +108,7 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
     most = max(LEAST_TRACKS, MOST_CELLS // (len(tracks.days) + STANDS) ** 2)
     some = tracks.chosen(np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64))
     with_things, gained = _learnt(some, _start(tracks.log_sizes))
-    none = with_things.shares * (np.arange(4) != THING)
+    none = with_things.shares * (np.arange(len(BELIEVED)) != THING)
     _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
         for start in range(0, len(told), AT_ONCE):
@@ -178,19 +168,16 @@ def _weighed(tracks: _Tracks, season: _Season) -> tuple[Numbers, float]:
 def _log_priors(days: Numbers, shares: Numbers) -> Numbers:
     """Return the logarithm of the probability of each fate, (M,)."""
     between = np.diff(days)
-    stopped = np.concatenate([[EARLY], (1.0 - EARLY) * between / between.sum()]) * shares[3]
     with np.errstate(divide="ignore"):  # none stops between two visits of one day
-        return np.asarray(np.log(np.concatenate([shares[:STANDS], stopped])))
+        return np.asarray(np.log(np.append(shares[:-1], shares[-1] * between / between.sum())))
 
 
 def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
     """Return what explains the sizes better, given the probabilities of the fates, (N, M, 1 + V)."""
     counts = of_fates.sum(axis=(0, 2))
-    has_things = season.shares[THING] > 0.0
-    counts = np.array([counts[GROWS], counts[SLOW], counts[THING], counts[STANDS:].sum()])
-    believed = BELIEF * BELIEVED * (has_things | (np.arange(4) != THING))
-    shares = (counts + believed) / (counts + believed).sum()
-    return _Season(_regrown(log_sizes, season.growing, of_fates), shares)
+    # A share of nothing stays so.
+    shares = (np.append(counts[: STANDS + 1], counts[STANDS + 1 :].sum()) + BELIEF * BELIEVED) * (season.shares > 0.0)
+    return _Season(_regrown(log_sizes, season.growing, of_fates), shares / shares.sum())
 
 
 def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Growing:
