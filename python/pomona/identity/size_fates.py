@@ -4,7 +4,8 @@ The logarithms of the sizes of a track are $y_v = s_v + c_v + a + x\, d_v + e_v$
 $s_v$ the scale of a visit, $c_v$ a curve, $a \sim N(0, \sigma_a)$ its own level, $x$ how far it goes along $d_v$, and
 $e_v \sim N(0, \sigma_v)$. Of a track no size is off, or one. With $g_v$ the growth of the planting,
 
-- it *grows*: $c = g$, $d = g - \bar g$, $x \sim N(0, \sigma_b)$;
+- it *grows*: $c = g$, $d = g - \bar g$, $x \sim N(0, \sigma_b)$; and so too if it is *odd*, smaller or larger than most
+  fruits, with three times $\sigma_a$;
 - it is *slow*, by anything from nothing to all of the growth: $c = g_1$, $d = g - g_1$, $x$ even from 0 to 1;
 - it has *stopped* after visit $z$ and some of the next gain, or, with $z = 0$, before the first: $c = g_{\min(v, z)}$;
 - it is a *thing* as large as fruits on any day: $c = g_1$, $d = g_V - g_1$, $x$ even from 0 to 1.
@@ -20,11 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GROWS", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
+__all__ = ["GROWS", "ODD", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
 
 Numbers = NDArray[np.float64]
 
-GROWS, SLOW, THING, STANDS = range(4)
+GROWS, ODD, SLOW, THING, STANDS = range(5)
 """Fates; `STANDS` has stopped before the first visit, those behind it after the first, the second and so on."""
 
 OFF = 0.02
@@ -32,6 +33,9 @@ OFF = 0.02
 
 OFF_BY = 0.5
 """Of the logarithm of such a size: half to twice of what it should be."""
+
+ODD_BY = 3.0
+"""Times as far from the others as most: a size that is seen late and is small is no proof of a thing."""
 
 UNIFORM_SPREAD = 12.0**-0.5
 """Standard deviation of what is anywhere from 0 to 1."""
@@ -68,15 +72,20 @@ class Growing:
         return np.asarray(self.growth - self.growth.mean())
 
     def fates(self) -> tuple[Numbers, Numbers]:
-        """Return the curves and the directions of all fates, (M, V) both."""
+        """Return the curves and the directions of all fates, (M, V) both; a way that is normal has a spread of 1."""
         growth, n = self.growth, len(self.growth)
         stops, visits = np.arange(1, n)[:, None], np.arange(n)
         gains = np.maximum(np.diff(growth), 0.0)[:, None] * (visits >= stops)
         first = np.full(n, growth[0])
-        curves = np.vstack([growth, first, first, first, growth[np.minimum(visits, stops - 1)] + 0.5 * gains])
+        curves = np.vstack([growth, growth, first, first, first, growth[np.minimum(visits, stops - 1)] + 0.5 * gains])
         everywhere = np.full(n, growth[-1] - growth[0])
-        along = np.vstack([self.directions, growth - growth[0], everywhere, np.zeros(n), UNIFORM_SPREAD * gains])
-        return curves, along
+        rates, slower = self.rate_spread * self.directions, growth - growth[0]
+        return curves, np.vstack([rates, rates, slower, everywhere, np.zeros(n), UNIFORM_SPREAD * gains])
+
+    def levels(self) -> Numbers:
+        """Return the spreads of the levels of all fates, (M,)."""
+        fates = np.arange(STANDS + len(self.growth))
+        return np.where(fates == ODD, ODD_BY, 1.0) * self.level_spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,18 +111,17 @@ def fate_densities(log_sizes: Numbers, drops: Numbers, growing: Growing) -> Numb
         $x$ they are $1 - x$ as many.
     growing : Growing
     """
-    curves, along = growing.fates()
-    sums = _summed(log_sizes, growing, curves, along)
+    sums = _summed(log_sizes, growing)
     sums.density[:, [SLOW, STANDS]] -= drops[:, None, None]
     sums.said[:, SLOW] += drops[:, None]
-    return np.asarray(sums.density + _along(sums, growing.rate_spread))
+    return np.asarray(sums.density + _along(sums))
 
 
-def _summed(log_sizes: Numbers, growing: Growing, curves: Numbers, along: Numbers) -> _Sums:
-    seen = ~np.isnan(log_sizes)
+def _summed(log_sizes: Numbers, growing: Growing) -> _Sums:
+    seen, (curves, along) = ~np.isnan(log_sizes), growing.fates()
     weights = (seen / growing.noises**2)[:, None, :]
     off = np.where(seen, log_sizes - growing.scales, 0.0)[:, None, :] - curves
-    of_level = growing.level_spread**-2
+    of_level = growing.levels()[:, None] ** -2
     weight, gone = _without_each(weights), _without_each(weights * along)
     said, along_said = _without_each(weights * off), _without_each(weights * along * off)
     together = of_level + weight
@@ -126,16 +134,15 @@ def _summed(log_sizes: Numbers, growing: Growing, curves: Numbers, along: Number
     return _Sums(density, _without_each(weights * along**2) - gone**2 / together, along_said - gone * said / together)
 
 
-def _along(sums: _Sums, rate_spread: float) -> Numbers:
+def _along(sums: _Sums) -> Numbers:
     """Return what going along the directions adds to the logarithm of the densities, (N, M, 1 + V)."""
     from scipy.special import log_ndtr
 
     added, fates = np.empty_like(sums.density), np.arange(sums.density.shape[1])
     is_even = (fates == SLOW) | (fates == THING)
     even, normal = fates[is_even], fates[~is_even]
-    own = np.where(normal == GROWS, rate_spread**-2, 1.0)[:, None]
     information, said = sums.information[:, normal], sums.said[:, normal]
-    added[:, normal] = 0.5 * said**2 / (own + information) - 0.5 * np.log1p(information / own)
+    added[:, normal] = 0.5 * said**2 / (1.0 + information) - 0.5 * np.log1p(information)
     information, said = np.maximum(sums.information[:, even], LEAST), sums.said[:, even]
     root = np.sqrt(information)
     ends = -said / root, root - said / root

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.size_fates import GROWS, STANDS, THING, Growing, fate_densities, own_numbers
+from pomona.identity.size_fates import GROWS, ODD, SLOW, STANDS, THING, Growing, fate_densities, own_numbers
 
 __all__ = ["still_chances"]
 
@@ -19,6 +19,12 @@ FEWEST_TRACKS, FEWEST_DAYS = 20, 3
 BELIEVED = np.array([0.89, 0.04, 0.03, 0.02, 0.02])
 """Shares of tracks that grow, are slow, are things, stand still from the first visit on, and have stopped later, before
 the season says its own."""
+
+SHARE_OF_THINGS = 2
+"""Place of theirs."""
+
+ARE_ODD = 0.05
+"""Of those that grow, the share that is much smaller or larger than the others."""
 
 BELIEF = 12.0
 """Tracks that this belief is worth: one detector has no clips, another takes every dripper for a fruit."""
@@ -108,7 +114,7 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
     most = max(LEAST_TRACKS, MOST_CELLS // (len(tracks.days) + STANDS) ** 2)
     some = tracks.chosen(np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64))
     with_things, gained = _learnt(some, _start(tracks.log_sizes))
-    none = with_things.shares * (np.arange(len(BELIEVED)) != THING)
+    none = np.where(np.arange(len(BELIEVED)) == SHARE_OF_THINGS, 0.0, with_things.shares)
     _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
         for start in range(0, len(told), AT_ONCE):
@@ -168,15 +174,17 @@ def _weighed(tracks: _Tracks, season: _Season) -> tuple[Numbers, float]:
 def _log_priors(days: Numbers, shares: Numbers) -> Numbers:
     """Return the logarithm of the probability of each fate, (M,)."""
     between = np.diff(days)
+    grows = shares[0] * np.array([1.0 - ARE_ODD, ARE_ODD])
     with np.errstate(divide="ignore"):  # none stops between two visits of one day
-        return np.asarray(np.log(np.append(shares[:-1], shares[-1] * between / between.sum())))
+        return np.asarray(np.log(np.concatenate([grows, shares[1:-1], shares[-1] * between / between.sum()])))
 
 
 def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
     """Return what explains the sizes better, given the probabilities of the fates, (N, M, 1 + V)."""
     counts = of_fates.sum(axis=(0, 2))
+    counts = np.concatenate([[counts[: ODD + 1].sum()], counts[SLOW : STANDS + 1], [counts[STANDS + 1 :].sum()]])
     # A share of nothing stays so.
-    shares = (np.append(counts[: STANDS + 1], counts[STANDS + 1 :].sum()) + BELIEF * BELIEVED) * (season.shares > 0.0)
+    shares = (counts + BELIEF * BELIEVED) * (season.shares > 0.0)
     return _Season(_regrown(log_sizes, season.growing, of_fates), shares / shares.sum())
 
 
