@@ -16,6 +16,7 @@ fruit that stopped early, where one as large as they are at last is none.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ OFF = 0.02
 
 OFF_BY = 0.5
 """Of the logarithm of such a size: half to twice of what it should be."""
+
+SURPRISE = 4.0
+"""Nats by which sizes are less likely than usual, from which one of them may be off: it takes six to believe that."""
 
 ODD_BY = 3.0
 """Times as far from the others as most: a size that is seen late and is small is no proof of a thing."""
@@ -90,7 +94,7 @@ class Growing:
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Sums over the sizes of a track, all of them and without each in turn, (N, M, 1 + V) each, level summed over."""
+    """Sums over the sizes of a track, all of them and perhaps without each in turn, (N, M, 1 + V), its level apart."""
 
     density: Numbers
     information: Numbers
@@ -100,7 +104,7 @@ class _Sums:
 def fate_densities(log_sizes: Numbers, drops: Numbers, growing: Growing) -> Numbers:
     """Return the logarithm of the density of the sizes of each track, (N, M, 1 + V), for each of the M fates.
 
-    With no size off, and with that of each visit.
+    With no size off, and with that of each visit where one may be.
 
     Parameters
     ----------
@@ -111,27 +115,37 @@ def fate_densities(log_sizes: Numbers, drops: Numbers, growing: Growing) -> Numb
         $x$ they are $1 - x$ as many.
     growing : Growing
     """
-    sums = _summed(log_sizes, growing)
+    seen = ~np.isnan(log_sizes)
+    logs = np.full((len(log_sizes), STANDS + seen.shape[1], 1 + seen.shape[1]), -np.inf)
+    logs[:, :, :1] = _densities(log_sizes, drops, growing, _of_all)
+    usual = seen @ (np.log1p(-OFF) - np.log(np.sqrt(2.0 * np.pi) * growing.noises) - 0.5)
+    rows = np.flatnonzero(logs[:, :, 0].max(axis=1) < usual - SURPRISE)
+    logs[rows] = _densities(log_sizes[rows], drops[rows], growing, _without_each)
+    return logs
+
+
+def _densities(log_sizes: Numbers, drops: Numbers, growing: Growing, summed: Callable[[Numbers], Numbers]) -> Numbers:
+    sums = _summed(log_sizes, growing, summed)
     sums.density[:, [SLOW, STANDS]] -= drops[:, None, None]
     sums.said[:, SLOW] += drops[:, None]
     return np.asarray(sums.density + _along(sums))
 
 
-def _summed(log_sizes: Numbers, growing: Growing) -> _Sums:
+def _summed(log_sizes: Numbers, growing: Growing, summed: Callable[[Numbers], Numbers]) -> _Sums:
     seen, (curves, along) = ~np.isnan(log_sizes), growing.fates()
     weights = (seen / growing.noises**2)[:, None, :]
     off = np.where(seen, log_sizes - growing.scales, 0.0)[:, None, :] - curves
     of_level = growing.levels()[:, None] ** -2
-    weight, gone = _without_each(weights), _without_each(weights * along)
-    said, along_said = _without_each(weights * off), _without_each(weights * along * off)
+    weighted, sideways = weights * off, weights * along
+    weight, gone = summed(weights), summed(sideways)
+    said, along_said = summed(weighted), summed(sideways * off)
     together = of_level + weight
-    logs = np.where(seen, 0.5 * np.log(weights[:, 0] / (2.0 * np.pi) + ~seen), 0.0)
-    sizes = np.where(seen, np.log1p(-OFF), 0.0).sum(axis=1)[:, None] + np.pad(
-        np.where(seen, np.log(OFF / (1.0 - OFF) / (np.sqrt(2.0 * np.pi) * OFF_BY)), -np.inf), ((0, 0), (1, 0))
-    )
-    density = _without_each(logs)[:, None, :] + sizes[:, None, :] - 0.5 * np.log(together / of_level)
-    density = density - 0.5 * (_without_each(weights * off**2) - said**2 / together)
-    return _Sums(density, _without_each(weights * along**2) - gone**2 / together, along_said - gone * said / together)
+    logs = summed(np.where(seen, np.log1p(-OFF) - np.log(np.sqrt(2.0 * np.pi) * growing.noises), 0.0))
+    logs[:, 1:] += np.where(seen, np.log(OFF / (np.sqrt(2.0 * np.pi) * OFF_BY)), -np.inf)[:, : logs.shape[1] - 1]
+    shares = said / together
+    density = logs[:, None, :] - 0.5 * np.log(together / of_level) - 0.5 * (summed(weighted * off) - said * shares)
+    information = summed(sideways * along) - gone**2 / together
+    return _Sums(density, information, along_said - gone * shares)
 
 
 def _along(sums: _Sums) -> Numbers:
@@ -155,10 +169,17 @@ def _along(sums: _Sums) -> Numbers:
     return added
 
 
+def _of_all(terms: Numbers) -> Numbers:
+    """Return the sum over the last axis."""
+    return np.asarray(terms.sum(axis=-1, keepdims=True))
+
+
 def _without_each(terms: Numbers) -> Numbers:
     """Return the sum over the last axis, and beside it the sums without each of its terms."""
-    total = terms.sum(axis=-1, keepdims=True)
-    return np.asarray(np.concatenate([total, total - terms], axis=-1))
+    sums = np.empty((*terms.shape[:-1], terms.shape[-1] + 1))
+    terms.sum(axis=-1, out=sums[..., 0])
+    np.subtract(sums[..., :1], terms, out=sums[..., 1:])
+    return sums
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,9 @@ PROOF = 12.0
 """Nats by which things that stay have to explain all sizes better than slow and stopped fruits alone: fates are no
 exact model of either, so a few nats are no proof."""
 
+FEWEST_THINGS = 2.0
+"""Fewer are no proof, nor worth the search for another reason."""
+
 SCALE_SPREAD = 0.05
 """Of the logarithm of a visit's scale: of a camera that was set up anew."""
 
@@ -46,13 +49,13 @@ LEAST_NOISE, LEAST_SPREAD = 0.01, 0.03
 USUAL_NOISE, NOISE_BELIEF = 0.05, 6.0
 """Of a size, and tracks that this is worth."""
 
-MOST_CELLS, LEAST_TRACKS = 200_000, 100
-"""Tracks times fates times visits by which it is learnt; of 600 tracks on ten visits and more of fewer."""
+MOST_CELLS, LEAST_TRACKS = 50_000, 100
+"""Tracks times fates times visits by which it is learnt: of 300 tracks of eight visits, and of more of fewer."""
 
 AT_ONCE = 500
 """Tracks that are weighed together."""
 
-ROUNDS, CLOSE = 40, 0.1
+ROUNDS, CLOSE = 40, 0.5
 """Of expectation-maximisation at most, and nats that the last of them gained."""
 
 LEAST_HANGING = 1e-6
@@ -114,6 +117,8 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
     most = max(LEAST_TRACKS, MOST_CELLS // (len(tracks.days) + STANDS) ** 2)
     some = tracks.chosen(np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64))
     with_things, gained = _learnt(some, _start(tracks.log_sizes))
+    if with_things.shares[SHARE_OF_THINGS] * len(some) < FEWEST_THINGS:
+        return chances
     none = np.where(np.arange(len(BELIEVED)) == SHARE_OF_THINGS, 0.0, with_things.shares)
     _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
