@@ -22,7 +22,7 @@ from pomona.identity.size_fates import (
     THING,
     Growing,
     fate_densities,
-    own_numbers,
+    own_growth,
 )
 from pomona.identity.still_things import still_chances
 
@@ -200,19 +200,19 @@ def test_a_size_that_is_off_counts_as_none_but_for_its_own_density() -> None:
     off = np.log(OFF / (np.sqrt(2.0 * np.pi) * OFF_BY))
     both = [fate_densities(one, np.zeros(1), GROWING) for one in (sizes, without)]
     assert both[0][0, :, 3] == pytest.approx(both[1][0, :, 0] + off)
-    numbers = [own_numbers(one, GROWING) for one in (sizes, without)]
+    numbers = [own_growth(one, GROWING) for one in (sizes, without)]
     assert numbers[0].squares[:, 0, 3] == pytest.approx(numbers[1].squares[:, 0, 0])
     assert numbers[0].variances[0, 3] == pytest.approx(numbers[1].variances[0, 0])
 
 
-def test_own_numbers_are_those_of_one_gaussian() -> None:
+def test_own_growth_are_those_of_one_gaussian() -> None:
     sizes = np.array([[-3.85, -3.5, -3.2, -2.95]])
     own = np.stack([np.ones(4), GROWING.directions])
     prior = np.diag([GROWING.level_spread**2, GROWING.rate_spread**2])
     gain = prior @ own @ np.linalg.inv(own.T @ prior @ own + np.diag(GROWING.noises**2))
     off = sizes[0] - GROWING.scales - GROWING.growth
     posterior = prior - gain @ own.T @ prior
-    found = own_numbers(sizes, GROWING)
+    found = own_growth(sizes, GROWING)
     assert found.off[0, 0] == pytest.approx(off - own.T @ gain @ off)
     assert found.variances[0, 0] == pytest.approx(np.diag(own.T @ posterior @ own))
     assert found.squares[:, 0, 0] == pytest.approx((gain @ off) ** 2 + np.diag(posterior))

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GROWS", "ODD", "SLOW", "STANDS", "THING", "Growing", "OwnNumbers", "fate_densities", "own_numbers"]
+__all__ = ["GROWS", "ODD", "SLOW", "STANDS", "THING", "Growing", "OwnGrowth", "fate_densities", "own_growth"]
 
 Numbers = NDArray[np.float64]
 
@@ -183,7 +183,7 @@ def _without_each(terms: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, eq=False)
-class OwnNumbers:
+class OwnGrowth:
     """Level and rate of N tracks if they grow, given all sizes, and all but each.
 
     Attributes
@@ -201,7 +201,7 @@ class OwnNumbers:
     squares: Numbers
 
 
-def own_numbers(log_sizes: Numbers, growing: Growing) -> OwnNumbers:
+def own_growth(log_sizes: Numbers, growing: Growing) -> OwnGrowth:
     """Tell the own level and rate of tracks that grow; see `fate_densities`."""
     seen, along = ~np.isnan(log_sizes), growing.directions
     weights = seen / growing.noises**2
@@ -214,4 +214,4 @@ def own_numbers(log_sizes: Numbers, growing: Growing) -> OwnNumbers:
     foretold = level[:, :, None] + rate[:, :, None] * along
     variances = (around[:, :, None] - 2.0 * gone[:, :, None] * along + weight[:, :, None] * along**2) / room[:, :, None]
     squares = np.stack([level**2 + around / room, rate**2 + weight / room])
-    return OwnNumbers(off[:, None, :] - foretold, variances, squares)
+    return OwnGrowth(off[:, None, :] - foretold, variances, squares)

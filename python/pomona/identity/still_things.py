@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.size_fates import GROWS, ODD, SLOW, STANDS, THING, Growing, fate_densities, own_numbers
+from pomona.identity.size_fates import GROWS, ODD, SLOW, STANDS, THING, Growing, fate_densities, own_growth
 
 __all__ = ["still_chances"]
 
@@ -195,7 +195,7 @@ def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
 
 def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Growing:
     seen, grows = ~np.isnan(log_sizes), of_fates[:, GROWS]
-    own = own_numbers(log_sizes, growing)
+    own = own_growth(log_sizes, growing)
     # A size that is off says nothing.
     counted = grows[:, :, None] * seen[:, None, :] * ~np.eye(seen.shape[1] + 1, seen.shape[1], -1, dtype=bool)
     n = counted.sum(axis=(0, 1))
