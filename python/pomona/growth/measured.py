@@ -15,7 +15,7 @@ from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import BearingTrees, bearing_trees
 from pomona.growth.whole_fruits import whole_fruits
 from pomona.orchard import Observations, OrchardMap
-from pomona.orchard.hanging import hang_chances, may_hang
+from pomona.orchard.hanging import are_things, fruit_chances, hang_chances, may_hang
 
 __all__ = ["SEASON_DAYS", "MeasuredFruits", "measured_fruits", "require_one_season", "require_two_days"]
 
@@ -80,8 +80,13 @@ class MeasuredFruits:
     @property
     def hanging(self) -> NDArray[np.bool_]:
         """Which fruits hang for all that the map knows, (N,); all, once none does: the season is looked back at."""
-        hanging = may_hang(self.cloud)
+        hanging = may_hang(self.cloud) & ~are_things(self.cloud)
         return hanging if hanging.any() else np.ones(len(self.ids), dtype=bool)
+
+    @property
+    def fruit_chances(self) -> NDArray[np.float64]:
+        """Probability of each that it is a fruit, (N,)."""
+        return fruit_chances(self.cloud)
 
     @property
     def hang_chances(self) -> NDArray[np.float64]:

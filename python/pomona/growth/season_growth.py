@@ -129,7 +129,7 @@ def growth_of(
     day, limits = harvest_after(fruits.days[-1], harvest), rising_limits(limits_mm)
     order, trees = reckoned_order(fruits)
     rows, sizes_mm, moments = np.argsort(order), fruits.diameters_mm[order], fruits.moments
-    trust = trust_in_sizes(SizeTable.of(sizes_mm, trees, CALENDAR.times(moments)))
+    trust = trust_in_sizes(SizeTable.of(sizes_mm, trees, CALENDAR.times(moments)), fruits.fruit_chances[order])
     curves = weighed_curves(sizes_mm, trees, trust.in_curve, moments, clocks)
     aside = trust.put_aside
     odd = aside.any(axis=1) | odd_fruits(curves[0].table, curves[0].fitted)

@@ -63,16 +63,20 @@ class Trust:
         Probability that the fruit stopped growing after so many visits; the last is that it still grows.
     in_size : (N, S + 1, S) float64
         Probability that a size is its fruit's own, where that stopped so; 1 where there is none.
+    are_fruits : (N,) float64
+        Probability that it is a fruit at all, and no thing that stays as it is.
     """
 
     stops: Numbers
     in_size: Numbers
+    are_fruits: Numbers
 
     @property
     def in_curve(self) -> Numbers:
         """Probability of each size to be its fruit's own, and on the row's curve, (N, S)."""
         grew = np.arange(self.stops.shape[1])[:, None] > np.arange(self.in_size.shape[2])
-        return np.asarray(np.einsum("nz,zs,nzs->ns", self.stops, grew.astype(np.float64), self.in_size))
+        own = np.einsum("nz,zs,nzs->ns", self.stops, grew.astype(np.float64), self.in_size)
+        return np.asarray(own * self.are_fruits[:, None])
 
     @property
     def stopped(self) -> Numbers:
@@ -86,28 +90,32 @@ class Trust:
         return np.asarray((off.sum(axis=1, keepdims=True) > 0.5) & (off == off.max(axis=1, keepdims=True)))
 
 
-def trust_in_sizes(table: SizeTable) -> Trust:
+def trust_in_sizes(table: SizeTable, are_fruits: Numbers | None = None) -> Trust:
     """Return how far sizes and fruits are trusted.
 
     Parameters
     ----------
     table : SizeTable
         Its own trust is not asked.
+    are_fruits : (N,) float64, optional
+        Probability of each that it is a fruit at all; for sure where that is not said.
     """
-    shows_growth = table.seen.sum(axis=1) > 1
-    in_curve, start, share = np.ones(table.logs.shape), None, _STOPPED / _LOOKED_AT
+    are_fruits = np.ones(len(table.logs)) if are_fruits is None else are_fruits
+    shows_growth = are_fruits * (table.seen.sum(axis=1) > 1)
+    start, share = None, _STOPPED / _LOOKED_AT
+    in_curve = np.where(table.seen, are_fruits[:, None], 1.0)
     for _ in range(_ROUNDS):
         before, table = in_curve, table.trusted(in_curve)
         shape, start = likeliest_shape(table, FAMILIES["expolinear"], start)
-        trust = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), share)
-        share = float((trust.stopped[shows_growth].sum() + _STOPPED) / (shows_growth.sum() + _LOOKED_AT))
+        trust = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), share, are_fruits)
+        share = float((shows_growth @ trust.stopped + _STOPPED) / (shows_growth.sum() + _LOOKED_AT))
         in_curve = np.where(table.seen, trust.in_curve, 1.0)
         if np.abs(in_curve - before).max() < _CLOSE:
             break
     return trust
 
 
-def _judged(model: Hierarchy, share: float) -> Trust:
+def _judged(model: Hierarchy, share: float, are_fruits: Numbers) -> Trust:
     """Judge fruits and sizes by a model, where such a share of all fruits has stopped."""
     n, n_visits = model.table.logs.shape
     effects = model.expected()
@@ -120,7 +128,7 @@ def _judged(model: Hierarchy, share: float) -> Trust:
     together = np.stack(log_odds, axis=1)
     of_stops = logsumexp(together, axis=2)
     stops = np.exp(of_stops - logsumexp(of_stops, axis=1, keepdims=True))
-    return Trust(stops, -np.expm1(together[:, :, 1:] - of_stops[:, :, None]))
+    return Trust(stops, -np.expm1(together[:, :, 1:] - of_stops[:, :, None]), are_fruits)
 
 
 def _log_priors(times: Numbers, share: float) -> Numbers:

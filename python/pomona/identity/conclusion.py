@@ -14,6 +14,7 @@ from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, looks_of
+from pomona.identity.still_things import still_chances
 from pomona.identity.stretches import LIKELY
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
 
@@ -84,6 +85,7 @@ def conclude(
     # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
     # says how much leaves hide, or how many go elsewhere.
     lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)
+    lives = lives.with_still(still_chances(_log_sizes(sights, labels, frames), sights.days, 1.0 - lives.gone))
     looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
     states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(
@@ -98,6 +100,13 @@ def conclude(
         states=states,
         state_probabilities=state_probabilities,
     )
+
+
+def _log_sizes(sights: Sights, labels: NDArray[np.int64], frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the logarithms of the diameters of each fruit, (K, V), in the unit of the map; NaN where unknown."""
+    log_sizes = np.full((labels.max(initial=-1) + 1, len(frames)), np.nan)
+    log_sizes[labels, sights.visits] = np.where(np.isfinite(sights.log_sizes), sights.log_sizes, np.nan)
+    return np.asarray(log_sizes + np.log(np.linalg.det(frames[:, :3, :3])) / 3.0)
 
 
 def _sights_before(labels: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -54,7 +54,7 @@ class Lives:
     gone : (K,) float64
         Probability that it no longer hangs on the day of the newest visit, if it is a fruit.
     false : (K,) float64
-        Probability that it never was a fruit; zero when two visits saw it.
+        Probability that it never was a fruit; when two visits saw it, that it is a thing that stays as it is.
     """
 
     gone: NDArray[np.float64]
@@ -63,6 +63,10 @@ class Lives:
     def with_emptied(self, emptied: NDArray[np.float64]) -> Lives:
         """Return it with what hung where stretches may have been emptied, (K, V) as `Looks.emptied`, gone as surely."""
         return Lives(np.maximum(self.gone, emptied.max(axis=1, initial=0.0)), self.false)
+
+    def with_still(self, still: NDArray[np.float64]) -> Lives:
+        """Return it with what may be things that stay as they are, (K,) probabilities as `still_chances`."""
+        return Lives(self.gone, 1.0 - (1.0 - self.false) * (1.0 - still))
 
 
 def lives_of(histories: Histories) -> Lives:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
 
-__all__ = ["LIKELY", "hang_chances", "may_hang", "tell_trees"]
+__all__ = ["LIKELY", "are_things", "fruit_chances", "hang_chances", "may_hang", "tell_trees"]
 
 LIKELY = 0.5
 """Probability of being a fruit above which one that was missed is one."""
@@ -27,6 +27,23 @@ def may_hang(fruits: FruitCloud) -> NDArray[np.bool_]:
     states, chances = (fruits.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
     judged = zip(states, chances, strict=True)
     return np.array([state != "gone" and (state != "missed" or float(p or 1) > LIKELY) for state, p in judged], bool)
+
+
+def are_things(fruits: FruitCloud) -> NDArray[np.bool_]:
+    """Tell what several visits saw and is likelier no fruit, (N,): a thing that stays as it is.
+
+    Parameters
+    ----------
+    fruits : FruitCloud
+        Of a map, with the columns ``n_sessions`` and ``fruit_probability``; what they do not say speaks for a fruit.
+    """
+    counts = np.array([int(one or 1) for one in fruits.extras.get("n_sessions", ("",) * len(fruits))], np.int64)
+    return np.asarray((counts > 1) & (fruit_chances(fruits) <= LIKELY))
+
+
+def fruit_chances(fruits: FruitCloud) -> NDArray[np.float64]:
+    """Probability of each point of a map, (N,), that it is a fruit; 1 where ``fruit_probability`` does not say."""
+    return np.array([float(one or 1) for one in fruits.extras.get("fruit_probability", ("",) * len(fruits))], float)
 
 
 def hang_chances(fruits: FruitCloud) -> NDArray[np.float64]:
