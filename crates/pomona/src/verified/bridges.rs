@@ -13,15 +13,12 @@ use super::growth::{CONVINCING, Growth};
 use super::hypothesis::{Hypothesis, Model, refined};
 use super::patches::Patchwork;
 use super::search::REACH;
+use super::translations::{WIDTH, most_common};
 use crate::geometry::{Scale, Similarity};
 use crate::moments::Moments;
-use crate::neighbours::cells::{CellMap, cell_of};
 use crate::neighbours::tree::{Tree, single};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-
-/// Edge of a cell of offsets in standard deviations of the noise: what a refinement reaches.
-const WIDTH: f64 = 4.0;
 
 /// Offsets that are refined beside none.
 const BEST: usize = 4;
@@ -146,12 +143,9 @@ impl Growth<'_> {
         let mut starts = vec![(start, place)];
         let mut least = CONVINCING;
         if bent > 0.5 * width {
-            let points: Vec<_> =
-                query.within(&place, reach).into_iter().map(|row| query.points[row as usize]).collect();
-            let offsets = votes(&points, &start, |at| map.within(at, bent), &map.points, width);
-            starts.extend(
-                offsets.into_iter().map(|by| (Similarity { translation: start.translation + by, ..start }, place)),
-            );
+            let fruits = query.within(&place, reach).into_iter().map(|row| start.image(&query.points[row as usize]));
+            let offsets = most_common(fruits, map, bent, width).take(BEST);
+            starts.extend(offsets.map(|by| (Similarity { translation: start.translation + by, ..start }, place)));
             least = reached(1.0, (2.0 * bent / width).powi(3), 1.0);
         }
         let model = Model { sigma: *sigma, ..*model };
@@ -179,28 +173,6 @@ impl Patchwork<'_> {
         let near = Moments::total(reached.map(|cell| (&cell.moments, weight(cell))));
         (near.weight > 0.0).then(|| near.step(&self.pose, Scale::Metric, self.cut.edge * self.cut.edge))?
     }
-}
-
-/// The offsets that most fruits have to those of the map around where `start` puts them.
-fn votes(
-    points: &[Vector3<f64>],
-    start: &Similarity,
-    around: impl Fn(&Vector3<f64>) -> Vec<u32>,
-    map: &[Vector3<f64>],
-    width: f64,
-) -> Vec<Vector3<f64>> {
-    let mut cells: CellMap<(f64, Vector3<f64>)> = CellMap::default();
-    for p in points {
-        let at = start.image(p);
-        for row in around(&at) {
-            let offset = map[row as usize] - at;
-            let cell = cells.entry(cell_of(&offset, 1.0 / width)).or_default();
-            *cell = (cell.0 + 1.0, cell.1 + offset);
-        }
-    }
-    let mut votes: Vec<_> = cells.into_iter().collect();
-    votes.sort_by(|(a, (one, _)), (b, (other, _))| other.total_cmp(one).then(a.cmp(b)));
-    votes.into_iter().take(BEST).map(|(_, (count, sum))| sum / count).collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
 use super::acceptance::PATTERN;
-use super::case::{Finding, Findings, Log, Search};
+use super::case::{Finding, Findings, Search};
 use super::decision::SURE;
 use super::doubts::Rated;
 use super::overlap::Overlap;
@@ -13,22 +13,38 @@ use crate::geometry::Similarity;
 impl<'a> Search<'a> {
     /// The answer to what was found.
     pub(super) fn answer_of(&self, mut findings: Findings<'a>) -> Match {
+        let needed = findings.log.threshold.max(self.threshold(findings.log.effort.stands.share_left()));
+        let clear = SURE * needed;
+        self.drop_patterns(&mut findings.accepted, clear);
         self.join(&mut findings.accepted);
         let mut stages = self.stages(&findings);
-        if let Some(doubt) = findings.accepted.first().and_then(|best| self.doubt_of(best, &findings.log)) {
+        if let Some(doubt) = self.doubt_of(&findings, clear) {
             stages.push((doubt, 1.0));
             findings.accepted.clear();
         }
         self.answer(findings, stages)
     }
 
-    /// What rules the best finding out, by the name of its stage.
-    fn doubt_of(&self, best: &Finding, log: &Log) -> Option<&'static str> {
-        let needed = log.threshold.max(self.threshold(log.effort.stands.share_left()));
-        if best.fits_moved(SURE * needed) {
+    /// What rules the best finding out where it has less evidence than is `clear`, by the name of its stage.
+    fn doubt_of(&self, Findings { accepted, log, .. }: &Findings, clear: f64) -> Option<&'static str> {
+        let (best, others) = accepted.split_first()?;
+        if self.is_pattern(best, others, clear) {
             return Some("moved");
         }
         self.fits_better_mirrored(best, log).then_some("mirrored")
+    }
+
+    /// Drops findings behind the best that fit moved: what a planting repeats is no part of an answer, and no rival.
+    fn drop_patterns(&self, accepted: &mut Vec<Finding>, clear: f64) {
+        let keeps = |at: usize| at == 0 || !self.is_pattern(&accepted[at], accepted, clear);
+        let mut kept: Vec<bool> = (0..accepted.len()).map(keeps).collect();
+        kept.reverse();
+        accepted.retain(|_| kept.pop().unwrap_or(true));
+    }
+
+    /// Whether a finding with less evidence than is `clear` fits moved, elsewhere than where others lie.
+    fn is_pattern(&self, finding: &Finding, others: &[Finding], clear: f64) -> bool {
+        finding.fits_moved(clear, |moved| others.iter().any(|other| self.lays(&other.overlap, moved)))
     }
 
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.

@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
 
     /// Whether an optimum that was not accepted shows that wrong poses reach nearly as much on this planting, wherever it lies.
     pub(super) fn outdoes(&self, best: Rated, other: Rated, pattern: f64) -> bool {
-        self.rivals(best, other, self.unexplained(best.overlap, other.overlap), pattern)
+        self.rivals(best, other, self.unexplained(best.overlap, &other.overlap.predictions), pattern)
     }
 
     /// Whether both cannot be true: a row that is torn apart has a pose before and one behind, and neither doubts the other.
@@ -179,16 +179,21 @@ impl<'a> Search<'a> {
 
     /// Whether one puts most of the fruits of another optimum's overlap where that puts them.
     pub(super) fn shows(&self, one: &Overlap, other: &Overlap) -> bool {
-        !is_most(self.unexplained(one, other))
+        self.lays(one, &other.predictions)
     }
 
-    /// Share of the fruits of another optimum's overlap that the best does not put where that puts them.
-    fn unexplained(&self, best: &Overlap, other: &Overlap) -> f64 {
+    /// Whether it puts most of the fruits where these are.
+    pub(super) fn lays(&self, one: &Overlap, places: &[Option<Landing>]) -> bool {
+        !is_most(self.unexplained(one, places))
+    }
+
+    /// Share of the fruits at these places that the best does not put there.
+    fn unexplained(&self, best: &Overlap, places: &[Option<Landing>]) -> f64 {
         let apart = |(best, other): (&Option<Landing>, &Option<Landing>)| {
             let there = other.as_ref()?.place;
             Some(best.is_none_or(|at| (at.place - there).norm() > 0.5 * self.map.spacing))
         };
-        share(best.predictions.iter().zip(&other.predictions).filter_map(apart))
+        share(best.predictions.iter().zip(places).filter_map(apart))
     }
 }
 

@@ -60,6 +60,7 @@ mod sight;
 mod size;
 mod soft;
 mod support;
+mod translations;
 mod vertical;
 mod votes;
 
