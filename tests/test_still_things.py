@@ -64,8 +64,31 @@ def drawn(
     return sizes, np.arange(len(sizes)) >= n_fruits
 
 
+def along_a_row(count: int) -> Numbers:
+    """Places anywhere in a row of 20 m."""
+    return np.random.default_rng(0).uniform(size=(count, 3)) * [20.0, 1.0, 2.0]
+
+
 def chances(sizes: Numbers, days: Numbers) -> Numbers:
-    return still_chances(sizes, days, np.ones(len(sizes)))
+    return still_chances(sizes, days, np.ones(len(sizes)), along_a_row(len(sizes)))
+
+
+@pytest.mark.parametrize("share", [0.12, 0.3, 0.5])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_trees_of_another_sort_are_no_things(share: float, seed: int) -> None:
+    """Of one size from the first visit on, half as large as the others will be or as large; and a few things."""
+    rng = np.random.default_rng(seed)
+    days = np.array([0.0, 20.0, 45.0, 70.0, 100.0])
+    sizes, is_thing = drawn(rng, days, 0.03)
+    places = along_a_row(len(sizes))
+    of_another = (places[:, 0] < 20.0 * share) & ~is_thing
+    ripe = np.log(0.02) + 0.6 * seed / 1.5 + 0.1 * rng.normal(size=(len(sizes), 1))
+    sizes[of_another] = np.where(np.isnan(sizes), np.nan, ripe + 0.05 * rng.normal(size=sizes.shape))[of_another]
+    found = still_chances(sizes, days, np.ones(len(sizes)), places)
+    elsewhere = is_thing & (places[:, 0] > 20.0 * share + 1.5)
+    assert (found[of_another] > 0.5).mean() < 0.02
+    assert (found[~is_thing & ~of_another] > 0.5).mean() < 0.02
+    assert (found[elsewhere] > 0.5).mean() > 0.8
 
 
 def days_of(n_visits: int, span: float = 100.0) -> Numbers:
@@ -155,7 +178,7 @@ def test_what_visits_say_is_gone_is_no_thing() -> None:
     hanging = np.ones(len(sizes))
     gone = np.flatnonzero(are_things)[:10]
     hanging[gone] = 1e-3
-    found = still_chances(sizes, days, hanging)
+    found = still_chances(sizes, days, hanging, along_a_row(len(sizes)))
     assert (found[gone] < chances(sizes, days)[gone] + 1e-12).all()
     assert found[gone].mean() < 0.9 < found[np.flatnonzero(are_things)[10:]].mean()
 

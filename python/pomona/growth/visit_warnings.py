@@ -16,6 +16,9 @@ _SHRUNK, _LEAST = 0.9, 10
 """Size of a fruit, in the middle of so many, against the visit before, from which on it is told: scales of visits err
 by 2 %, and fruits lose less than that on a dry day."""
 
+_OFF_CURVE = 0.3
+"""Logarithm of the scale of a visit from which on it is the curve that is wrong: no camera is off by a third."""
+
 
 def of_visits(growth: SeasonGrowth) -> list[str]:
     """Say in a line each what is wrong with visits."""
@@ -27,7 +30,20 @@ def of_visits(growth: SeasonGrowth) -> list[str]:
         "camera, its date?"
         for odd in growth.odd_visits
     ]
-    return [*of_late_visits(fruits, "growth is told"), *off, *_of_shrunk(fruits, likely)]
+    return [*of_late_visits(fruits, "growth is told"), *(off or _of_curve(growth)), *_of_shrunk(fruits, likely)]
+
+
+def _of_curve(growth: SeasonGrowth) -> list[str]:
+    """Say that the sizes of a visit lie far from the curves, if so: that of the whole row suits none of its parts."""
+    beside = np.log(growth.foretold.scales)
+    farthest = int(np.abs(beside).argmax())
+    if abs(beside[farthest]) < _OFF_CURVE:
+        return []
+    day, percent = called(growth.fruits, farthest), 100 * np.expm1(beside[farthest])
+    return [
+        f"sizes of {day} lie {percent:+.0f} % beside the curves, more than a camera errs: sizes and rates are not to "
+        "be trusted; has part of the row stopped growing, or is it of another sort?"
+    ]
 
 
 def of_late_visits(fruits: MeasuredFruits, told: str) -> list[str]:

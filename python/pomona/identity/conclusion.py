@@ -85,7 +85,9 @@ def conclude(
     # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
     # says how much leaves hide, or how many go elsewhere.
     lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)
-    lives = lives.with_still(still_chances(_log_sizes(sights, labels, frames), sights.days, 1.0 - lives.gone))
+    places = _middles(labels, positions)
+    still = still_chances(_log_sizes(sights, labels, frames), sights.days, 1.0 - lives.gone, places)
+    lives = lives.with_still(still)
     looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
     states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(
@@ -107,6 +109,13 @@ def _log_sizes(sights: Sights, labels: NDArray[np.int64], frames: NDArray[np.flo
     log_sizes = np.full((labels.max(initial=-1) + 1, len(frames)), np.nan)
     log_sizes[labels, sights.visits] = np.where(np.isfinite(sights.log_sizes), sights.log_sizes, np.nan)
     return np.asarray(log_sizes + np.log(np.linalg.det(frames[:, :3, :3])) / 3.0)
+
+
+def _middles(labels: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the middle of the sights of each fruit, (K, 3)."""
+    sums = np.zeros((labels.max(initial=-1) + 1, 3))
+    np.add.at(sums, labels, positions)
+    return np.asarray(sums / np.bincount(labels, minlength=len(sums))[:, None])
 
 
 def _sights_before(labels: NDArray[np.int64]) -> NDArray[np.int64]:

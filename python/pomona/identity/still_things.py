@@ -58,6 +58,16 @@ AT_ONCE = 500
 ROUNDS, CLOSE = 40, 0.5
 """Of expectation-maximisation at most, and nats that the last of them gained."""
 
+AROUND = 24
+"""Tracks next to one that say whether it hangs among fruits that grow."""
+
+OF_ANOTHER_SORT, OTHERS, MOST_THINGS = 0.05, 0.9, 0.5
+"""Share of places where fruits of another sort hang, which are ripe while these grow; of what hangs there, those that
+do not grow; and of what hangs among fruits, the things at most: no tree bears nothing but knots and clips."""
+
+PLACE_ROUNDS = 10
+"""Of expectation-maximisation of the share of things."""
+
 LEAST_HANGING = 1e-6
 """Chance that a track still hangs, where nothing of it was seen for long."""
 
@@ -97,7 +107,7 @@ class _Season:
     shares: Numbers
 
 
-def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Numbers:
+def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers, places: Numbers) -> Numbers:
     """Return the probability of each track, (K,), that it is a thing that stays; 0 where sizes do not tell.
 
     Parameters
@@ -108,6 +118,8 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
         Of the visits.
     hanging : (K,) float64
         Probability that it still hangs, by what visits missed: things do not go.
+    places : (K, 3) float64
+        Of the tracks in one frame: where nothing grows it is fruits of another sort that do not.
     """
     chances = np.zeros(len(log_sizes))
     measured = ~np.isnan(log_sizes).all(axis=0)
@@ -125,7 +137,28 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> Number
         for start in range(0, len(told), AT_ONCE):
             part = np.arange(start, min(start + AT_ONCE, len(told)))
             chances[told[part]] = _weighed(tracks.chosen(part), with_things)[0][:, THING].sum(axis=1)
+        chances[told] *= _are_among_fruits(chances[told], places[told])
     return chances
+
+
+def _are_among_fruits(chances: Numbers, places: Numbers) -> Numbers:
+    """Return the probability that things as likely as these are among fruits and no fruits of another sort, (N,)."""
+    from scipy.spatial import cKDTree
+
+    n = min(AROUND, len(places) - 1)
+    near = np.asarray(cKDTree(places).query(places, k=1 + n)[1])
+    still = chances[near[:, 1:]].sum(axis=1)
+
+    def log_chance(share: float) -> Numbers:
+        return np.asarray(still * np.log(share) + (n - still) * np.log1p(-share))
+
+    are_among = np.ones(len(places))
+    for _ in range(PLACE_ROUNDS):
+        # Where nothing grows says nothing of the share of things among fruits.
+        things = np.clip(are_among @ chances / max(are_among.sum(), 1.0), 1.0 / n, MOST_THINGS)
+        odds = np.log(OF_ANOTHER_SORT / (1.0 - OF_ANOTHER_SORT)) + log_chance(OTHERS) - log_chance(things)
+        are_among = 1.0 / (1.0 + np.exp(np.minimum(odds, 700.0)))
+    return np.asarray(are_among)
 
 
 def _told_tracks(log_sizes: Numbers, days: Numbers, hanging: Numbers) -> tuple[NDArray[np.int64], _Tracks]:
