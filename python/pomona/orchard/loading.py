@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from pomona.cloud import FruitCloud, Unit
 from pomona.cloud.files import check_places, doubt_of_diameters
 from pomona.cloud.near_names import DIAMETER, near_names
@@ -22,6 +24,12 @@ from pomona.reading import shown
 from pomona.store.values import iso_date
 
 __all__ = ["load_session"]
+
+FEWEST_REPEATED, REPEATED = 5, 0.03
+"""Fruits, and their share of all, that have one diameter which is no measurement."""
+
+ALONE = 1.2
+"""Fruits to a diameter, in the mean, where sizes are not rounded: of rounded ones many are alike."""
 
 
 def load_session(path: str | Path, *, date: str | datetime.date | None = None, unit: Unit | None = None) -> Session:
@@ -46,7 +54,8 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
     Warns
     -----
     PomonaWarning
-        When a column of a cloud is kept as text whose name nearly is one that counts, as `diameter_mm`.
+        When a column of a cloud is kept as text whose name nearly is one that counts, as `diameter_mm`; and when many
+        fruits have one diameter, to the last digit, and the others each its own: that of fruits nobody measured.
     """
     path = given_path(path)
     day = None if date is None else iso_date(date, f"{path}: date")
@@ -59,6 +68,7 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
             _check_diameters(path, session.cloud)
     if path.suffix.lower() != ".gpkg":
         _tell_near_names(path, session.cloud)
+    _tell_repeated_diameter(path, session.cloud)
     return session
 
 
@@ -97,6 +107,20 @@ def _tell_near_names(path: Path, cloud: FruitCloud) -> None:
         metres = ", in metres," if known == DIAMETER else ""
         found = f"found the column {shown(name)}, which is kept as text"
         warnings.warn(f"{path}: {found}; expected {known}{metres} for it to count", PomonaWarning, stacklevel=3)
+
+
+def _tell_repeated_diameter(path: Path, cloud: FruitCloud) -> None:
+    """Warn where a detector gives one size to what it could not measure: it would be a thing that does not grow."""
+    known_m = np.empty(0) if cloud.diameters_m is None else cloud.diameters_m[~np.isnan(cloud.diameters_m)]
+    values_m, counts = np.unique(known_m, return_counts=True)
+    if len(values_m) < 2:
+        return
+    most = int(counts.argmax())
+    if counts[most] < max(FEWEST_REPEATED, REPEATED * len(known_m)) or np.delete(counts, most).mean() > ALONE:
+        return
+    found = f"{counts[most]} of {len(known_m)} diameters are {values_m[most]:.6g} m exactly, and the others differ"
+    expected = "expected none where nobody measured, for what does not grow is taken for no fruit"
+    warnings.warn(f"{path}: {found}; {expected}", PomonaWarning, stacklevel=3)
 
 
 @contextmanager
