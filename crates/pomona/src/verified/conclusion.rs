@@ -9,6 +9,15 @@ use super::settlement::Settled;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
+use nalgebra::Vector3;
+
+/// What speaks against the best finding.
+enum Doubt {
+    /// It is ruled out, by the name of the stage.
+    Ruled(&'static str),
+    /// So far moved, and there alone, it has nearly as much evidence, nats: trees that look the same.
+    Elsewhere(Vector3<f64>, f64),
+}
 
 impl<'a> Search<'a> {
     /// The answer to what was found.
@@ -18,39 +27,51 @@ impl<'a> Search<'a> {
         self.drop_patterns(&mut findings.accepted, clear);
         self.join(&mut findings.accepted);
         let mut stages = self.stages(&findings);
-        if let Some(doubt) = self.doubt_of(&findings, clear) {
-            stages.push((doubt, 1.0));
-            findings.accepted.clear();
+        let mut elsewhere = None;
+        match self.doubt_of(&findings, clear) {
+            Some(Doubt::Ruled(stage)) => {
+                stages.push((stage, 1.0));
+                findings.accepted.clear();
+            }
+            Some(Doubt::Elsewhere(by, nats)) => elsewhere = Some((by, nats)),
+            None => {}
         }
-        self.answer(findings, stages)
+        self.answer(findings, stages, elsewhere)
     }
 
-    /// What rules the best finding out where it has less evidence than is `clear`, by the name of its stage.
-    fn doubt_of(&self, Findings { accepted, log, .. }: &Findings, clear: f64) -> Option<&'static str> {
+    /// What speaks against the best finding where it has less evidence than is `clear`.
+    fn doubt_of(&self, Findings { accepted, log, .. }: &Findings, clear: f64) -> Option<Doubt> {
         let (best, others) = accepted.split_first()?;
-        if self.is_pattern(best, others, clear) {
-            return Some("moved");
+        match self.moved(best, others, clear)[..] {
+            [] => self.fits_better_mirrored(best, log).then_some(Doubt::Ruled("mirrored")),
+            [(by, nats)] => Some(Doubt::Elsewhere(by, nats)),
+            _ => Some(Doubt::Ruled("moved")),
         }
-        self.fits_better_mirrored(best, log).then_some("mirrored")
     }
 
     /// Drops findings behind the best that fit moved: what a planting repeats is no part of an answer, and no rival.
     fn drop_patterns(&self, accepted: &mut Vec<Finding>, clear: f64) {
-        let keeps = |at: usize| at == 0 || !self.is_pattern(&accepted[at], accepted, clear);
+        let keeps = |at: usize| at == 0 || self.moved(&accepted[at], accepted, clear).is_empty();
         let mut kept: Vec<bool> = (0..accepted.len()).map(keeps).collect();
         kept.reverse();
         accepted.retain(|_| kept.pop().unwrap_or(true));
     }
 
-    /// Whether a finding with less evidence than is `clear` fits moved, elsewhere than where others lie.
-    fn is_pattern(&self, finding: &Finding, others: &[Finding], clear: f64) -> bool {
+    /// Where a finding with less evidence than is `clear` fits moved, elsewhere than where others lie; see [`Finding::fits_moved`].
+    fn moved(&self, finding: &Finding, others: &[Finding], clear: f64) -> Vec<(Vector3<f64>, f64)> {
         finding.fits_moved(clear, |moved| others.iter().any(|other| self.lays(&other.overlap, moved)))
     }
 
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
-    /// The other optima of the same search show what wrong poses reach on this very planting.
-    pub(super) fn answer(&self, findings: Findings, mut stages: Vec<(&'static str, f64)>) -> Match {
+    /// The other optima of the same search show what wrong poses reach on this very planting. `elsewhere` is how the best is moved to
+    /// another pose, and what evidence that has, nats.
+    pub(super) fn answer(
+        &self,
+        findings: Findings,
+        mut stages: Vec<(&'static str, f64)>,
+        elsewhere: Option<(Vector3<f64>, f64)>,
+    ) -> Match {
         let Findings { accepted, others, log } = findings;
         let pattern = self.reached(PATTERN, log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
@@ -70,6 +91,10 @@ impl<'a> Search<'a> {
         let rivals: Vec<Registration> = accepted
             .filter(|other| is_new(other) && self.excludes(best, other.rated(), pattern))
             .map(|finding| self.registration(&finding.overlap))
+            .chain(elsewhere.map(|(by, log_odds)| {
+                let pose = Similarity { translation: overlap.pose.translation + by, ..overlap.pose };
+                self.registration(&Overlap { pose, log_odds, ..overlap.clone() })
+            }))
             .collect();
         // What was measured does not tell the poses apart: the pairs are those of one of them.
         let poses = (1 + rivals.len()) as f64;

@@ -4,6 +4,7 @@
 //! as the best one, and so it does when it is moved by as much again. Where a pose is right, nothing is left of its evidence there.
 
 use super::case::Finding;
+use super::contender::first_of_each;
 use super::doubts::is_most;
 use super::evidence::evidence_within;
 use super::layers::BEYOND_A_CLUSTER;
@@ -28,17 +29,27 @@ const ASKED: usize = 64;
 const TRIED: usize = 32;
 
 impl Finding<'_> {
-    /// Whether a settled finding with less evidence than is `clear`, nats, keeps much of it where it is moved by what lays its pairs on
-    /// other fruits of the map, and that is no other pose that is `known`.
-    pub(super) fn fits_moved(&self, clear: f64, known: impl Fn(&[Option<Landing>]) -> bool + Sync) -> bool {
-        let Some(settled) = self.settled.as_ref().filter(|_| self.overlap.log_odds < clear) else { return false };
+    /// Where a settled finding with less evidence than is `clear`, nats, keeps much of it when it is moved by what lays its pairs on other
+    /// fruits of the map, and that is no other pose that is `known`: the translations, and its evidence there, nats.
+    pub(super) fn fits_moved(
+        &self,
+        clear: f64,
+        known: impl Fn(&[Option<Landing>]) -> bool + Sync,
+    ) -> Vec<(Vector3<f64>, f64)> {
+        let unsure = self.settled.as_ref().filter(|_| self.overlap.log_odds < clear);
+        let Some(settled) = unsure else { return Vec::new() };
         let map = self.growth.patches.map;
         let believed = settled.beliefs.links().filter(|(_, probability)| *probability > 0.5);
         let pairs: Vec<Vector3<f64>> = believed.map(|(edge, _)| map.points[edge.map as usize]).collect();
         let Overlap { pose, sigma, predictions, .. } = settled.overlap.clone();
         let direction = settled.direction.clone();
         let laid = Patchwork { pose, sigma, direction, predictions, ..self.growth.patches.clone() };
-        keeps_moved(&laid, &ways(&laid, &pairs), PATTERN_SHARE * settled.evidence, known)
+        let kept = kept_moved(&laid, &ways(&laid, &pairs), PATTERN_SHARE * settled.evidence, known);
+        // Two cells of translations may share one.
+        let same = |one: &(Vector3<f64>, f64), other: &(Vector3<f64>, f64)| {
+            (one.0 - other.0).norm() < BEYOND_A_CLUSTER * map.spacing
+        };
+        first_of_each(kept.into_iter(), usize::MAX, same)
     }
 }
 
@@ -50,22 +61,23 @@ fn ways(laid: &Patchwork, pairs: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     most_common(asked, map, farthest, WIDTH * laid.sigma).filter(|by| by.norm() > least).take(TRIED).collect()
 }
 
-/// Whether a settled pose has more than so much evidence when all its predictions are moved one of these ways, as far as most of what the
-/// map has shown is still expected.
-fn keeps_moved(
+/// The ways by which all predictions of a settled pose are moved and it has more than so much evidence, with that, as far as most of what
+/// the map has shown is still expected.
+fn kept_moved(
     laid: &Patchwork,
     ways: &[Vector3<f64>],
     most: f64,
     known: impl Fn(&[Option<Landing>]) -> bool + Sync,
-) -> bool {
+) -> Vec<(Vector3<f64>, f64)> {
     let expected = due(laid);
-    let keeps = |there: &mut Patchwork, by: &Vector3<f64>| {
+    let kept = |there: &mut Patchwork, by: &Vector3<f64>| {
         there.pose.translation = laid.pose.translation + by;
         let moved = |at: &Landing| Landing { place: at.place + by, ..*at };
         there.predictions = laid.predictions.iter().map(|at| at.as_ref().map(moved)).collect();
-        is_most(due(there) / expected) && evidence_within(NEAR, there) > most && !known(&there.predictions)
+        let nats = if is_most(due(there) / expected) { evidence_within(NEAR, there) } else { f64::NEG_INFINITY };
+        (nats > most && !known(&there.predictions)).then_some((*by, nats))
     };
-    ways.par_iter().map_init(|| laid.clone(), keeps).any(|keeps| keeps)
+    ways.par_iter().map_init(|| laid.clone(), kept).flatten_iter().collect()
 }
 
 /// Fruits that the map should have shown.
@@ -93,7 +105,7 @@ mod tests {
         laid.predictions = query.points.iter().map(land).collect();
         let ways = ways(&laid, &map.points);
         assert!(!ways.is_empty());
-        keeps_moved(&laid, &ways, share * evidence_within(NEAR, &laid), |_| false)
+        !kept_moved(&laid, &ways, share * evidence_within(NEAR, &laid), |_| false).is_empty()
     }
 
     #[test]
