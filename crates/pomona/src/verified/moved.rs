@@ -25,7 +25,7 @@ const NEAR: f64 = 4.0;
 const FARTHEST: f64 = 16.0;
 
 /// Pairs that say which ways are tried, at the most; and the ways by which most of their fruits come on others that are tried.
-const ASKED: usize = 64;
+const PAIRS_ASKED: usize = 64;
 const TRIED: usize = 32;
 
 impl Finding<'_> {
@@ -57,7 +57,7 @@ impl Finding<'_> {
 fn ways(laid: &Patchwork, pairs: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let map = laid.map;
     let [least, farthest] = [BEYOND_A_CLUSTER, FARTHEST].map(|spacings| spacings * map.spacing);
-    let asked = pairs.iter().copied().step_by(pairs.len().div_ceil(ASKED).max(1));
+    let asked = pairs.iter().copied().step_by(pairs.len().div_ceil(PAIRS_ASKED).max(1));
     most_common(asked, map, farthest, WIDTH * laid.sigma).filter(|by| by.norm() > least).take(TRIED).collect()
 }
 

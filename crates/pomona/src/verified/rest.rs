@@ -11,7 +11,7 @@ use super::seeds::Seed;
 
 /// Seeds of a round that are asked, at the most: all of some four hundred fruits. What is left over of a longer row has several parts' worth
 /// of seeds, and to ask all of them costs as much as a search for a row that is not there.
-const ASKED: usize = 12_000;
+const SEEDS_ASKED: usize = 12_000;
 
 /// Nearest neighbours of a fruit that have no partner either where a further part may lie.
 const AROUND: usize = 4;
@@ -28,7 +28,7 @@ impl<'a> Search<'a> {
             let mut more = Findings::none(Effort::default(), findings.log.threshold);
             for mut seeds in self.rounds() {
                 seeds.retain(|(quad, _)| quad.iter().all(|&row| alone[row as usize]));
-                let some: Vec<Seed> = seeds.iter().copied().step_by(seeds.len().div_ceil(ASKED).max(1)).collect();
+                let some: Vec<Seed> = seeds.iter().copied().step_by(seeds.len().div_ceil(SEEDS_ASKED).max(1)).collect();
                 let (mut hypotheses, _) = self.ask(&some, &mut more.log);
                 hypotheses.retain(|seed| seed.log_odds > RIVAL_SEED * findings.log.threshold);
                 self.grow_distinct(&hypotheses, &mut more);

@@ -41,6 +41,7 @@ mod tests {
         let place = |i: usize| (step(i) + 0.01 * dice.normal()).into();
         let cloud = Landscape::new(&FruitCloud::from_positions((0..40).map(place).collect()));
         let found: Vec<Vector3<f64>> = most_common(cloud.points.iter().copied(), &cloud, 1.0, 0.08).take(9).collect();
+        assert_eq!(found.len(), 9);
         for by in found {
             let off = [by.x / 0.5, by.y, by.z / 0.6].map(|steps| (steps - steps.round()).abs());
             assert!(off.iter().all(|off| *off < 0.1), "{by}");
