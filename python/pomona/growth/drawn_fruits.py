@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from pomona.growth.chance import Chance, evenly_spread
 from pomona.growth.fitting import N_NUMBERS
 from pomona.growth.hierarchy import Effects, Hierarchy
-from pomona.growth.stopped_fruits import stopped_growth, three_numbers
+from pomona.growth.stopped_fruits import four_numbers, kept_growth, stopped_growth
 from pomona.growth.trust import Trust
 from pomona.growth.weighing import WeighedCurve
 
@@ -100,19 +100,19 @@ def drawn_fruits(
         effects = model.draw(chance)
         strayed = model.draw_stray(effects, with_next_day, chance)
         strays_by = (strayed[n_visits] - strayed[n_visits - 1]) / _A_DAY
-        sizes, onsets, stops, shares = _own_numbers(model, effects, trust, strayed[:n_visits], chance)
+        sizes, onsets, stops, shares, kept = _own_numbers(model, effects, trust, strayed[:n_visits], chance)
         # The onset moves the curve itself here, not its tangent.
         growth = model.log_size(times - onsets[:, None]) + np.delete(strayed, n_visits)
         x = shape.rate_per_day * (table.times[-1] - onsets - shape.onset_day)
         rates = per_day * (shape.rate_per_day * family.slope(x) + strays_by)
         stopped = stops < n_visits
-        growth[stopped] = stopped_growth(growth[stopped], stops[stopped], shares[stopped])
+        growth[stopped] = stopped_growth(growth[stopped], stops[stopped], shares[stopped], kept[stopped])
         # Of one camera all sizes are too large alike. The mean takes that up: its prior is wide, so nothing else moves.
         camera = CAMERA_SPREAD * chance.shared("camera")[0]
         yield DrawnFruits(
             float(weight),
             (effects.mean - camera + effects.trees[table.trees] + sizes)[:, None] + growth,
-            np.where(stopped, 0.0, rates),
+            np.where(stopped, kept_growth(rates, kept), rates),
             stopped,
             effects.visits - strayed[:n_visits],
             np.sqrt(_SHARED_DOUBT) * chance.shared("hanging")[0]
@@ -127,17 +127,18 @@ def _count(belief: float) -> int:
 
 def _own_numbers(
     model: Hierarchy, effects: Effects, trust: Trust, strayed: Numbers, chance: Chance
-) -> tuple[Numbers, Numbers, NDArray[np.int64], Numbers]:
-    """Draw sizes a, onsets o, after how many visits each stopped, and u of those that did, (N,) each.
+) -> tuple[Numbers, Numbers, NDArray[np.int64], Numbers, Numbers]:
+    """Draw sizes a, onsets o, after how many visits each stopped, and u and w of those that did, (N,) each.
 
     Of fruits that surely grow the numbers are those of the effects.
     """
     n, n_visits = model.table.logs.shape
     lots = ndtr(chance.single("stopping", n))[model.table.ranks]
     rows = np.flatnonzero(trust.stopped >= _MAY_HAVE_STOPPED)
-    sizes, onsets, shares, stops = effects.sizes.copy(), effects.onsets_days.copy(), np.zeros(n), np.full(n, n_visits)
+    sizes, onsets, stops = effects.sizes.copy(), effects.onsets_days.copy(), np.full(n, n_visits)
+    shares, kept = np.zeros((2, n))
     stops[rows] = (lots[rows, None] > trust.stops[rows].cumsum(axis=1)[:, :-1]).sum(axis=1)
-    own = three_numbers(model, effects, strayed, rows, stops[rows], trust.in_size[rows, stops[rows]])
-    noise = chance.single("own", 3 * n).reshape(3, -1)[:, model.table.ranks]
-    sizes[rows], onsets[rows], shares[rows] = own.drawn(noise[:, rows].T).T
-    return sizes, onsets, stops, shares
+    own = four_numbers(model, effects, strayed, rows, stops[rows], trust.in_size[rows, stops[rows]])
+    noise = chance.single("own", 4 * n).reshape(4, -1)[:, model.table.ranks]
+    sizes[rows], onsets[rows], shares[rows], kept[rows] = own.drawn(noise[:, rows].T).T
+    return sizes, onsets, stops, shares, kept

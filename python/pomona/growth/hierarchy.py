@@ -166,6 +166,20 @@ class Hierarchy:
         of_visits += (self._prior_mean / _SIZE_AT_ONSET_SPREAD) ** 2
         return float(-0.5 * (of_noise + of_fruits + of_trees + of_visits))
 
+    def log_prior(self, effects: Effects) -> float:
+        """Logarithm of the density of what fruits share, before any measurement: the mean, the visits, the trees."""
+        spread = self.shape.tree_spread
+        of_visits = effects.visits @ np.linalg.solve(self._shared, effects.visits)
+        of_visits += float(np.linalg.slogdet(2.0 * np.pi * self._shared)[1])
+        of_trees = ((effects.trees / spread) ** 2 + 2.0 * np.log(spread) + np.log(2.0 * np.pi)).sum()
+        of_mean = ((effects.mean - self._prior_mean) / _SIZE_AT_ONSET_SPREAD) ** 2
+        return float(-0.5 * (of_visits + of_trees + of_mean))
+
+    def log_scales(self) -> Numbers:
+        """Logarithms of what scales the density of each fruit's sizes: their noise and the spreads of its own, (N,)."""
+        of_noise = np.log(self.whole, where=self.table.seen, out=np.zeros(self.whole.shape))
+        return np.asarray(0.5 * of_noise.sum(axis=1) - np.log(self.shape.fruit_spread * self.shape.onset_spread_days))
+
     def expected(self) -> Effects:
         """Return the expectations of all effects."""
         return self._effects(self._expected, None)

@@ -4,16 +4,18 @@ Some sizes are none of their fruit: of half a fruit behind a leaf, of another fr
 have stopped growing, and hang on: their sizes are their own, but none of the row's curve any more. A verdict on each
 would let one fruit at the border move the growth of all, so each size counts by its probability.
 
-Beforehand a fruit has stopped after $z$ of the $S$ visits (see `stopped_fruits`) with the probability $\pi_z$, on each
-day as likely, and grows with $1 - \pi$. Whether it does or not, one size in a hundred is off, its logarithm by a
+Beforehand a fruit has stopped after $z$ of the $S$ visits (see `stopped_fruits`) with the share $\pi_z$ of its tree
+(see `stop_shares`). Whether it does or not, one size in a hundred is off, its logarithm by a
 Gaussian error of standard deviation $B$: of a fruit none is off, or one. With $z_s$ the surprise at a size, given the
 fruit's others, in standard deviations $\sigma_s$, the odds that this one is off against none are
 
 $$ \frac{p}{1-p} \frac{1}{\sqrt{1 + q_s}} \exp\frac{z_s^2 q_s}{2 (1 + q_s)}, \qquad q_s = (B / \sigma_s)^2 $$
 
-The shape and the share $\pi$ are fitted with the sizes so trusted, and fruits and sizes are judged by them, in turn
-until none moves (expectation-maximisation): fitted to all of them, the shape would believe the worst. The share is that
-of fruits that were measured twice or more: one size shows no growth, and is more often that of no fruit.
+The shape and the shares are fitted with the sizes so trusted, and fruits and sizes are judged by them, in turn
+until none moves (expectation-maximisation): fitted to all of them, the shape would believe the worst. It may climb the
+wrong hill. Where a tree or half a row has stopped, a curve that suits no fruit can, with onsets far apart and scales
+of visits that double, suit all somewhat, and none has stopped by it. So it is begun twice, from all fruits and from the
+quarter that grows fastest, and what ends higher is believed.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from pomona.growth.curve_families import FAMILIES
 from pomona.growth.fitting import likeliest_shape
 from pomona.growth.hierarchy import Hierarchy
 from pomona.growth.size_table import SizeTable
-from pomona.growth.stopped_fruits import three_numbers
+from pomona.growth.stop_shares import StopShares
+from pomona.growth.stopped_fruits import four_numbers
 
 __all__ = ["OFF_BY", "Trust", "trust_in_sizes"]
 
@@ -40,11 +43,12 @@ _OFF = 0.01
 OFF_BY = 0.5
 """B, the standard deviation of the logarithm of such a size: half to twice of what it should be."""
 
-_STOPPED, _LOOKED_AT = 1.0, 100.0
-"""What is known of the share of fruits that have stopped before any is measured: of a hundred one had."""
+_FASTEST, _HALF = 0.75, 0.5
+"""From which quantile of growth on fruits are trusted where it is begun from the fastest, and which share has stopped
+there: the rest."""
 
-_BEFORE_DAYS = 10.0
-"""From which day before the first visit on a fruit may have stopped: the onset of growth."""
+_BETTER = 3.0
+"""By how much more, a logarithm, the second way must explain: what is no better is the same place, or as good a one."""
 
 _LEAST_PRECISION = 1e-9
 """Of a logarithm that is foretold: of a size that is all but unknown, where rounding leaves less than nothing."""
@@ -101,41 +105,63 @@ def trust_in_sizes(table: SizeTable, are_fruits: Numbers | None = None) -> Trust
         Probability of each that it is a fruit at all; for sure where that is not said.
     """
     are_fruits = np.ones(len(table.logs)) if are_fruits is None else are_fruits
-    shows_growth = are_fruits * (table.seen.sum(axis=1) > 1)
-    start, share = None, _STOPPED / _LOOKED_AT
-    in_curve = np.where(table.seen, are_fruits[:, None], 1.0)
+    found, reached = _climbed_from(table, are_fruits, table.seen, StopShares.before(table))
+    fastest = _fastest(table)
+    if fastest.any():
+        other, higher = _climbed_from(table, are_fruits, fastest[:, None] & table.seen, StopShares.before(table, _HALF))
+        found = other if higher > reached + _BETTER else found
+    return found
+
+
+def _fastest(table: SizeTable) -> NDArray[np.bool_]:
+    """Which fruits grow fastest against the middle of all, (N,), of those that were measured twice."""
+    twice = np.flatnonzero(table.seen.sum(axis=1) > 1)
+    fastest = np.zeros(len(table.logs), dtype=bool)
+    if len(twice):
+        beside = (table.logs - np.nanmedian(table.logs, axis=0))[twice]
+        rows, seen = np.arange(len(twice)), table.seen[twice]
+        last = seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1)
+        growth = beside[rows, last] - beside[rows, seen.argmax(axis=1)]
+        fastest[twice] = growth >= np.quantile(growth, _FASTEST)
+    return fastest
+
+
+def _climbed_from(
+    table: SizeTable, are_fruits: Numbers, trusted: NDArray[np.bool_], shares: StopShares
+) -> tuple[Trust, float]:
+    """Fit and judge in turn, from sizes that are trusted, (N, S), and shares; also how well it explains all sizes."""
+    start, in_curve = None, np.where(table.seen, trusted * are_fruits[:, None], 1.0)
     for _ in range(_ROUNDS):
         before, table = in_curve, table.trusted(in_curve)
         shape, start = likeliest_shape(table, FAMILIES["expolinear"], start)
-        trust = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), share, are_fruits)
-        share = float((shows_growth @ trust.stopped + _STOPPED) / (shows_growth.sum() + _LOOKED_AT))
+        trust, explained = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), shares, are_fruits)
+        explained += shares.log_prior() - 0.5 * float(start @ start)
+        shares = StopShares.learned(table, trust.stops, are_fruits)
         in_curve = np.where(table.seen, trust.in_curve, 1.0)
         if np.abs(in_curve - before).max() < _CLOSE:
             break
-    return trust
+    return trust, explained
 
 
-def _judged(model: Hierarchy, share: float, are_fruits: Numbers) -> Trust:
-    """Judge fruits and sizes by a model, where such a share of all fruits has stopped."""
-    n, n_visits = model.table.logs.shape
-    effects = model.expected()
+def _judged(model: Hierarchy, shares: StopShares, are_fruits: Numbers) -> tuple[Trust, float]:
+    """Judge fruits and sizes by a model; also the logarithm of the density of all, what fruits share at its best."""
+    table, effects = model.table, model.expected()
+    n, n_visits = table.logs.shape
     strayed, rows, whole = model.expected_stray(effects), np.arange(n), np.ones((n, n_visits))
+    with np.errstate(divide="ignore"):  # no fruit stops between two visits of one moment
+        log_priors = np.log(shares.trees)[table.trees]
     log_odds = []
-    for stop, prior in enumerate(_log_priors(model.table.times, share).tolist()):
-        own = three_numbers(model, effects, strayed, rows, np.full(n, stop), whole)
-        off = np.where(model.table.seen, _log_odds_off(own.said, own.precisions), -np.inf)
-        log_odds.append((prior + own.log_densities)[:, None] + np.pad(off, ((0, 0), (1, 0))))
+    for stop in range(n_visits + 1):
+        own = four_numbers(model, effects, strayed, rows, np.full(n, stop), whole)
+        off = np.where(table.seen, _log_odds_off(own.said, own.precisions), -np.inf)
+        log_odds.append((log_priors[:, stop] + own.log_densities)[:, None] + np.pad(off, ((0, 0), (1, 0))))
     together = np.stack(log_odds, axis=1)
     of_stops = logsumexp(together, axis=2)
-    stops = np.exp(of_stops - logsumexp(of_stops, axis=1, keepdims=True))
-    return Trust(stops, -np.expm1(together[:, :, 1:] - of_stops[:, :, None]), are_fruits)
-
-
-def _log_priors(times: Numbers, share: float) -> Numbers:
-    """Return the logarithm of the probability of a stop after each number of visits, and of none, (S + 1,)."""
-    days = np.diff(times, prepend=times[0] - _BEFORE_DAYS)
-    with np.errstate(divide="ignore"):  # no fruit stops between two visits of one moment
-        return np.append(np.log(share * days / days.sum()), np.log1p(-share))
+    of_fruits = logsumexp(of_stops, axis=1)
+    trust = Trust(
+        np.exp(of_stops - of_fruits[:, None]), -np.expm1(together[:, :, 1:] - of_stops[:, :, None]), are_fruits
+    )
+    return trust, float(are_fruits @ (of_fruits + model.log_scales()) + model.log_prior(effects))
 
 
 def _log_odds_off(said: Numbers, precisions: Numbers) -> Numbers:
