@@ -119,6 +119,21 @@ def test_one_visit_may_have_far_more_false_points_than_the_others(false):
     assert found.sum() == pytest.approx((~is_fruit).sum(), rel=0.2)
 
 
+@pytest.mark.parametrize("n_visits", [3, 5])
+@pytest.mark.parametrize("share", [0.5, 0.7])
+def test_what_was_thinned_after_the_first_visit_is_gone_and_was_no_false_point(share, n_visits):
+    """Of two thirds of a visit that no other saw, people took more, sooner than that it alone saw so many of none."""
+    rng = np.random.default_rng(31)
+    seen, is_fruit = uneven_row(rng, false=(0.02,) * n_visits, hidden=0.25, n_fruits=330)
+    thinned = is_fruit & (rng.random(len(seen)) < share)
+    seen[thinned, 1:] = False
+    seen, thinned = seen[seen.any(axis=1)], thinned[seen.any(axis=1)]
+    found = lives(seen)
+    assert found.false[thinned].mean() < 0.1
+    assert found.gone[thinned].mean() > 0.8
+    assert found.gone[seen[:, -1]].max() == 0.0
+
+
 def test_what_a_visit_looks_at_as_the_first_is_not_false_for_being_new():
     rng = np.random.default_rng(22)
     seen, is_fruit = uneven_row(rng, false=(0.04,) * 4, hidden=0.15, n_fruits=600)
