@@ -61,9 +61,10 @@ ROUNDS, CLOSE = 40, 0.5
 AROUND = 24
 """Tracks next to one that say whether it hangs among fruits that grow."""
 
-OF_ANOTHER_SORT, OTHERS, MOST_THINGS = 0.05, 0.9, 0.5
-"""Share of places where fruits of another sort hang, which are ripe while these grow; of what hangs there, those that
-do not grow; and of what hangs among fruits, the things at most: no tree bears nothing but knots and clips."""
+OF_ANOTHER_SORT, OTHERS, MOST_LAG = 0.05, 0.9, 0.5
+"""Share of places where nothing grows, as fruits of another sort, which are ripe while these grow, or thirsty ones; of
+what hangs there, those that do not grow; and of what hangs among fruits, those at most: no tree bears nothing but knots
+and clips."""
 
 PLACE_ROUNDS = 10
 """Of expectation-maximisation of the share of things."""
@@ -134,29 +135,40 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers, places: N
     none = np.where(np.arange(len(BELIEVED)) == SHARE_OF_THINGS, 0.0, with_things.shares)
     _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
     if gained - without > PROOF:
+        lags = np.zeros(len(told))
         for start in range(0, len(told), AT_ONCE):
             part = np.arange(start, min(start + AT_ONCE, len(told)))
-            chances[told[part]] = _weighed(tracks.chosen(part), with_things)[0][:, THING].sum(axis=1)
-        chances[told] *= _are_among_fruits(chances[told], places[told])
+            of_fates = _weighed(tracks.chosen(part), with_things)[0].sum(axis=2)
+            chances[told[part]], lags[part] = of_fates[:, THING], of_fates[:, SLOW:].sum(axis=1)
+        chances[told] *= _are_among_fruits(lags, places[told])
     return chances
 
 
-def _are_among_fruits(chances: Numbers, places: Numbers) -> Numbers:
-    """Return the probability that things as likely as these are among fruits and no fruits of another sort, (N,)."""
+def _are_among_fruits(lags: Numbers, places: Numbers) -> Numbers:
+    """Return the probability that tracks are among fruits that grow, (N,), and not where nothing does.
+
+    There fruits of another sort hang, that are ripe while these grow, or fruits that have stopped, as in a drought.
+
+    Parameters
+    ----------
+    lags : (N,) float64
+        Probability that a track grows less than the others, or not: as a thing, or as a fruit.
+    places : (N, 3) float64
+    """
     from scipy.spatial import cKDTree
 
     n = min(AROUND, len(places) - 1)
     near = np.asarray(cKDTree(places).query(places, k=1 + n)[1])
-    still = chances[near[:, 1:]].sum(axis=1)
+    lagging = lags[near[:, 1:]].sum(axis=1)
 
     def log_chance(share: float) -> Numbers:
-        return np.asarray(still * np.log(share) + (n - still) * np.log1p(-share))
+        return np.asarray(lagging * np.log(share) + (n - lagging) * np.log1p(-share))
 
     are_among = np.ones(len(places))
     for _ in range(PLACE_ROUNDS):
-        # Where nothing grows says nothing of the share of things among fruits.
-        things = np.clip(are_among @ chances / max(are_among.sum(), 1.0), 1.0 / n, MOST_THINGS)
-        odds = np.log(OF_ANOTHER_SORT / (1.0 - OF_ANOTHER_SORT)) + log_chance(OTHERS) - log_chance(things)
+        # Where nothing grows says nothing of the share among fruits.
+        among = np.clip(are_among @ lags / max(are_among.sum(), 1.0), 1.0 / n, MOST_LAG)
+        odds = np.log(OF_ANOTHER_SORT / (1.0 - OF_ANOTHER_SORT)) + log_chance(OTHERS) - log_chance(among)
         are_among = 1.0 / (1.0 + np.exp(np.minimum(odds, 700.0)))
     return np.asarray(are_among)
 
