@@ -152,8 +152,8 @@ def test_shares_are_learned_where_a_stop_shows() -> None:
     # Three fruits show a stop in the first 30 of 50 days, one does; before them one of a hundred had.
     assert shares.share == pytest.approx(2.0 / (100.0 + 3 * 0.6))
     np.testing.assert_allclose(shares.row, [0.2 * shares.share, *[0.4 * shares.share] * 2, 1.0 - shares.share])
-    np.testing.assert_allclose(shares.trees[0, :3], (2.0 * shares.row[:3] + [0.0, 1.0, 0.0]) / 4.0)
-    np.testing.assert_allclose(shares.trees[1, :3], 2.0 * shares.row[:3] / 3.0)
+    np.testing.assert_allclose(shares.trees[0, :3], (5.0 * shares.row[:3] + [0.0, 1.0, 0.0]) / 7.0)
+    np.testing.assert_allclose(shares.trees[1, :3], 5.0 * shares.row[:3] / 6.0)
     np.testing.assert_allclose(shares.trees.sum(axis=1), 1.0)
     assert shares.log_prior() < StopShares.before(table).log_prior()
 

@@ -1,7 +1,7 @@
 r"""Of a hundred fruits of a tree, how many stopped growing after each visit: a share that is learned tree by tree.
 
 What stops fruits stops those of a tree, as a drought that reaches its roots, or fruits here and there, as frost and
-insects do. So each tree has its own shares $\pi_{tz}$ of fruits that stopped after $z$ visits, learned as if of two
+insects do. So each tree has its own shares $\pi_{tz}$ of fruits that stopped after $z$ visits, learned as if of five
 fruits that are as the row's; and the row's are learned as if of a hundred fruits of which one had stopped, on each day
 as likely. One share for the whole row would ask of each fruit of a dry tree why it of all has stopped, and half a row
 of them were sooner a wrong curve than 150 chances.
@@ -28,7 +28,7 @@ Numbers = NDArray[np.float64]
 _STOPPED, _LOOKED_AT = 1.0, 100.0
 """What is known of the share of fruits that have stopped before any is measured: of a hundred one had."""
 
-_ALIKE = 2.0
+_ALIKE = 5.0
 """By how many fruits as the row's the shares of a tree are known before any of its own is measured."""
 
 _BEFORE_DAYS = 10.0

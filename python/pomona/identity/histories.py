@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.identity.first_views import N_BINS, N_SETTINGS, UNCOUNTED, ViewDensities
+from pomona.identity.first_views import N_BINS, N_SETTINGS, UNCOUNTED, WIDTHS, ViewDensities
 from pomona.identity.local_shares import shares_of_places
-from pomona.identity.looks import MISSES, SHARES_OF_VIEWS, Looks, visibility_classes
+from pomona.identity.looks import MISSES, SHARES_OF_VIEWS, USUAL_VIEWS, Looks, visibility_classes
 
 __all__ = ["CHANCES_OF_SEEING", "SHARE_GONE", "Histories", "HistoryOdds", "histories_of"]
 
@@ -33,6 +33,11 @@ IN_PART_SPREAD = 1.0
 OWN_SPREAD = 0.4
 """Of the logit of each class about what level and slope say of it."""
 
+AGAIN_SPREAD = 0.2
+"""Of the logit of what a second look at all fruits sees, those that the first missed among them, about that of a first:
+a visit that sees three quarters is followed by one that sees as many, where nothing goes. Without it, of two visits of
+which the second sees half as many, a quarter of all fruits could be seen at first and two in five of those again."""
+
 LEAVES_SPREAD = 0.15
 """Of the logit of a visit's chances to see what looks before had missed: leaves fall, or have grown. Most visits are
 alike, and one may be far off: half width of a Cauchy distribution."""
@@ -52,7 +57,7 @@ WEEK = 7.0
 BELIEF_GONE = 25.0
 """Fruits that this belief is worth: few against the hundreds of a row, so that thinning shows."""
 
-CLEARED = 0.003
+CLEARED = 0.02
 """Of the times between visits a week apart or more, those in which any share goes, as likely: people thin and pick. So
 small that it says nothing where a tenth went. By the belief in a usual week alone, two thirds thinned at once were
 sooner two thirds of false points on the visit before, of which no other visit has any."""
@@ -151,11 +156,21 @@ class HistoryOdds:
         self.told = logits - logits[0]
         self.in_part = np.arange(len(logits)) >= len(logits) - len(_BY_VIEWS)
         self.of_visits = slice(3 + len(self.told), 3 + len(self.told) + 2 * self.n_visits)
+        counted = one.first_views != UNCOUNTED
+        share = np.count_nonzero(counted) / max(len(counted), 1)
+        self.once_seen = np.zeros(len(logits))
+        self.once_seen[MISSES + 1 :][: len(_BY_VIEWS)] = share * WIDTHS
+        self.once_seen[MISSES + 1 + np.searchsorted(SHARES_OF_VIEWS, USUAL_VIEWS, side="right")] += 1.0 - share
         self.was_missed = self.in_part | ((np.arange(len(logits)) > 0) & (np.arange(len(logits)) <= MISSES))
 
-    def start(self) -> NDArray[np.float64]:
-        """Return what is believed beforehand: level, slope, the classes' own, views, logits of what goes."""
+    def start(self, last_gone: float | None = None) -> NDArray[np.float64]:
+        """Return what is believed beforehand: level, slope, the classes' own, views, logits of what goes.
+
+        With the share that goes before the last visit, where another than the usual is to be tried.
+        """
         believed = np.where(self.goes, self.share_gone, SHARE_GONE)
+        if last_gone is not None:
+            believed[-1:] = last_gone
         return np.concatenate([np.zeros(self.n_own), np.log(believed / (1.0 - believed))])
 
     def bounds(self, *, alike: bool) -> list[tuple[float, float]]:
@@ -173,7 +188,7 @@ class HistoryOdds:
     def __call__(self, told: NDArray[np.float64], share_false: float) -> tuple[float, NDArray[np.float64]]:
         """Return minus the log posterior and its gradient."""
         n_own = self.n_own
-        chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
+        chances, leaving, views = self._chances(told), self.leaving(told), self._views(told)
         rates = self._rates(told, share_false)
         ends, log_real, log_false, false = self._weighed(views, chances, leaving, rates)
         unseen_ends, log_unseen = _endings(leaving, np.full(len(self.n_at), -1), self._misses_at(chances))
@@ -203,6 +218,9 @@ class HistoryOdds:
                 FALSE_SPREAD * of_rates,
             ]
         )
+        again, of_again = self._again(told)
+        value -= 0.5 * again**2
+        of_chances[: 3 + len(self.told)] -= again * of_again
         seen_first = self.closed_views + self._first_sights(real, false)
         value += (self.closed_views * views.logs[:, :-1]).sum()
         goes = leaving[1:]
@@ -240,7 +258,7 @@ class HistoryOdds:
 
     def lives(self, told: NDArray[np.float64], share_false: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return for each fruit, (K,), that it has gone, if it is one, and that it never was one."""
-        chances, leaving, views = self._chances(told), self._leaving(told), self._views(told)
+        chances, leaving, views = self._chances(told), self.leaving(told), self._views(told)
         rates = self._rates(told, share_false)
         ends, _, _, false = self._weighed(views, chances, leaving, rates)
         ends, _, _, false = self._weighed(views, chances, self._leaving_places(leaving, ends, false), rates)
@@ -266,7 +284,7 @@ class HistoryOdds:
     def room(self, told: NDArray[np.float64], share_false: float) -> float:
         """Return `ViewDensities.room` at the top of the log posterior."""
         chances, views = self._chances(told), self._views(told)
-        false = self._weighed(views, chances, self._leaving(told), self._rates(told, share_false))[3]
+        false = self._weighed(views, chances, self.leaving(told), self._rates(told, share_false))[3]
         return views.room(*(_in_bins(self.first_views, each) for each in (false, false * (1.0 - false))))
 
     def _weighed(
@@ -298,21 +316,42 @@ class HistoryOdds:
 
     def _chances(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the chance of each visit to see a fruit of each class, (V, C)."""
+        of_visits = LEAVES_SPREAD * told[3 + len(self.told) :][: self.n_visits, None] * self.was_missed
+        return np.asarray(MOST_SEEING / (1.0 + np.exp(-self._logits(told) - of_visits)))
+
+    def _again(self, told: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        """Return by how much more a usual second look sees of all fruits than a first, in its spread; and the slopes.
+
+        Of level, slope, in part and the classes' own.
+        """
+        chances = MOST_SEEING / (1.0 + np.exp(-self._logits(told)))
+        slopes = chances * (1.0 - chances / MOST_SEEING)
+        first, missed, seen = chances[0], chances[1], float(self.once_seen @ chances)
+        both = first * seen + (1.0 - first) * missed
+        of_both, of_first = 1.0 / (both * (1.0 - both)), 1.0 / (first * (1.0 - first))
+        of_chances = of_both * first * self.once_seen
+        of_chances[:2] += of_both * (seen - missed) - of_first, of_both * (1.0 - first)
+        of_logits = of_chances * slopes / AGAIN_SPREAD
+        apart = float(np.log(both / (1.0 - both)) - np.log(first / (1.0 - first))) / AGAIN_SPREAD
+        common = [LEVEL_SPREAD * of_logits.sum(), SLOPE_SPREAD * of_logits @ self.told]
+        return apart, np.array([*common, IN_PART_SPREAD * of_logits @ self.in_part, *OWN_SPREAD * of_logits])
+
+    def _logits(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the logits of the chances of a usual visit to see a fruit of each class, (C,), of `MOST_SEEING`."""
         common = LEVEL + LEVEL_SPREAD * told[0] + (SLOPE + SLOPE_SPREAD * told[1]) * self.told
         own = OWN_SPREAD * told[3:][: len(self.told)] + IN_PART_SPREAD * told[2] * self.in_part
-        of_visits = LEAVES_SPREAD * told[3 + len(self.told) :][: self.n_visits, None] * self.was_missed
-        return np.asarray(MOST_SEEING / (1.0 + np.exp(-common - own - of_visits)))
+        return np.asarray(common + own)
 
     def _first_chance(self, told: NDArray[np.float64]) -> float:
         """Return the chance of a usual visit to see a fruit at a first look."""
-        return float(MOST_SEEING / (1.0 + np.exp(-LEVEL - LEVEL_SPREAD * told[0] - OWN_SPREAD * told[3])))
+        return float(MOST_SEEING / (1.0 + np.exp(-self._logits(told)[0])))
 
     def _rates(self, told: NDArray[np.float64], share_false: float) -> NDArray[np.float64]:
         """Return how many false points each visit has beside each fruit that hangs, (V,)."""
         of_visits = FALSE_SPREAD * told[3 + len(self.told) + self.n_visits :][: self.n_visits]
         return np.asarray(share_false / (1.0 - share_false) * self._first_chance(told) * np.exp(of_visits))
 
-    def _leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
+    def leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the share that goes before each visit, (V,); none before the first, nor between two of one date."""
         return np.concatenate([[0.0], self.goes / (1.0 + np.exp(-told[self.n_own :]))])
 

@@ -30,6 +30,13 @@ UNEVEN = 12.0
 """Nats by which visits that differ have to explain all better than visits that are alike: most are, and classes of
 fruits that hide are no exact model, so a few nats are no proof."""
 
+HALF_GONE = 0.5
+"""Share that goes before the last visit where the search begins a second time: of two visits nobody can tell whether
+half went, or hides from one of them, and both explain all well."""
+
+OTHER = 0.1
+"""By how much shares that go differ, at least, where a second search ended elsewhere."""
+
 FINE = 400
 """Steps in which the interpolated posterior is summed up."""
 
@@ -43,6 +50,10 @@ two visits half of what was missed may be gone, and nobody can say which half.""
 
 LEVEL = 0.01
 """Probabilities that differ by less are of fruits that are gone as surely."""
+
+
+Fits = dict[int, tuple[float, NDArray[np.float64]]]
+"""Log posterior of each share that counts, by its number, and what fits it best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,21 +92,29 @@ def lives_of(histories: Histories) -> Lives:
     In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
     odds = HistoryOdds(histories)
-    fits, uneven = (_fits(odds, alike=alike) for alike in (True, False))
-    if max(one for one, _ in uneven.values()) - max(one for one, _ in fits.values()) > UNEVEN:
-        fits = uneven
-    weights = _weights({number: log_posterior for number, (log_posterior, _) in fits.items()})
+    ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
+    if max(map(_best, uneven)) - max(map(_best, ways)) > UNEVEN:
+        ways = uneven
     gone, false = np.zeros(len(histories.seen)), np.zeros(len(histories.seen))
-    for number, weight in weights.items():
-        gone_then, false_then = odds.lives(fits[number][1], SHARES_FALSE[number])
-        gone += weight * gone_then
-        false += weight * false_then
+    for fits, weights in zip(ways, _weights(ways), strict=True):
+        for number, weight in weights.items():
+            gone_then, false_then = odds.lives(fits[number][1], SHARES_FALSE[number])
+            gone += weight * gone_then
+            false += weight * false_then
     return Lives(gone, false)
 
 
-def _fits(odds: HistoryOdds, *, alike: bool) -> dict[int, tuple[float, NDArray[np.float64]]]:
-    """Return the log posterior of the shares that count, by number, and what fits each best."""
-    usual = _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start(), alike=alike)
+def _ways(odds: HistoryOdds, *, alike: bool) -> list[Fits]:
+    """Return what fits best as a rule, and what does where half went before the last visit, if that is another way."""
+    share = SHARES_FALSE[USUAL_FALSE]
+    tops = [_climbed(odds, share, start, alike=alike) for start in (odds.start(), odds.start(HALF_GONE))]
+    leaving = [odds.leaving(told) for _, told in tops]
+    is_other = np.abs(leaving[1] - leaving[0]).max() > OTHER
+    return [_fits(odds, top, alike=alike) for top in tops[: 1 + is_other]]
+
+
+def _fits(odds: HistoryOdds, usual: tuple[float, NDArray[np.float64]], *, alike: bool) -> Fits:
+    """Follow the top at the usual share to those of all shares that count."""
     fits = {USUAL_FALSE: usual}
     best = usual[0]
     for numbers in (range(USUAL_FALSE - 1, -1, -1), range(USUAL_FALSE + 1, len(SHARES_FALSE))):
@@ -106,6 +125,10 @@ def _fits(odds: HistoryOdds, *, alike: bool) -> dict[int, tuple[float, NDArray[n
             if fits[number][0] < best - HARDLY:
                 break
     return dict(sorted(fits.items()))
+
+
+def _best(fits: Fits) -> float:
+    return max(log_posterior for log_posterior, _ in fits.values())
 
 
 def _climbed(
@@ -120,17 +143,21 @@ def _climbed(
     return float(belief - top.fun - odds.room(top.x, share)), top.x
 
 
-def _weights(log_posteriors: dict[int, float]) -> dict[int, float]:
-    """Return the weight of each share: the integral over the logarithm of shares of what is linear between them."""
+def _weights(ways: list[Fits]) -> list[dict[int, float]]:
+    """Return the weights of the shares of each way: integrals over their logarithm of what is linear between them."""
     from scipy.interpolate import PchipInterpolator
 
-    numbers = list(log_posteriors)
-    logs = np.log(SHARES_FALSE[numbers])
-    fine = np.linspace(logs[0], logs[-1], FINE)
-    density = PchipInterpolator(logs, list(log_posteriors.values()))(fine)
-    density = np.exp(density - density.max())
-    density /= density.sum()
-    return {number: float(np.interp(fine, logs, logs == logs[at]) @ density) for at, number in enumerate(numbers)}
+    most, weights = max(map(_best, ways)), []
+    for fits in ways:
+        logs = np.log(SHARES_FALSE[list(fits)])
+        fine = np.linspace(logs[0], logs[-1], FINE)
+        density = np.exp(PchipInterpolator(logs, [log_posterior for log_posterior, _ in fits.values()])(fine) - most)
+        density *= (logs[-1] - logs[0]) / FINE
+        weights.append(
+            {number: float(np.interp(fine, logs, logs == logs[at]) @ density) for at, number in enumerate(fits)}
+        )
+    total = sum(sum(each.values()) for each in weights)
+    return [{number: weight / total for number, weight in each.items()} for each in weights]
 
 
 def states_of(
