@@ -55,8 +55,8 @@ def test_two_of_one_visit_never_join() -> None:
 
 
 def test_a_pair_that_is_hardly_likelier_than_a_neighbour_is_none() -> None:
-    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.75)]) == [0, 1]
-    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.8)]) == [0, 0]
+    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.55)]) == [0, 1]
+    assert clusters([1, 1], [pair(0, 1, [(0, 0)], 0.65)]) == [0, 0]
 
 
 def test_what_matched_visits_leave_unpaired_speaks_against() -> None:
