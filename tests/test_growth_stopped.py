@@ -150,12 +150,28 @@ def test_shares_are_learned_where_a_stop_shows() -> None:
     stops = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
     shares = StopShares.learned(table, stops, np.array([1.0, 1.0, 1.0, 1.0]))
     # Three fruits show a stop in the first 30 of 50 days, one does; before them one of a hundred had.
-    assert shares.share == pytest.approx(2.0 / (100.0 + 3 * 0.6))
-    np.testing.assert_allclose(shares.row, [0.2 * shares.share, *[0.4 * shares.share] * 2, 1.0 - shares.share])
+    share = 2.0 / (100.0 + 3 * 0.6)
+    np.testing.assert_allclose(shares.row, [0.2 * share, *[0.4 * share] * 2, 1.0 - share])
     np.testing.assert_allclose(shares.trees[0, :3], (5.0 * shares.row[:3] + [0.0, 1.0, 0.0]) / 7.0)
     np.testing.assert_allclose(shares.trees[1, :3], 5.0 * shares.row[:3] / 6.0)
     np.testing.assert_allclose(shares.trees.sum(axis=1), 1.0)
     assert shares.log_prior() < StopShares.before(table).log_prior()
+
+
+@pytest.mark.parametrize("later", [1, 3])
+def test_two_visits_of_one_day_tell_what_each_tells(row_growth: SeasonGrowth, later: int) -> None:
+    """No fruit stops between them; growth ended there in a failure."""
+    fruits = row_growth.fruits
+    moments = list(fruits.moments)
+    moments[later] = moments[later - 1]
+    sizes_mm = fruits.diameters_mm.copy()
+    sizes_mm[:, later] = sizes_mm[:, later - 1]
+    found = growth_of(replace(fruits, diameters_mm=sizes_mm, moments=tuple(moments)))
+    assert np.isfinite(found.foretold.sizes_mm).all()
+    # One of ninety may have stopped, by growth over less of the season.
+    assert np.median(found.stopped) < 0.05
+    ratios = found.foretold.sizes_mm[:, 0] / row_growth.foretold.sizes_mm[:, 0]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_quantile_asks_nothing_of_what_has_no_weight() -> None:

@@ -41,13 +41,10 @@ class StopShares:
 
     Attributes
     ----------
-    share : float
-        Of the row's fruits, that have stopped at all.
     row : (S + 1,)
     trees : (T, S + 1)
     """
 
-    share: float
     row: Numbers
     trees: Numbers
 
@@ -55,7 +52,7 @@ class StopShares:
     def before(cls, table: SizeTable, share: float = _STOPPED / _LOOKED_AT) -> StopShares:
         """Believe in a share, in all trees alike."""
         row = _over_days(table.times, share)
-        return cls(share, row, np.tile(row, (len(table.tree_starts), 1)))
+        return cls(row, np.tile(row, (len(table.tree_starts), 1)))
 
     @classmethod
     def learned(cls, table: SizeTable, stops: Numbers, are_fruits: Numbers) -> StopShares:
@@ -68,11 +65,12 @@ class StopShares:
         of_trees = np.add.reduceat(stopped, table.tree_starts) + _ALIKE * row
         of_trees /= (np.add.reduceat(shows[:, 0], table.tree_starts) + _ALIKE)[:, None]
         of_trees[:, -1] = 1.0 - of_trees[:, :-1].sum(axis=1)
-        return cls(share, row, of_trees)
+        return cls(row, of_trees)
 
     def log_prior(self) -> float:
         """Logarithm of their density before any fruit is measured, but for what does not depend on them."""
-        of_row = _STOPPED * np.log(self.share) + (_LOOKED_AT - _STOPPED) * np.log1p(-self.share)
+        grow = float(self.row[-1])
+        of_row = _STOPPED * np.log1p(-grow) + (_LOOKED_AT - _STOPPED) * np.log(grow)
         return float(of_row - _ALIKE * rel_entr(self.row, self.trees).sum())
 
 

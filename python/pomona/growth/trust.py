@@ -53,6 +53,9 @@ _BETTER = 3.0
 _LEAST_PRECISION = 1e-9
 """Of a logarithm that is foretold: of a size that is all but unknown, where rounding leaves less than nothing."""
 
+_LEAST_SHARE = 1e-300
+"""No fruit stops between two visits of one moment, and what follows from that it did has to be a number."""
+
 _ROUNDS, _CLOSE = 30, 0.01
 """Of turns at most, and by how much the trust in a size may move in the last of them."""
 
@@ -148,8 +151,7 @@ def _judged(model: Hierarchy, shares: StopShares, are_fruits: Numbers) -> tuple[
     table, effects = model.table, model.expected()
     n, n_visits = table.logs.shape
     strayed, rows, whole = model.expected_stray(effects), np.arange(n), np.ones((n, n_visits))
-    with np.errstate(divide="ignore"):  # no fruit stops between two visits of one moment
-        log_priors = np.log(shares.trees)[table.trees]
+    log_priors = np.log(np.maximum(shares.trees, _LEAST_SHARE))[table.trees]
     log_odds = []
     for stop in range(n_visits + 1):
         own = four_numbers(model, effects, strayed, rows, np.full(n, stop), whole)

@@ -58,9 +58,9 @@ BELIEF_GONE = 25.0
 """Fruits that this belief is worth: few against the hundreds of a row, so that thinning shows."""
 
 CLEARED = 0.02
-"""Of the times between visits a week apart or more, those in which any share goes, as likely: people thin and pick. So
-small that it says nothing where a tenth went. By the belief in a usual week alone, two thirds thinned at once were
-sooner two thirds of false points on the visit before, of which no other visit has any."""
+"""Of the times between visits a week apart or more, those in which any share goes, as likely: people thin and pick.
+By the belief in a usual week alone, two thirds thinned at once were sooner two thirds of false points on the visit
+before, of which no other visit has any."""
 
 FARTHEST = 6.0
 """Of a setting from what is believed beforehand, standard deviations."""
