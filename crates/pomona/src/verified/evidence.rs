@@ -22,18 +22,19 @@ use crate::beliefs::Beliefs;
 
 /// Evidence of an overlap, nats.
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
-    evidence_within(GATE, laid)
+    let (evidence, _) = evidence_within(GATE, laid);
+    evidence
 }
 
-/// The same of pairs within so many standard deviations alone.
-pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> f64 {
+/// The same of pairs within so many standard deviations alone, and how many of these are expected to be right.
+pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> (f64, f64) {
     let map = laid.map;
     let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
     let here = laid.due();
     let met = laid.meetings(gate, |meeting| Some(*meeting));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
-    let mut evidence = 0.0;
+    let [mut evidence, mut found] = [0.0; 2];
     for _ in 0..TURNS {
         let [of_query, of_map] = of_either(share, due);
         let edge = |meeting: &Meeting| {
@@ -44,10 +45,10 @@ pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> f64 {
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
         let alone = |share: f64, supports: &[f64]| supports.iter().map(|u| (1.0 - share * u).ln()).sum::<f64>();
         evidence = beliefs.log_sum + alone(of_query, &here) + alone(of_map, &there) + of_query * due[0];
-        let found: f64 = beliefs.probabilities.iter().sum();
+        found = beliefs.probabilities.iter().sum();
         share = (found / fewer(due)).clamp(SHARES.0, SHARES.1);
     }
-    evidence
+    (evidence, found)
 }
 
 #[cfg(test)]
