@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from growth_maker import HARVEST, GrownRow, rows_of
+from growth_maker import HARVEST, GrownRow, grow_row, rows_of
+from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.curve_families import FAMILIES
+from pomona.growth.fruit_order import _stretches
 from pomona.growth.growth_tables import write_tables
 from pomona.growth.hierarchy import Hierarchy, Shape
+from pomona.growth.measured import measured_fruits
 from pomona.growth.mixed_quantiles import mixed_quantile
 from pomona.growth.season_growth import SeasonGrowth, growth_of
 from pomona.growth.size_table import SizeTable
@@ -140,6 +143,43 @@ def test_trees_that_have_stopped_are_told_from_the_others(
     assert np.median(rates[~dry] / usual[~dry]) == pytest.approx(1.0, abs=0.05)
     assert rates[dry].mean() == pytest.approx(keeps * usual[dry].mean(), abs=0.06)
     assert not of_visits(found)
+
+
+@pytest.fixture(scope="module")
+def long_row(tmp_path_factory: pytest.TempPathFactory) -> GrownRow:
+    return grow_row(tmp_path_factory.mktemp("long") / "row.gpkg", (45, 65, 85, 105, 125), n_trees=6, scales=(1.0,) * 5)
+
+
+@pytest.mark.parametrize("dry_trees", [(0, 1, 2), (0, 2, 4)], ids=["half a row", "every second tree"])
+def test_half_a_row_of_another_sort_is_told_where_no_trees_are_known(
+    long_row: GrownRow, dry_trees: tuple[int, ...]
+) -> None:
+    """One curve suits both sorts where visits may measure two and three times what there is."""
+    fruits = measured_fruits(long_row.path)
+    numbers = np.array([int(labels[0].split()[1]) for labels in fruits.labels])
+    dry, rng = np.isin(numbers // 30, dry_trees), np.random.default_rng(3)
+    sizes_mm = np.stack(
+        [
+            np.where(dry, long_row.sizes_mm(min(day, 77))[numbers], 0.75 * long_row.sizes_mm(day)[numbers])
+            for day in long_row.days
+        ],
+        axis=1,
+    )
+    sizes_mm *= np.exp(rng.normal(0.0, 0.04, sizes_mm.shape)) * np.array([1.0, 1.02, 0.99, 1.01, 0.98])
+    nowhere = BearingTrees(("",), np.zeros(len(numbers), np.int64), fruits.trees.along_m, ("",))
+    found = growth_of(replace(fruits, diameters_mm=sizes_mm, trees=nowhere))
+    assert (found.stopped[dry] > 0.5).mean() > 0.9
+    assert (found.stopped[~dry] < 0.5).mean() > 0.9
+    assert np.abs(np.log(found.foretold.scales)).max() < 0.08
+    assert not of_visits(found)
+
+
+def test_stretches_of_a_row_are_the_same_from_either_end() -> None:
+    places = np.random.default_rng(1).permutation(60).astype(float)
+    there, back = _stretches(places), _stretches(-places)
+    assert np.bincount(there).tolist() == [30, 30]
+    np.testing.assert_array_equal(there, 1 - back)
+    assert _stretches(places[:10]).tolist() == [0] * 10
 
 
 def test_shares_are_learned_where_a_stop_shows() -> None:

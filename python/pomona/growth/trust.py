@@ -134,16 +134,20 @@ def _climbed_from(
 ) -> tuple[Trust, float]:
     """Fit and judge in turn, from sizes that are trusted, (N, S), and shares; also how well it explains all sizes."""
     start, in_curve = None, np.where(table.seen, trusted * are_fruits[:, None], 1.0)
+    best: tuple[Trust, float] | None = None
     for _ in range(_ROUNDS):
         before, table = in_curve, table.trusted(in_curve)
         shape, start = likeliest_shape(table, FAMILIES["expolinear"], start)
         trust, explained = _judged(Hierarchy(table, FAMILIES["expolinear"], shape), shares, are_fruits)
         explained += shares.log_prior() - 0.5 * float(start @ start)
+        if best is None or explained > best[1]:
+            best = trust, explained
         shares = StopShares.learned(table, trust.stops, are_fruits)
         in_curve = np.where(table.seen, trust.in_curve, 1.0)
         if np.abs(in_curve - before).max() < _CLOSE:
             break
-    return trust, explained
+    assert best is not None
+    return best
 
 
 def _judged(model: Hierarchy, shares: StopShares, are_fruits: Numbers) -> tuple[Trust, float]:

@@ -91,8 +91,12 @@ def lives_of(histories: Histories) -> Lives:
     likely it makes what was seen at the chances of seeing and the shares of going that explain it best (`HistoryOdds`).
     In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
+    from threadpoolctl import threadpool_limits
+
     odds = HistoryOdds(histories)
-    ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
+    # L-BFGS-B asks BLAS for matrices of ten rows: threads that wait for each other take two to twenty times as long.
+    with threadpool_limits(1, user_api="blas"):
+        ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
     if max(map(_best, uneven)) - max(map(_best, ways)) > UNEVEN:
         ways = uneven
     gone, false = np.zeros(len(histories.seen)), np.zeros(len(histories.seen))
