@@ -128,6 +128,20 @@ def test_where_all_are_fruits_none_is_a_thing(kind: dict[str, float], seed: int)
         assert chances(drawn(np.random.default_rng([2, seed]), days, 0.0, **kind)[0], days).max() < 0.05
 
 
+@pytest.mark.parametrize("share", [0.15, 0.3])
+def test_slow_fruits_are_no_things(share: float) -> None:
+    """They grow at half the pace or somewhat more: not at all, were a camera to measure a little more on every visit."""
+    days = days_of(5)
+    for seed in range(6):
+        rng = np.random.default_rng([4, seed])
+        sizes, _ = drawn(rng, days, 0.0, noise=0.04, growth=0.5, hidden=0.3, scale=0.02)
+        slow = rng.random(len(sizes)) < share
+        paces = rng.uniform(0.5, 0.6, np.count_nonzero(slow))
+        curve = 0.5 * (1.0 - np.exp(-2.0 * (days - days[0]) / np.ptp(days))) / (1.0 - np.exp(-2.0))
+        sizes[slow] -= (1.0 - paces)[:, None] * curve
+        assert chances(sizes, days).max() < 0.2
+
+
 @pytest.mark.parametrize("kind", [{"noise": 0.1}, {"scale": 0.08}, {"stops": 0.1}], ids=str)
 def test_things_are_told_beside_what_is_like_them(kind: dict[str, float]) -> None:
     days = days_of(5)

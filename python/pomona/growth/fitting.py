@@ -35,19 +35,21 @@ _STEP, _FINE_STEP = 0.05, 1e-3
 _IMPOSSIBLE = -1e9
 """Logarithm of a likelihood below any that is met."""
 
-# Medians and standard deviations: of the logarithms, but of the onset, in days against the first visit. Those of scales
-# and of straying are narrow: with visits that measure three times what there is, one curve suits a row of two sorts of
-# which half has stopped.
+# Medians and standard deviations: of the logarithms, but of the onset, in days against the first visit.
 _ONSET_DAYS = (-10.0, 20.0)
 _RATE_SPREAD = 0.20
 _SPREADS = (
     (0.07, 0.5),  # of a fruit's size
     (3.0, 0.5),  # of its onset, days
     (0.02, 0.7),  # of a tree's size
-    (0.02, 0.2),  # of a visit's scale: no camera errs by a tenth
+    (0.02, 0.5),  # of a visit's scale
     (2.0, 0.6),  # of a diameter, mm
-    (1e-4, 0.5),  # of the block's relative growth a day, against the curve
+    (1e-4, 1.0),  # of the block's relative growth a day, against the curve
 )
+
+_AGREEING = (*_SPREADS[:3], (0.02, 0.2), _SPREADS[4], (1e-4, 0.5))
+"""The same where visits agree and growth keeps to its curve: by these who has stopped is told. With visits that measure
+three times what there is, one curve suits a row of two sorts of which one has stopped."""
 
 N_NUMBERS = len(_SPREADS) + 2
 """Of a shape."""
@@ -56,11 +58,13 @@ N_NUMBERS = len(_SPREADS) + 2
 class _Posterior:
     """The logarithm of the posterior over the shape, in standard deviations of the prior."""
 
-    def __init__(self, table: SizeTable, family: CurveFamily) -> None:
+    def __init__(
+        self, table: SizeTable, family: CurveFamily, spreads: tuple[tuple[float, float], ...] = _SPREADS
+    ) -> None:
         self.table, self.family = table, family
-        medians = (family.usual_rate_per_day, *(median for median, _ in _SPREADS))
+        medians = (family.usual_rate_per_day, *(median for median, _ in spreads))
         self.middle = np.log(medians)
-        self.spread = np.array([_RATE_SPREAD, *(spread for _, spread in _SPREADS)])
+        self.spread = np.array([_RATE_SPREAD, *(spread for _, spread in spreads)])
 
     def shape(self, z: Numbers) -> Shape:
         onset = float(self.table.times[0] + _ONSET_DAYS[0] + _ONSET_DAYS[1] * z[0])
@@ -166,8 +170,8 @@ def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
 
 
 def likeliest_shape(table: SizeTable, family: CurveFamily, start: Numbers | None = None) -> tuple[Shape, Numbers]:
-    """Find the mode alone; also as the start of a next search, (8,)."""
-    posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
+    """Find the mode alone, where visits agree; also as the start of a next search, (8,)."""
+    posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family, _AGREEING)
     mode = _climbed(posterior, start)
     return posterior.shape(mode), mode
 

@@ -1,4 +1,9 @@
-"""Which tracks are no fruits but things that stay as they are: knots, clips, tags, drippers, seen on every visit."""
+"""Which tracks are no fruits but things that stay as they are: knots, clips, tags, drippers, seen on every visit.
+
+Things show by how much a visit's camera errs, as they are as large on each. But slow fruits are things that stay, too,
+for a camera that measures a little more from visit to visit. So things have to prove themselves to cameras that do not
+err, and the cameras' errors are learned of those that did.
+"""
 
 from __future__ import annotations
 
@@ -129,12 +134,13 @@ def still_chances(log_sizes: Numbers, days: Numbers, hanging: Numbers, places: N
         return chances
     most = max(LEAST_TRACKS, MOST_CELLS // (len(tracks.days) + STANDS) ** 2)
     some = tracks.chosen(np.linspace(0, len(told) - 1, min(len(told), most)).astype(np.int64))
-    with_things, gained = _learnt(some, _start(tracks.log_sizes))
+    with_things, gained = _learnt(some, _start(tracks.log_sizes), rescales=False)
     if with_things.shares[SHARE_OF_THINGS] * len(some) < FEWEST_THINGS:
         return chances
     none = np.where(np.arange(len(BELIEVED)) == SHARE_OF_THINGS, 0.0, with_things.shares)
-    _, without = _learnt(some, replace(with_things, shares=none / none.sum()))
+    _, without = _learnt(some, replace(with_things, shares=none / none.sum()), rescales=False)
     if gained - without > PROOF:
+        with_things, _ = _learnt(some, with_things, rescales=True)
         lags = np.zeros(len(told))
         for start in range(0, len(told), AT_ONCE):
             part = np.arange(start, min(start + AT_ONCE, len(told)))
@@ -198,7 +204,7 @@ def _start(log_sizes: Numbers) -> _Season:
     return _Season(Growing(growth, np.zeros(n), np.full(n, USUAL_NOISE), max(spread, LEAST_SPREAD), 0.1), BELIEVED)
 
 
-def _learnt(tracks: _Tracks, season: _Season) -> tuple[_Season, float]:
+def _learnt(tracks: _Tracks, season: _Season, *, rescales: bool) -> tuple[_Season, float]:
     """Return what explains the sizes best, from a start on, and how well it does: nats."""
     before = -np.inf
     for _ in range(ROUNDS):
@@ -206,7 +212,7 @@ def _learnt(tracks: _Tracks, season: _Season) -> tuple[_Season, float]:
         gained -= 0.5 * float(((season.growing.scales / SCALE_SPREAD) ** 2).sum())
         if gained < before + CLOSE:
             break
-        before, season = gained, _better(tracks.log_sizes, season, of_fates)
+        before, season = gained, _better(tracks.log_sizes, season, of_fates, rescales=rescales)
     return season, gained
 
 
@@ -229,16 +235,16 @@ def _log_priors(days: Numbers, shares: Numbers) -> Numbers:
         return np.asarray(np.log(np.concatenate([grows, shares[1:-1], shares[-1] * between / between.sum()])))
 
 
-def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers) -> _Season:
+def _better(log_sizes: Numbers, season: _Season, of_fates: Numbers, *, rescales: bool) -> _Season:
     """Return what explains the sizes better, given the probabilities of the fates, (N, M, 1 + V)."""
     counts = of_fates.sum(axis=(0, 2))
     counts = np.concatenate([[counts[: ODD + 1].sum()], counts[SLOW : STANDS + 1], [counts[STANDS + 1 :].sum()]])
     # A share of nothing stays so.
     shares = (counts + BELIEF * BELIEVED) * (season.shares > 0.0)
-    return _Season(_regrown(log_sizes, season.growing, of_fates), shares / shares.sum())
+    return _Season(_regrown(log_sizes, season.growing, of_fates, rescales=rescales), shares / shares.sum())
 
 
-def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Growing:
+def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers, *, rescales: bool) -> Growing:
     seen, grows = ~np.isnan(log_sizes), of_fates[:, GROWS]
     own = own_growth(log_sizes, growing)
     # A size that is off says nothing.
@@ -248,7 +254,7 @@ def _regrown(log_sizes: Numbers, growing: Growing, of_fates: Numbers) -> Growing
     squares = (counted * ((own.off - moved) ** 2 + own.variances)).sum(axis=(0, 1))
     noises = np.sqrt((squares + NOISE_BELIEF * USUAL_NOISE**2) / (n + NOISE_BELIEF))
     spreads = np.sqrt((grows * own.squares).sum(axis=(1, 2)) / grows.sum())
-    scales = _rescaled(log_sizes, growing, of_fates)
+    scales = _rescaled(log_sizes, growing, of_fates) if rescales else growing.scales
     return Growing(
         growth=growing.growth + moved + growing.scales - scales,
         scales=scales,
