@@ -130,7 +130,7 @@ def test_where_all_are_fruits_none_is_a_thing(kind: dict[str, float], seed: int)
 
 @pytest.mark.parametrize("share", [0.15, 0.3])
 def test_slow_fruits_are_no_things(share: float) -> None:
-    """They grow at half the pace or somewhat more: not at all, were a camera to measure a little more on every visit."""
+    """They grow at half the pace: not at all, were a camera to measure a little more on every visit."""
     days = days_of(5)
     for seed in range(6):
         rng = np.random.default_rng([4, seed])
