@@ -94,7 +94,7 @@ def lives_of(histories: Histories) -> Lives:
     from threadpoolctl import threadpool_limits
 
     odds = HistoryOdds(histories)
-    # L-BFGS-B asks BLAS for matrices of ten rows: threads that wait for each other take two to twenty times as long.
+    # L-BFGS-B asks BLAS for matrices of ten rows: threads that wait for each other cost more than they bring.
     with threadpool_limits(1, user_api="blas"):
         ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
     if max(map(_best, uneven)) - max(map(_best, ways)) > UNEVEN:
