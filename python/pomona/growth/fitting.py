@@ -47,7 +47,7 @@ _SPREADS = (
     (1e-4, 1.0),  # of the block's relative growth a day, against the curve
 )
 
-_AGREEING = (*_SPREADS[:3], (0.02, 0.2), _SPREADS[4], (1e-4, 0.5))
+_AGREEING = (*_SPREADS[:3], (_SPREADS[3][0], 0.2), _SPREADS[4], (_SPREADS[5][0], 0.5))
 """The same where visits agree and growth keeps to its curve: by these who has stopped is told. With visits that measure
 three times what there is, one curve suits a row of two sorts of which one has stopped."""
 

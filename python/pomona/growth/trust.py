@@ -15,7 +15,8 @@ The shape and the shares are fitted with the sizes so trusted, and fruits and si
 until none moves (expectation-maximisation): fitted to all of them, the shape would believe the worst. It may climb the
 wrong hill. Where a tree or half a row has stopped, a curve that suits no fruit can, with onsets far apart and scales
 of visits that double, suit all somewhat, and none has stopped by it. So it is begun twice, from all fruits and from the
-quarter that grows fastest, and what ends higher is believed.
+quarter that grows fastest, and the highest place on either way is believed: the last turns may lead down again, as
+shares are learned where a stop shows alone.
 """
 
 from __future__ import annotations
