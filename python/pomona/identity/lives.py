@@ -91,6 +91,7 @@ def lives_of(histories: Histories) -> Lives:
     likely it makes what was seen at the chances of seeing and the shares of going that explain it best (`HistoryOdds`).
     In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
+    import scipy.optimize  # noqa: F401 - only what is loaded can be limited
     from threadpoolctl import threadpool_limits
 
     odds = HistoryOdds(histories)
@@ -142,7 +143,9 @@ def _climbed(
     from scipy.optimize import minimize
 
     bounds = odds.bounds(alike=alike)
-    top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8})
+    # A step remembered for each setting: settings hang together, and with ten steps it takes twice as many looks.
+    options = {"ftol": 1e-8, "maxcor": len(told)}
+    top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     belief = SHARE_FALSE * BELIEF_FALSE * np.log(share) + ((1.0 - SHARE_FALSE) * BELIEF_FALSE - 1.0) * np.log1p(-share)
     return float(belief - top.fun - odds.room(top.x, share)), top.x
 
