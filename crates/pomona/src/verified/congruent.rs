@@ -26,14 +26,13 @@ pub(super) fn is_sparser(one: &Landscape, other: &Landscape, scale: Scale) -> bo
 const TRIED: usize = 200_000;
 const MOST: usize = 128;
 
-/// Fours that lie as seeds do, from which on no further seeds are laid, and seeds that are laid at once. Visits after a harvest have
-/// 108,000 at the most; where noise is as wide as fruits hang apart any four lie like any other, and a frame had millions.
-const ENOUGH: u64 = 200_000;
+/// Seeds that are laid at once, and fours that lie like one of them, on the average, from which on neither they nor longer ones tell
+/// anything: where noise is as wide as fruits hang apart any four lie like any other. After a harvest they are 200 to 3,300.
 const AT_ONCE: usize = 8;
+const ANY: u64 = 4_000;
 
-/// Fruits of the query times poses that are refined: of thousands that a sparse visit lets pass at first the right one is seldom
-/// among the best, and few fruits are refined fast.
-const FRUITS_REFINED: usize = 100_000;
+/// Poses that are refined: of thousands that a sparse visit lets pass at first the right one is seldom among the best.
+const REFINED: usize = 1_500;
 
 /// Length of a seed in standard deviations of the noise, at the least.
 const LEAST: f64 = 10.0;
@@ -47,7 +46,7 @@ impl<'a> Search<'a> {
         let (mut candidates, effort) = self.congruent();
         findings.log.effort = findings.log.effort + effort;
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, (FRUITS_REFINED / self.query.len()).max(1));
+        let best = distinct(self.query, self.map.spacing, &candidates, REFINED);
         let hypotheses = self.refined(&best);
         findings.log.refined += hypotheses.len();
         self.grow_distinct(&hypotheses, findings);
@@ -86,13 +85,12 @@ impl<'a> Search<'a> {
         let (mut contenders, mut effort) = (Vec::new(), Effort::default());
         for some in seeds.chunks(AT_ONCE) {
             let of_each: Vec<(Vec<Contender>, Effort)> = some.par_iter().map(of_seed).collect();
-            for (found, spent) in of_each {
-                contenders.extend(found);
-                effort = effort + spent;
-            }
-            if effort.candidates > ENOUGH {
+            let before = effort.candidates;
+            effort = of_each.iter().fold(effort, |sum, &(_, spent)| sum + spent);
+            if effort.candidates - before > ANY * some.len() as u64 {
                 break;
             }
+            contenders.extend(of_each.into_iter().flat_map(|(found, _)| found));
         }
         (contenders, effort)
     }

@@ -26,12 +26,29 @@ pub(super) const REFINED: usize = 48;
 /// The best `keep` candidates of those given best first, one of each pose.
 pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Contender], keep: usize) -> Vec<Contender> {
     let (spacings, turn_rad) = SAME;
-    first_of_each(candidates.iter().copied(), keep, |candidate, other| {
+    let same = |candidate: &Contender, other: &Contender| {
         let place = candidate.place;
         (place - other.place).norm() < query.spacing
             && (candidate.pose.image(&place) - other.pose.image(&place)).norm() < spacings * map_spacing
             && candidate.pose.turn_to(&other.pose) < turn_rad
-    })
+    };
+    // Entries of rotations differ by no more than the angle between them: the same pose lies in this cell or one beside it.
+    let across = (2.0 / turn_rad) as usize + 3;
+    let mut kept: Vec<Contender> = Vec::new();
+    let mut cells: Vec<Vec<usize>> = vec![Vec::new(); across * across];
+    for candidate in candidates {
+        if kept.len() == keep {
+            break;
+        }
+        let rotation = candidate.pose.rotation.matrix();
+        let [row, column] = [rotation[(0, 0)], rotation[(1, 2)]].map(|entry| ((entry + 1.0) / turn_rad) as usize + 1);
+        let mut near = (row - 1..=row + 1).flat_map(|row| &cells[row * across + column - 1..=row * across + column + 1]);
+        if !near.any(|cell| cell.iter().any(|&other| same(candidate, &kept[other]))) {
+            cells[row * across + column].push(kept.len());
+            kept.push(*candidate);
+        }
+    }
+    kept
 }
 
 /// The first `most` of those that are not the `same` as one before.
