@@ -117,16 +117,20 @@ def test_what_cannot_be_is_one_line(
 @pytest.mark.parametrize(
     ("dates", "said"),
     [
-        (("2004-06-14", "2024-06-29"), "found visits from 2004-06-14 to 2024-06-29, expected those of one season"),
-        (("0224-06-14", "2024-06-29"), "found a visit on 0224-06-14, expected a year from 1900 to 2199"),
+        (
+            ("2024-01-05", "2024-05-05", "2024-08-25"),
+            "found visits from 2024-01-05 to 2024-08-25, expected those of one season",
+        ),
+        (("2004-06-14", "2024-06-29"), "one day"),
+        (("0224-06-14", "0224-06-29"), "found a visit on 0224-06-14, expected a year from 1900 to 2199"),
         (("0001-01-01", "0001-01-16"), "found a visit on 0001-01-01, expected a year from 1900 to 2199"),
         (("9999-12-01", "9999-12-31"), "found a visit on 9999-12-01, expected a year from 1900 to 2199"),
     ],
 )
-def test_visits_of_several_seasons_are_no_growth(
-    pomona: Pomona, tmp_path: Path, dates: tuple[str, str], said: str
+def test_visits_that_are_not_of_one_season_are_no_growth(
+    pomona: Pomona, tmp_path: Path, dates: tuple[str, ...], said: str
 ) -> None:
-    path = grow_row(tmp_path / "o.gpkg", days=(50, 65), n_trees=1).path
+    path = grow_row(tmp_path / "o.gpkg", days=(50, 65, 80)[: len(dates)], n_trees=1).path
     with closing(geopackage.connect(path)) as connection, connection:
         sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
         connection.executemany("UPDATE sessions SET date = ? WHERE id = ?", zip(dates, sessions, strict=True))

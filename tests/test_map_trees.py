@@ -269,6 +269,28 @@ def test_a_map_keeps_its_trees_when_visits_come_and_go(tmp_path: Path, spindles:
     assert problems(path) == []
 
 
+def test_rows_that_are_parts_of_a_map_are_told_each_by_itself(
+    tmp_path: Path, spindles: tuple[np.ndarray, np.ndarray]
+) -> None:
+    """How they lie to each other nobody knows: each is turned as its camera began."""
+    path, places = tmp_path / "orchard.gpkg", spindles[0]
+    other, _ = grown_row("spindle", 6, 1.5, 8)
+    crosswise = other @ Rotation.from_euler("z", 70, degrees=True).as_matrix().T
+    alone = []
+    for number, row in enumerate((places, crosswise)):
+        session = dataclasses.replace(visit(row, "2024-08-01"), name=f"row {number}", trajectory=None)
+        add_session(tmp_path / f"{number}.gpkg", session)
+        alone += find_trees(tmp_path / f"{number}.gpkg")
+        assert add_session(path, session, new_part=True).is_added
+    told = find_trees(path)
+    assert [(row.kind, row.n_fruits, len(row.trees)) for row in told] == [
+        (row.kind, row.n_fruits, len(row.trees)) for row in alone
+    ]
+    assert [row.spacing_m for row in told] == pytest.approx([row.spacing_m for row in alone], rel=1e-6)
+    names = bearing_trees(OrchardMap(path).fruits()).names
+    assert len(names) == sum(len(row.trees) for row in alone)
+
+
 def test_drawn_and_given_trees_are_taken_as_they_are(tmp_path: Path) -> None:
     places, trees = grown_row("wall", 4, 2.0, 3)
     path = tmp_path / "orchard.gpkg"

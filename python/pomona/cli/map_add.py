@@ -116,6 +116,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "n_parts": 0 if match is None else match.n_parts,
         "torn_near": list(added.torn_near),
         "torn_like": added.torn_like,
+        "season_before": added.season_before,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
         "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}
@@ -138,6 +139,11 @@ def _added_as_text(visit: Session, added: Added) -> str:
         return f"{visit.name}: {match.status.value}, not found in the map, which stays as it was"
     if match.status.value != "Found":
         return f"{visit.name}: {match.status.value}, starts a part of its own with {amount(added.n_new, 'fruit')}"
+    if added.season_before is not None:
+        return (
+            f"{visit.name}: first visit of its season, found by where fruits hung until {added.season_before[:10]}: "
+            f"{amount(added.n_new, 'new fruit')}, for none outlives the winter{_torn_as_text(added)}"
+        )
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
         f"{added.n_missed} in view and not seen{_torn_as_text(added)}"

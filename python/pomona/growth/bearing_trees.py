@@ -74,8 +74,9 @@ def _found(cloud: FruitCloud) -> list[str]:
     unsaid = ("",) * len(cloud)
     states, chances = (cloud.extras.get(name, unsaid) for name in ("state", "fruit_probability"))
     telling = np.flatnonzero(tell_trees(states, [float(chance) if chance else None for chance in chances]))
-    names, ways = [""] * len(cloud), cloud.ways if isinstance(cloud, FruitsInMap) else ()
-    for fruit, name in zip(telling.tolist(), tree_names(cloud.positions[telling], ways), strict=True):
+    names = [""] * len(cloud)
+    parts, ways = (cloud.parts, cloud.ways) if isinstance(cloud, FruitsInMap) else (np.zeros(len(cloud), np.int64), {})
+    for fruit, name in zip(telling.tolist(), tree_names(cloud.positions[telling], parts[telling], ways), strict=True):
         names[fruit] = name
     return names
 

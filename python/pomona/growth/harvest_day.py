@@ -6,7 +6,7 @@ from datetime import date, datetime
 
 from pomona.calendar_days import expected_day
 from pomona.errors import PomonaError
-from pomona.growth.measured import SEASON_DAYS
+from pomona.identity import SEASON_DAYS
 from pomona.reading import shown
 
 __all__ = ["harvest_after", "harvest_day"]

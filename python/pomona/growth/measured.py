@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from pathlib import Path
@@ -14,16 +14,14 @@ from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.growth.bearing_trees import BearingTrees, bearing_trees
 from pomona.growth.whole_fruits import whole_fruits
-from pomona.orchard import Observations, OrchardMap
+from pomona.identity import SEASON_DAYS, seasons_of
+from pomona.orchard import Observations, OrchardMap, Visit
 from pomona.orchard.hanging import are_things, fruit_chances, hang_chances, may_hang
 
-__all__ = ["SEASON_DAYS", "MeasuredFruits", "measured_fruits", "require_one_season", "require_two_days"]
+__all__ = ["MeasuredFruits", "measured_fruits", "require_one_season", "require_two_days"]
 
 SIZES_MM = (1.0, 1000.0)
 """No fruit is smaller or larger: what says so is no measurement."""
-
-SEASON_DAYS = 200
-"""From bloom to the last harvest: a later day is one of another season, of which the curves know nothing."""
 
 _YEARS = (1900, 2199)
 """Of recordings: another year is a slip of the pen or of a clock, and pictures have no calendar for the outermost."""
@@ -105,7 +103,7 @@ class MeasuredFruits:
 
 
 def measured_fruits(path: str | Path) -> MeasuredFruits:
-    """Read the sizes of a map's fruits; visits and fruits without any diameter are left out.
+    """Read the sizes of a map's fruits of its last season; visits and fruits without any diameter are left out.
 
     Raises
     ------
@@ -115,14 +113,19 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
     orchard = OrchardMap(path)
     if orchard.kind != "map":
         raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
-    cloud, seen, visits = orchard.fruits(), orchard.observations(), orchard.visits()
+    visits = _of_last_season(orchard.visits())
     names = tuple(visit.name for visit in visits)
+    seen = orchard.observations().of_sessions(names)
+    everything = orchard.fruits()
+    in_season = np.isin(np.array(list(map(int, everything.ids or ())), dtype=np.int64), seen.fruit_ids)
+    # Where trees stand fruits of all seasons tell.
+    trees = bearing_trees(everything).select(np.flatnonzero(in_season))
+    cloud = everything.select(in_season)
     ids = np.array(list(map(int, cloud.ids or ())), dtype=np.int64)
     diameters_mm, labels = _table(ids, names, seen)
     known = ~np.isnan(diameters_mm)
     if not known.any():
         raise PomonaError(f"{path}: found no diameters, expected sessions that measured them")
-    trees = bearing_trees(cloud)
     measured = known.any(axis=0)
     fruits, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(measured)
     # Visits of one moment by their names: the map has them in the order in which they were added.
@@ -142,6 +145,14 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         days_without_sizes=tuple(sorted(without)),
         unmeasured=_unmeasured(cloud, trees, fruits),
     )
+
+
+def _of_last_season(visits: Sequence[Visit]) -> list[Visit]:
+    """Return the visits after the last winter, in their order."""
+    ordered = sorted(visits, key=lambda visit: datetime.fromisoformat(visit.date))
+    days = np.array([datetime.fromisoformat(visit.date).toordinal() for visit in ordered], np.float64)
+    of_season = {visit.name for visit in ordered[seasons_of(days)[-1]]}
+    return [visit for visit in visits if visit.name in of_season]
 
 
 def _unmeasured(cloud: FruitCloud, trees: BearingTrees, measured: NDArray[np.int64]) -> dict[str, float]:

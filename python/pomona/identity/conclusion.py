@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, looks_of
+from pomona.identity.seasons import seasons_of
 from pomona.identity.still_things import still_chances
 from pomona.identity.stretches import LIKELY
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
@@ -62,7 +64,8 @@ def conclude(
 ) -> Conclusion:
     """Say who is who, from all visits of a part of the orchard at once.
 
-    Nothing here depends on the order in which the visits came; only the frame of the map does.
+    Nothing here depends on the order in which the visits came; only the frame of the map does. Visits of another season
+    say where a visit lies, and nothing of its fruits (`seasons_of`).
 
     Parameters
     ----------
@@ -74,22 +77,22 @@ def conclude(
         As for `frames_of_visits`.
     """
     sights = all_sights(visits)
-    links = links_of(sights, pairs)
+    seasons = seasons_of(sights.days)
+    season_of = np.repeat(np.arange(len(seasons)), [one.stop - one.start for one in seasons])
+    links = links_of(sights, [pair for pair in pairs if season_of[pair.first] == season_of[pair.second]])
     labels = _core.contracted(sights.visits, len(visits), links.sights, links.log_odds, links.matched)
     frames = frames_of_visits(visits, pairs, known, keepers)
     positions = np.concatenate(
         [visit.positions @ frame[:3, :3].T + frame[:3, 3] for visit, frame in zip(visits, frames, strict=True)]
     )
+    fates: list[_Fates] = []
+    for season in seasons:
+        rows, n_before = sights.rows_of(season), sum(len(each.states) for each in fates)
+        own = np.unique(labels[rows], return_inverse=True)[1]
+        fates.append(_fates(visits[season], sights.of(season), own, positions[rows], frames[season]))
+        labels[rows] = own + n_before
+    looks, lives, states, state_probabilities = _of_all(fates)
     before = _sights_before(labels)
-    looks = looks_of(visits, sights, labels, positions, frames)
-    # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
-    # says how much leaves hide, or how many go elsewhere.
-    lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)
-    places = _middles(labels, positions)
-    still = still_chances(_log_sizes(sights, labels, frames), sights.days, 1.0 - lives.gone, places)
-    lives = lives.with_still(still)
-    looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
-    states, state_probabilities = states_of(looks.seen, looks.in_view, lives)
     return Conclusion(
         sights=sights,
         labels=labels,
@@ -102,6 +105,46 @@ def conclude(
         states=states,
         state_probabilities=state_probabilities,
     )
+
+
+class _Fates(NamedTuple):
+    """What became of the fruits of a season."""
+
+    looks: Looks
+    lives: Lives
+    states: list[str]
+    state_probabilities: NDArray[np.float64]
+
+
+def _fates(
+    visits: Sequence[SeenVisit],
+    sights: Sights,
+    labels: NDArray[np.int64],
+    positions: NDArray[np.float64],
+    frames: NDArray[np.float64],
+) -> _Fates:
+    """Say what became of the fruits of a season by its last visit."""
+    looks = looks_of(visits, sights, labels, positions, frames)
+    # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
+    # says how much leaves hide, or how many go elsewhere.
+    lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)
+    places = _middles(labels, positions)
+    still = still_chances(_log_sizes(sights, labels, frames), sights.days, 1.0 - lives.gone, places)
+    lives = lives.with_still(still)
+    looks = replace(looks, in_view=looks.in_view | (looks.emptied > LIKELY))
+    return _Fates(looks, lives, *states_of(looks.seen, looks.in_view, lives))
+
+
+def _of_all(seasons: Sequence[_Fates]) -> _Fates:
+    """Put the fruits of all seasons together: those of the seasons before the last are gone."""
+    *past, last = seasons
+    if not past:
+        return last
+    gone = [np.ones(len(each.states)) for each in past]
+    lives = Lives(np.concatenate([*gone, last.lives.gone]), np.concatenate([each.lives.false for each in seasons]))
+    states = ["gone" for each in past for _ in each.states] + last.states
+    looks = Looks.of_seasons([each.looks for each in seasons])
+    return _Fates(looks, lives, states, np.concatenate([*gone, last.state_probabilities]))
 
 
 def _log_sizes(sights: Sights, labels: NDArray[np.int64], frames: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -144,8 +144,9 @@ def _climbed(
 
     bounds = odds.bounds(alike=alike)
     # A step remembered for each setting: settings hang together, and with ten steps it takes twice as many looks.
-    options = {"ftol": 1e-8, "maxcor": len(told)}
-    top = minimize(odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    top = minimize(
+        odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8, "maxcor": len(told)}
+    )
     belief = SHARE_FALSE * BELIEF_FALSE * np.log(share) + ((1.0 - SHARE_FALSE) * BELIEF_FALSE - 1.0) * np.log1p(-share)
     return float(belief - top.fun - odds.room(top.x, share)), top.x
 

@@ -74,6 +74,24 @@ class Looks:
     went_by: NDArray[np.bool_]
     about: NDArray[np.int64]
 
+    @classmethod
+    def of_seasons(cls, seasons: Sequence[Looks]) -> Looks:
+        """Put seasons one after the other: none of them looked at the fruits of another."""
+        n_fruits, n_visits = np.sum([one.seen.shape for one in seasons], axis=0).tolist()
+        seen, in_view, by = np.zeros((3, n_fruits, n_visits), bool)
+        views, emptied = np.zeros((2, n_fruits, n_visits))
+        towards = np.full((n_fruits, n_visits, 3), np.nan)
+        n_about = min(one.about.shape[1] for one in seasons)
+        about, fruit, visit = [], 0, 0
+        for one in seasons:
+            of = np.s_[fruit : fruit + one.seen.shape[0], visit : visit + one.seen.shape[1]]
+            seen[of], in_view[of], by[of] = one.seen, one.in_view, one.went_by
+            views[of], emptied[of], towards[of] = one.views, one.emptied, one.towards
+            about.append(one.about[:, :n_about] + fruit)
+            fruit, visit = of[0].stop, of[1].stop
+        is_counted = np.concatenate([one.is_counted for one in seasons])
+        return cls(seen, in_view, views, towards, is_counted, emptied, by, np.concatenate(about))
+
 
 def looks_of(
     visits: Sequence[SeenVisit],

@@ -95,6 +95,21 @@ class Sights:
     def __len__(self) -> int:
         return len(self.visits)
 
+    def rows_of(self, visits: slice) -> slice:
+        """Return the rows of some visits that follow each other."""
+        ends = [*self.starts.tolist(), len(self)]
+        return slice(ends[visits.start], ends[visits.stop])
+
+    def of(self, visits: slice) -> Sights:
+        """Return the sights of some visits that follow each other, numbered from the first of these."""
+        rows = self.rows_of(visits)
+        return Sights(
+            visits=self.visits[rows] - visits.start,
+            starts=self.starts[visits] - rows.start,
+            log_sizes=self.log_sizes[rows],
+            days=self.days[visits],
+        )
+
 
 def all_sights(visits: Sequence[SeenVisit]) -> Sights:
     """Lay the sights of all visits in one row."""

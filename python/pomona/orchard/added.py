@@ -56,3 +56,4 @@ class Added:
     torn_near: tuple[str, ...] = ()
     torn_like: str | None = None
     was_there: bool = False
+    season_before: str | None = None

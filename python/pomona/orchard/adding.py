@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pomona.atomic import NoLinksError, new_file
 from pomona.errors import PomonaError
-from pomona.identity import VisitPair
+from pomona.identity import VisitPair, seasons_of
 from pomona.orchard.added import Added
 from pomona.orchard.evidence import Evidence, new_visit
 from pomona.orchard.joining import Newcomer, join
@@ -23,7 +23,7 @@ from pomona.orchard.removing import take_out
 from pomona.orchard.replacing import NotFoundError, holds, there_already
 from pomona.orchard.seen_parts import SeenPart, matches_with_parts, seen_parts
 from pomona.orchard.session import Session
-from pomona.orchard.settling import Settlement, write_changes
+from pomona.orchard.settling import SettledPart, Settlement, write_changes
 from pomona.orchard.tears import beside_tears, torn_alike
 from pomona.orchard.visit_days import require_visit_day
 from pomona.orchard.writing import Placement
@@ -292,7 +292,14 @@ def _told(settlement: Settlement, session_id: int) -> Added:
         match=None,
         is_added=True,
         changes=tuple(settlement.changes),
+        season_before=_season_before(part, own),
     )
+
+
+def _season_before(part: SettledPart, own: int) -> str | None:
+    """Return when the season before ended for the part, where a visit is the first one after it."""
+    begins = [season.start for season in seasons_of(part.conclusion.sights.days)]
+    return part.evidence.visits[own - 1].date if own and own in begins else None
 
 
 def require_new(connection: sqlite3.Connection, session: Session, content: str) -> None:

@@ -17,6 +17,7 @@ from pomona.errors import PomonaError, PomonaWarning
 from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.hanging import tell_trees
+from pomona.orchard.parts import part_numbers
 from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
 from pomona.orchard.writing import update_layers
 from pomona.store.cells import finite_json
@@ -24,7 +25,7 @@ from pomona.store.opening import TIMEOUT_S, Waiting, writing
 from pomona.store.rows import columns_of
 from pomona.tree_rows import Crowns, Planting, RowLine, planting_at
 from pomona.tree_rows.numbering_of_trees import UNNUMBERED, numbers_along, same_trees
-from pomona.tree_rows.told_rows import told_rows
+from pomona.tree_rows.told_rows import rows_of_parts
 from pomona.tree_rows.tree_spacing import SPACINGS_M
 
 __all__ = ["TreeRow", "find_trees"]
@@ -69,7 +70,8 @@ class _Fruits:
     ids: NDArray[np.int64]
     positions: NDArray[np.float64]
     believed: NDArray[np.bool_]
-    ways: tuple[NDArray[np.float64], ...]
+    parts: NDArray[np.int64]
+    ways: Mapping[int, Sequence[NDArray[np.float64]]]
 
 
 def find_trees(
@@ -157,7 +159,8 @@ class _Finding:
 
     def rows(self) -> list[TreeRow]:
         believed = np.flatnonzero(self.fruits.believed)
-        rows = told_rows(self.fruits.positions[believed], self.fruits.ways, self.spacing_m)
+        fruits = self.fruits
+        rows = rows_of_parts(fruits.positions[believed], fruits.parts[believed], fruits.ways, self.spacing_m)
         self._require_beside([line for line, _ in rows])
         bear(self.connection, self.fruits.ids, np.zeros(len(self.fruits.ids), np.int64), None)
         told = [self._row(line, planting, believed[line.members]) for line, planting in rows]
@@ -284,12 +287,15 @@ def _in_segments(line: RowLine, crowns: Crowns) -> tuple[NDArray[np.int64], NDAr
 
 
 def _fruits(connection: sqlite3.Connection) -> _Fruits:
-    ids, geoms, states, chances = columns_of(connection, "fruits", ("id", "geom", "state", "fruit_probability"))
+    names = ("id", "geom", "state", "fruit_probability", "last_session_id")
+    ids, geoms, states, chances, last_sessions = columns_of(connection, "fruits", names)
+    part_of = part_numbers(connection)
     return _Fruits(
         ids=np.array(ids, np.int64),
         positions=geopackage.points_of(geoms),
         believed=tell_trees(states, chances),
-        ways=camera_ways(connection),
+        parts=np.array([part_of.get(session, 0) for session in last_sessions], np.int64),
+        ways=camera_ways(connection, part_of),
     )
 
 

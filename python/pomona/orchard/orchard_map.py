@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
@@ -21,6 +21,7 @@ from pomona.earth import Anchor
 from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.earth_layers import stored_anchor
 from pomona.orchard.fruit_ids import Change
+from pomona.orchard.parts import part_numbers
 from pomona.store.cells import finite_json
 from pomona.store.failures import told
 from pomona.store.opening import snapshot
@@ -97,6 +98,19 @@ class Observations:
         n_fruits, n_sessions = len(set(self.fruit_ids.tolist())), len(set(self.sessions))
         return f"Observations({len(self)} of {amount(n_fruits, 'fruit')} in {amount(n_sessions, 'session')})"
 
+    def of_sessions(self, names: Container[str]) -> Observations:
+        """Return what these sessions saw."""
+        rows = [row for row, name in enumerate(self.sessions) if name in names]
+        return Observations(
+            fruit_ids=self.fruit_ids[rows],
+            sessions=tuple(self.sessions[row] for row in rows),
+            dates=tuple(self.dates[row] for row in rows),
+            labels=tuple(self.labels[row] for row in rows),
+            positions_in_map=self.positions_in_map[rows],
+            diameters_m=self.diameters_m[rows],
+            probabilities=self.probabilities[rows],
+        )
+
     def columns(self) -> dict[str, Any]:
         """Return them as a long table: fruit, session, date, label, x, y, z, diameter_m, probability."""
         return {
@@ -145,18 +159,24 @@ class FruitsInMap(FruitCloud):
 
     Attributes
     ----------
-    ways : tuple of (F, 3) float64
-        Where cameras went, in the frame of the fruits, for each session that knows it.
+    parts : (N,) int64
+        Part of the map that each fruit is of: how parts lie to each other nobody knows.
+    ways : mapping of int to sequence of (F, 3) float64
+        Where cameras went, in the frame of the fruits, for each session of a part that knows it.
     """
 
-    ways: tuple[NDArray[np.float64], ...] = ()
+    parts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    ways: Mapping[int, Sequence[NDArray[np.float64]]] = field(default_factory=dict)
 
     def transformed(self, map_from_query: ArrayLike) -> FruitsInMap:
         """Return fruits and ways in another frame, as `FruitCloud.transformed` does."""
         moved = super().transformed(map_from_query)
         assert isinstance(moved, FruitsInMap)
         transform = np.asarray(map_from_query, np.float64)
-        return replace(moved, ways=tuple(way @ transform[:3, :3].T + transform[:3, 3] for way in self.ways))
+        ways = {
+            part: [way @ transform[:3, :3].T + transform[:3, 3] for way in driven] for part, driven in self.ways.items()
+        }
+        return replace(moved, ways=ways)
 
 
 class OrchardMap:
@@ -215,7 +235,11 @@ class OrchardMap:
     def fruits(self) -> FruitsInMap:
         """Return every fruit where it was last seen, with its identity as id."""
         with self._reading() as connection:
-            return fruits_in_map(connection, partial(FruitsInMap, ways=camera_ways(connection)))
+            part_of = part_numbers(connection)
+            (last_sessions,) = columns_of(connection, "fruits", ("last_session_id",))
+            parts = np.array([part_of.get(session, 0) for session in last_sessions], np.int64)
+            ways = camera_ways(connection, part_of)
+            return fruits_in_map(connection, partial(FruitsInMap, parts=parts, ways=ways))
 
     @property
     def cloud(self) -> FruitCloud:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pomona.store.failures import WrongContentError
 from pomona.store.rows import columns_of
 
-__all__ = ["components", "parts_of_map", "parts_with"]
+__all__ = ["components", "part_numbers", "parts_of_map", "parts_with"]
 
 
 def components(members: Sequence[int], pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -34,6 +34,11 @@ def parts_of_map(connection: sqlite3.Connection) -> list[list[int]]:
         if not known.issuperset(sessions):
             raise WrongContentError(f"matches {match_id}: points to a row of sessions that is not there")
     return components(session_ids, ((first, second) for _, first, second in matches))
+
+
+def part_numbers(connection: sqlite3.Connection) -> dict[int, int]:
+    """Return the number of the part of each session."""
+    return {session_id: number for number, part in enumerate(parts_of_map(connection)) for session_id in part}
 
 
 def parts_with(connection: sqlite3.Connection, session_ids: Iterable[int]) -> list[int]:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Collection, Container, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from pomona import _core
 from pomona.cloud import FruitCloud
-from pomona.identity import VisitPair
+from pomona.identity import VisitPair, seasons_of
 from pomona.orchard.evidence import Evidence, KnownVisit
 from pomona.orchard.hanging import may_hang
 from pomona.settings import Settings
@@ -86,7 +87,8 @@ def recognised(
 ) -> Recognised:
     """Look for a session in the map, or among the fruits that some sessions of it saw last.
 
-    In a large one among the fruits where it seems to lie; among all of them where it is not found there.
+    In a large one among the fruits where it seems to lie, and among all of them where it is not found there; then among
+    those of seasons before, as the first visit of this season to a stretch may be.
     """
     asked = "" if among is None else one_of("last_session_id", among)
     nearby = _nearby(connection, cloud, settings, asked)
@@ -96,16 +98,29 @@ def recognised(
         if found.is_found:
             return found
     ids = columns_of(connection, "fruits", ("id",), asked)[0] if asked else None
-    known = worth_recognising(fruits_in_map(connection, FruitCloud, ids))
-    if not len(known):
+    fruits = fruits_in_map(connection, FruitCloud, ids)
+    if not len(fruits):
         raise WrongContentError("has sessions and no fruits, expected at least one")
-    return Recognised(settings.match(cloud, known), known)
+    known = worth_recognising(fruits)
+    found = Recognised(settings.match(cloud, known), known)
+    before = fruits.select(_are_of_seasons_before(fruits))
+    if found.is_found or not len(before):
+        return found
+    earlier = Recognised(settings.match(cloud, before), before)
+    return earlier if earlier.is_found else found
 
 
 def worth_recognising(fruits: FruitCloud) -> FruitCloud:
     """Return the fruits that may still hang: those gone, and what never was a fruit, only look like others."""
     hanging = may_hang(fruits)
     return fruits.select(hanging) if hanging.any() else fruits
+
+
+def _are_of_seasons_before(fruits: FruitCloud) -> NDArray[np.bool_]:
+    """Tell the fruits of a map, (N,), that a winter took."""
+    last_seen = [datetime.fromisoformat(day).toordinal() for day in fruits.extras["last_seen"]]
+    days, of_day = np.unique(last_seen, return_inverse=True)
+    return np.asarray(of_day < seasons_of(days)[-1].start)
 
 
 def _nearby(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings, asked: str) -> list[int]:

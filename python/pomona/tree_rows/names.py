@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.tree_rows.told_rows import told_rows
+from pomona.tree_rows.told_rows import rows_of_parts
 
 __all__ = ["tree_name", "tree_names"]
 
@@ -17,10 +17,12 @@ def tree_name(row: int, n_rows: int, number: int) -> str:
     return str(number) if n_rows == 1 else f"{row}-{number}"
 
 
-def tree_names(positions: NDArray[np.float64], ways: Sequence[NDArray[np.float64]] = ()) -> tuple[str, ...]:
-    """Return the tree of each fruit, (N,), blank where none can be told; `ways` as for `told_rows`."""
+def tree_names(
+    positions: NDArray[np.float64], parts: NDArray[np.int64], ways: Mapping[int, Sequence[NDArray[np.float64]]]
+) -> tuple[str, ...]:
+    """Return the tree of each fruit, (N,), blank where none can be told; `parts` and `ways` as for `rows_of_parts`."""
     names = np.full(len(positions), "", dtype=object)
-    lines = told_rows(positions, ways)
+    lines = rows_of_parts(positions, parts, ways)
     for row, (line, planting) in enumerate(lines, 1):
         bearers, _ = planting.bearers(line.along_m, line.beside_m)
         told = bearers >= 0

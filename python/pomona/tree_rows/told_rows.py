@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,36 @@ from numpy.typing import NDArray
 from pomona.tree_rows.row_lines import RowLine, row_lines
 from pomona.tree_rows.tree_spacing import Planting, planting_of
 
-__all__ = ["told_rows"]
+__all__ = ["rows_of_parts", "told_rows"]
 
 ToldRows = list[tuple[RowLine, Planting]]
 
 SAME_WAY = 0.966
 """Cosine of the angle, 15 degrees, within which two directions are two measurements of one row's."""
+
+
+def rows_of_parts(
+    positions: NDArray[np.float64],
+    parts: NDArray[np.int64],
+    ways: Mapping[int, Sequence[NDArray[np.float64]]],
+    spacing_m: float | None = None,
+) -> ToldRows:
+    """Return the rows of fruits of a map, part by part: how parts lie to each other nobody knows.
+
+    Parameters
+    ----------
+    positions : (N, 3) float64
+    parts : (N,) int64
+    ways : mapping of int to sequence of (F, 3) float64
+        As in `told_rows`, by part.
+    spacing_m : float, optional
+    """
+    rows: ToldRows = []
+    for part in np.unique(parts).tolist():
+        own = np.flatnonzero(parts == part)
+        told = told_rows(positions[own], ways.get(part, ()), spacing_m)
+        rows += [(replace(line, members=own[line.members]), planting) for line, planting in told]
+    return rows
 
 
 def told_rows(
