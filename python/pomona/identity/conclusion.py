@@ -15,7 +15,7 @@ from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, looks_of
-from pomona.identity.seasons import seasons_of
+from pomona.identity.winters import seasons_of
 from pomona.identity.still_things import still_chances
 from pomona.identity.stretches import LIKELY
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
