@@ -15,10 +15,11 @@ from pomona.identity.histories import histories_of
 from pomona.identity.links import Links, links_of
 from pomona.identity.lives import Lives, lives_of, states_of
 from pomona.identity.looks import Looks, looks_of
-from pomona.identity.winters import seasons_of
+from pomona.identity.sides import sided
 from pomona.identity.still_things import still_chances
 from pomona.identity.stretches import LIKELY
 from pomona.identity.visits import SeenVisit, Sights, VisitPair, all_sights
+from pomona.identity.winters import seasons_of
 
 __all__ = ["Conclusion", "conclude"]
 
@@ -124,7 +125,7 @@ def _fates(
     frames: NDArray[np.float64],
 ) -> _Fates:
     """Say what became of the fruits of a season by its last visit."""
-    looks = looks_of(visits, sights, labels, positions, frames)
+    looks = sided(looks_of(visits, sights, labels, positions, frames), sights.days)
     # Histories tell of fruits that go one by one. A stretch that was emptied has a fate of its own, and none of it
     # says how much leaves hide, or how many go elsewhere.
     lives = lives_of(histories_of(looks, sights.days)).with_emptied(looks.emptied)

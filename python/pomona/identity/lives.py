@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.identity.histories import Histories, HistoryOdds
 
-__all__ = ["SHARE_FALSE", "Lives", "lives_of", "states_of"]
+__all__ = ["SHARE_FALSE", "UNEVEN", "Lives", "explained", "lives_of", "states_of"]
 
 SHARE_FALSE = 0.05
 """Of a visit's points that are no fruits: what is believed before the season says its own."""
@@ -91,15 +92,8 @@ def lives_of(histories: Histories) -> Lives:
     likely it makes what was seen at the chances of seeing and the shares of going that explain it best (`HistoryOdds`).
     In how many frames false points are seen is summed over, too: what fits best fits many of them better by chance.
     """
-    import scipy.optimize  # noqa: F401 - only what is loaded can be limited
-    from threadpoolctl import threadpool_limits
-
     odds = HistoryOdds(histories)
-    # L-BFGS-B asks BLAS for matrices of ten rows: threads that wait for each other cost more than they bring.
-    with threadpool_limits(1, user_api="blas"):
-        ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
-    if max(map(_best, uneven)) - max(map(_best, ways)) > UNEVEN:
-        ways = uneven
+    ways, _ = _best_ways(odds)
     gone, false = np.zeros(len(histories.seen)), np.zeros(len(histories.seen))
     for fits, weights in zip(ways, _weights(ways), strict=True):
         for number, weight in weights.items():
@@ -107,6 +101,32 @@ def lives_of(histories: Histories) -> Lives:
             gone += weight * gone_then
             false += weight * false_then
     return Lives(gone, false)
+
+
+def explained(histories: Histories, *, at_a_glance: bool = False) -> float:
+    """Return how well all is explained by what explains it best, nats; or by the usual share of false points alone."""
+    odds = HistoryOdds(histories)
+    if not at_a_glance:
+        return _best_ways(odds)[1]
+    with _one_thread():
+        return _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start(), alike=True)[0]
+
+
+def _one_thread() -> AbstractContextManager[object]:
+    """L-BFGS-B asks BLAS for small matrices: threads that wait for each other cost more than they bring."""
+    import scipy.optimize  # noqa: F401 - only what is loaded can be limited
+    from threadpoolctl import threadpool_limits
+
+    limited: AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
+    return limited
+
+
+def _best_ways(odds: HistoryOdds) -> tuple[list[Fits], float]:
+    """Return what fits best, of visits that are alike or, where that explains far more, that differ; and how well."""
+    with _one_thread():
+        ways, uneven = (_ways(odds, alike=alike) for alike in (True, False))
+    best, best_uneven = (max(map(_best, each)) for each in (ways, uneven))
+    return (uneven, best_uneven - UNEVEN) if best_uneven - best > UNEVEN else (ways, best)
 
 
 def _ways(odds: HistoryOdds, *, alike: bool) -> list[Fits]:
