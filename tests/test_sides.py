@@ -49,7 +49,7 @@ def test_a_visit_from_the_other_side_neither_takes_nor_makes_fruits(sides: str, 
     assert counted(told) == pytest.approx(N_FRUITS, rel=0.1)
 
 
-@pytest.mark.parametrize("sides", ["AAB", "ABA", "AAAB", "ABBA", "AABBABAB"])
+@pytest.mark.parametrize("sides", ["AAAB", "ABBA", "ABAB", "AABBABAB"])
 def test_visits_of_one_side_are_told_by_what_they_see_alike(sides: str) -> None:
     looks = from_sides(sides, np.random.default_rng(3))
     told = sided(looks, 14.0 * np.arange(len(sides)))
