@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from growth_maker import HARVEST, GrownRow, grow_row, rows_of
+from growth_maker import FRUITS_OF_TREE, HARVEST, GrownRow, grow_row, rows_of
 from pomona.growth.bearing_trees import BearingTrees
 from pomona.growth.curve_families import FAMILIES
 from pomona.growth.fruit_order import _stretches
@@ -15,7 +15,7 @@ from pomona.growth.growth_tables import write_tables
 from pomona.growth.hierarchy import Hierarchy, Shape
 from pomona.growth.measured import measured_fruits
 from pomona.growth.mixed_quantiles import mixed_quantile
-from pomona.growth.season_growth import SeasonGrowth, growth_of
+from pomona.growth.season_growth import SeasonGrowth, grow_season, growth_of
 from pomona.growth.size_table import SizeTable
 from pomona.growth.stop_shares import StopShares
 from pomona.growth.stopped_fruits import fates, four_numbers, stopped_growth
@@ -38,6 +38,18 @@ def stopped(grown_row: GrownRow, row_growth: SeasonGrowth) -> SeasonGrowth:
 
 def _numbers(grown: SeasonGrowth) -> np.ndarray:
     return np.array([int(labels[0].split()[1]) for labels in grown.fruits.labels])
+
+
+@pytest.mark.parametrize(("slowed_from", "is_told"), [(0.0, False), (80.0, True)])
+def test_that_all_fruits_have_hardly_grown_is_told(tmp_path: Path, slowed_from: float, is_told: bool) -> None:
+    """Curves go on where one visit alone says that a whole row does not: it may be off."""
+    slow = range(3 * FRUITS_OF_TREE) if is_told else ()
+    row = grow_row(tmp_path / "o.gpkg", (50, 65, 80, 110), dropping=slow, slowed_from=slowed_from)
+    lines = [line for line in of_visits(grow_season(row.path)) if "have they stopped?" in line]
+    assert len(lines) == is_told
+    if is_told:
+        assert lines[0].startswith("fruits grew by ")
+        assert f"from {row.day(80)} to {row.day(110)} where the curves say +" in lines[0]
 
 
 def test_who_has_stopped_is_told(row_growth: SeasonGrowth, stopped: SeasonGrowth) -> None:

@@ -16,6 +16,10 @@ _SHRUNK, _LEAST = 0.9, 10
 """Size of a fruit, in the middle of so many, against the visit before, from which on it is told: scales of visits err
 by 2 %, and fruits lose less than that on a dry day."""
 
+_SLOWER, _LESS = 0.5, 0.07
+"""Share of the growth up to the last visit that curves tell, below which fruits may have stopped, and what lacks of its
+logarithm at least: two visits of which each is off by 2 % seldom hide as much."""
+
 _OFF_CURVE = 0.3
 """Logarithm of the scale of a visit from which on it is the curve that is wrong: no camera is off by a third."""
 
@@ -30,7 +34,8 @@ def of_visits(growth: SeasonGrowth) -> list[str]:
         "camera, its date?"
         for odd in growth.odd_visits
     ]
-    return [*of_late_visits(fruits, "growth is told"), *(off or _of_curve(growth)), *_of_shrunk(fruits, likely)]
+    late = of_late_visits(fruits, "growth is told")
+    return [*late, *(off or _of_curve(growth)), *_of_still(growth), *_of_shrunk(fruits, likely)]
 
 
 def _of_curve(growth: SeasonGrowth) -> list[str]:
@@ -43,6 +48,25 @@ def _of_curve(growth: SeasonGrowth) -> list[str]:
     return [
         f"sizes of {day} lie {percent:+.0f} % beside the curves, more than a camera errs: sizes and rates are not to "
         "be trusted; has part of the row stopped growing, or is it of another sort?"
+    ]
+
+
+def _of_still(growth: SeasonGrowth) -> list[str]:
+    """Say that fruits hardly grew up to the last visit where the curves go on, if so; those apart that have stopped."""
+    fruits, last = growth.fruits, len(growth.fruits.days) - 1
+    before = max((visit for visit, day in enumerate(fruits.days) if day < fruits.days[last]), default=last)
+    goes_on = np.nan_to_num(growth.stopped) < 0.5
+    grown = np.log(fruits.diameters_mm[goes_on, last] / fruits.diameters_mm[goes_on, before])
+    told = np.log(growth.foretold.sizes_mm[goes_on, last] / growth.foretold.sizes_mm[goes_on, before])
+    both = ~np.isnan(grown)
+    if before == last or both.sum() < _LEAST:
+        return []
+    by, by_curves = float(np.median(grown[both])), float(np.median(told[both]))
+    if by > min(_SLOWER * by_curves, by_curves - _LESS):
+        return []
+    return [
+        f"fruits grew by {100 * np.expm1(by):+.0f} % from {called(fruits, before)} to {called(fruits, last)} where the "
+        f"curves say {100 * np.expm1(by_curves):+.0f} %: have they stopped? what is foretold has them go on"
     ]
 
 

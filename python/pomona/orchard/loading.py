@@ -28,6 +28,10 @@ __all__ = ["load_session"]
 FEWEST_REPEATED, REPEATED = 5, 0.03
 """Fruits, and their share of all, that have one diameter which is no measurement."""
 
+INSIDE, FEWEST_INSIDE, OFTEN_INSIDE = 0.5, 10, 0.1
+"""Of their mean diameter, how near two centres are where one fruit would be inside the other; and how many fruits, and
+what share of all, may be so by the errors of their places: 5 % where these are 4 cm."""
+
 ALONE = 1.2
 """Fruits to a diameter, in the mean, where sizes are not rounded: of rounded ones many are alike."""
 
@@ -55,7 +59,8 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
     -----
     PomonaWarning
         When a column of a cloud is kept as text whose name nearly is one that counts, as `diameter_mm`; and when many
-        fruits have one diameter, to the last digit, and the others each its own: that of fruits nobody measured.
+        fruits have one diameter, to the last digit, and the others each its own: that of fruits nobody measured; and
+        when many fruits would be inside one another.
     """
     path = given_path(path)
     day = None if date is None else iso_date(date, f"{path}: date")
@@ -69,6 +74,7 @@ def load_session(path: str | Path, *, date: str | datetime.date | None = None, u
     if path.suffix.lower() != ".gpkg":
         _tell_near_names(path, session.cloud)
     _tell_repeated_diameter(path, session.cloud)
+    _tell_doubled(path, session.cloud)
     return session
 
 
@@ -121,6 +127,27 @@ def _tell_repeated_diameter(path: Path, cloud: FruitCloud) -> None:
     found = f"{counts[most]} of {len(known_m)} diameters are {values_m[most]:.6g} m exactly, and the others differ"
     expected = "expected none where nobody measured, for what does not grow is taken for no fruit"
     warnings.warn(f"{path}: {found}; {expected}", PomonaWarning, stacklevel=3)
+
+
+def _tell_doubled(path: Path, cloud: FruitCloud) -> None:
+    """Warn where fruits would be inside one another: found twice they are counted twice."""
+    from scipy.spatial import cKDTree
+
+    if cloud.diameters_m is None or np.isnan(cloud.diameters_m).all():
+        return
+    sizes_m = np.where(np.isnan(cloud.diameters_m), 0.0, cloud.diameters_m)
+    near = cKDTree(cloud.positions).query_pairs(INSIDE * float(np.quantile(sizes_m, 0.95)), output_type="ndarray")
+    apart_m = np.linalg.norm(np.diff(cloud.positions[near], axis=1)[:, 0], axis=1)
+    doubled = np.unique(near[apart_m < INSIDE * sizes_m[near].mean(axis=1)])
+    if len(doubled) < max(FEWEST_INSIDE, OFTEN_INSIDE * len(cloud)):
+        return
+    example = cloud.label(int(doubled[0]))
+    found = f"{len(doubled)} of {len(cloud)} fruits with the middle of another one inside them, as {example}"
+    warnings.warn(
+        f"{path}: found {found}; expected each fruit once, for those found twice count twice",
+        PomonaWarning,
+        stacklevel=3,
+    )
 
 
 @contextmanager
