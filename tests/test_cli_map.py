@@ -67,10 +67,10 @@ def test_info_keeps_its_columns_whatever_a_session_is_called(tmp_path: Path) -> 
     add_session(path, Session(long, "2024-08-01", "drawn", few))
     add_session(path, Session("b", "2024-09-01", "drawn", many), new_part=True)
     header, *rows = run("info", path).stdout.splitlines()[3:]
-    assert [header.split(), *(row.split()[:6] for row in rows)] == [
-        ["date", "fruits", "matched", "new", "method", "noise", "session"],
-        ["2024-08-01", "9", "0", "9", "-", "-"],
-        ["2024-09-01", "12", "0", "12", "-", "-"],
+    assert [header.split(), *(row.split()[:7] for row in rows)] == [
+        ["part", "date", "fruits", "matched", "new", "method", "noise", "session"],
+        ["1", "2024-08-01", "9", "0", "9", "-", "-"],
+        ["2", "2024-09-01", "12", "0", "12", "-", "-"],
     ]
     names = header.index("session")
     assert [row[names:] for row in rows] == [long.rstrip(), "b"]

@@ -8,7 +8,8 @@ import pytest
 
 from orchard_maker import frame_of_its_own, who_is_who
 from pomona import FruitCloud
-from pomona.orchard import Session, add_session, problems, recognising, remove_session, seen_parts
+from pomona.growth.season_growth import grow_season
+from pomona.orchard import OrchardMap, Session, add_session, problems, recognising, remove_session, seen_parts
 from pomona.orchard.adding import _beside, _join
 from pomona.orchard.evidence import Evidence
 from pomona.orchard.parts import parts_of_map
@@ -55,6 +56,31 @@ def two_parts(path: Path, visits: list[Session]) -> Path:
 def n_parts(path: Path) -> int:
     with snapshot(path) as (connection, _):
         return len(parts_of_map(connection))
+
+
+def test_each_part_is_counted_by_itself(visits: list[Session], tmp_path: Path) -> None:
+    """By the number that the map says of its sessions."""
+    path = tmp_path / "orchard.gpkg"
+    sizes_mm = (40.0, 44.0, 60.0, 66.0)
+    days = ("2024-06-01", "2024-06-21", "2024-06-01", "2024-06-21")
+    rng = np.random.default_rng(2)
+    for number, (one, mm, day) in enumerate(
+        zip([visits[0], visits[3], visits[1], visits[1]], sizes_mm, days, strict=True)
+    ):
+        places = one.cloud.positions + rng.normal(0.0, 0.006, (len(one.cloud), 3))
+        sizes_m = 0.001 * mm * rng.lognormal(0.0, 0.05, len(places))
+        cloud = replace(one.cloud, positions=places, diameters_m=sizes_m)
+        session = Session(f"{number}", day, "test", cloud)
+        assert add_session(path, session, new_part=True).is_added
+    assert [(visit.name, visit.part) for visit in sorted(OrchardMap(path).visits(), key=lambda visit: visit.name)] == [
+        ("0", 1), ("1", 1), ("2", 2), ("3", 2)
+    ]  # fmt: skip
+    growth = grow_season(path)
+    parts = {block.name: block for block in growth.blocks if block.kind == "part"}
+    assert list(parts) == ["1", "2"]
+    assert sum(block.n_fruits for block in parts.values()) == pytest.approx(growth.blocks[0].n_fruits, abs=1)
+    now_mm = growth.foretold.sizes_mm[:, -1]
+    assert [parts[name].mean_of(now_mm) for name in ("1", "2")] == pytest.approx([44.0, 66.0], rel=0.05)
 
 
 @pytest.fixture

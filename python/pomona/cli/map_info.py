@@ -47,6 +47,7 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
             {
                 "name": visit.name,
                 "date": visit.date,
+                "part": visit.part,
                 "recording": visit.recording,
                 "n_fruits": visit.n_fruits,
                 "n_matched": visit.n_matched,
@@ -64,9 +65,10 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
 def _info_as_lines(info: dict[str, Any]) -> list[str]:
     states = ", ".join(f"{count} {state}" for state, count in info["states"].items())
     # Names come last: however long one is, the numbers stay where they are read.
-    header = ("date", "fruits", "matched", "new", "method", "noise", "session")
-    rows = [
+    header: tuple[str, ...] = ("part", "date", "fruits", "matched", "new", "method", "noise", "session")
+    rows: list[tuple[str, ...]] = [
         (
+            str(visit["part"]),
             visit["date"],
             str(visit["n_fruits"]),
             str(visit["n_matched"]),
@@ -77,6 +79,8 @@ def _info_as_lines(info: dict[str, Any]) -> list[str]:
         )
         for visit in info["sessions"]
     ]
+    if len({visit["part"] for visit in info["sessions"]}) < 2:
+        header, rows = header[1:], [row[1:] for row in rows]
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (header, *rows)]
     return [

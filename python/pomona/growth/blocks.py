@@ -23,13 +23,13 @@ HALF_A_FRUIT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The fruits that are counted together, of a tree, of a row, or all: each by its probability that it hangs.
+    """The fruits that are counted together, of a tree, a row, a part, or all: each by its probability that it hangs.
 
     Attributes
     ----------
-    kind : {"all", "row", "tree"}
+    kind : {"all", "part", "row", "tree"}
     name : str
-        Of the row or the tree; blank for all, and for the fruits of no tree.
+        Of the row or the tree, or the number of the part; blank for all, and for the fruits of no tree.
     chances : (N,) float64
         That it is a fruit, hangs, and is one of these.
     """
@@ -56,14 +56,16 @@ class Block:
 
 
 def blocks_of(fruits: MeasuredFruits) -> tuple[Block, ...]:
-    """All fruits that may hang, of each row where the map has several, of each tree, and then of no tree.
+    """All fruits that may hang, of each part and of each row where the map has several, of each tree, then of no tree.
 
     Rows and trees on which less than half a fruit is expected have none.
     """
     chances, trees = fruits.hang_chances, fruits.trees
     rows = np.array(fruits.cloud.extras.get("row", ("",) * len(chances)))
     names = sorted(set(rows.tolist()) - {""}, key=as_counted)
-    groups = [("row", name, rows == name) for name in names]
+    parts = np.unique(fruits.parts).tolist()
+    groups = [("part", str(part), fruits.parts == part) for part in (parts if len(parts) > 1 else ())]
+    groups += [("row", name, rows == name) for name in names]
     # Where no tree is known, the fruits of none are all.
     known = enumerate(trees.names if any(trees.names) else ())
     groups += [("tree", name, trees.numbers == number) for number, name in known]

@@ -50,6 +50,8 @@ class MeasuredFruits:
         The sessions' own names of the fruits.
     days_without_sizes : tuple of date
         Of visits that measured no fruit, ascending.
+    parts : (N,) int64
+        Number of the part of the map that each is of, from 1, as `Visit.part`; empty where there is one.
     unmeasured : mapping of str to float
         How many are expected to hang that no visit measured, by tree: none of the N.
     """
@@ -64,6 +66,7 @@ class MeasuredFruits:
     labels: tuple[tuple[str | None, ...], ...]
     days_without_sizes: tuple[date, ...] = ()
     unmeasured: Mapping[str, float] = field(default_factory=dict)
+    parts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
     def days(self) -> tuple[date, ...]:
@@ -144,6 +147,7 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         labels=tuple(tuple(labels[fruit, column] for column in columns) for fruit in fruits),
         days_without_sizes=tuple(sorted(without)),
         unmeasured=_unmeasured(cloud, trees, fruits),
+        parts=everything.parts[in_season][fruits] + 1,
     )
 
 

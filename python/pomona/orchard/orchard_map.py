@@ -50,6 +50,8 @@ class Visit:
         How it was matched; None for the first.
     log_odds, noise_m : float or None
         Evidence and noise of the match.
+    part : int
+        Number of the part of the map that it is of, from 1; most maps have one.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Visit:
     method: str | None
     log_odds: float | None
     noise_m: float | None
+    part: int = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,9 +255,21 @@ class OrchardMap:
         with self._reading() as connection:
             rows = zip(*columns_of(connection, "sessions", names, "ORDER BY date, id"), strict=True)
             counts = {session_id: counted for session_id, *counted in connection.execute(COUNTS)}
+            part_of = part_numbers(connection)
         return tuple(
-            Visit(name, date, recording, np.array(finite_json(transform)), *counts.get(i, (0, 0)), *about_match)
-            for i, name, date, recording, transform, *about_match in rows
+            Visit(
+                name=name,
+                date=date,
+                recording=recording,
+                map_from_session=np.array(finite_json(transform)),
+                n_fruits=counts.get(session_id, (0, 0))[0],
+                n_matched=counts.get(session_id, (0, 0))[1],
+                method=method,
+                log_odds=log_odds,
+                noise_m=noise_m,
+                part=part_of[session_id] + 1,
+            )
+            for session_id, name, date, recording, transform, method, log_odds, noise_m in rows
         )
 
     def changes(self) -> list[tuple[str, str, Change]]:
