@@ -73,9 +73,25 @@ def test_what_was_thinned_is_no_other_side(left: float, when: int) -> None:
     assert sided(looks, 14.0 * np.arange(4)) is looks
 
 
-def test_sides_that_are_known_stay() -> None:
-    looks = from_sides("AAAB", np.random.default_rng(0))
+@pytest.mark.parametrize("known", [(0,), (3,), (0, 1, 2), (1, 2, 3), (0, 3)])
+def test_sides_that_are_known_stay_and_tell_of_the_others(known: tuple[int, ...]) -> None:
+    """One visit with cameras must not take from the others that they agree with it, or do not."""
+    sides, rng = "AAAB", np.random.default_rng(0)
+    looks = from_sides(sides, rng)
     towards = looks.towards.copy()
-    towards[:, 0] = [0.0, 1.0, 0.0]
-    known = replace(looks, towards=towards)
+    for visit in known:
+        towards[:, visit] = [0.6, 0.8 if sides[visit] == "A" else -0.8, 0.0]
+    some = replace(looks, towards=towards)
+    told = sided(some, 14.0 * np.arange(4))
+    np.testing.assert_array_equal(told.towards[:, known], towards[:, known])
+    cosines = np.einsum("kvi,kwi->kvw", told.towards, told.towards)
+    alike = np.array([[one == other for other in sides] for one in sides])
+    assert (cosines[:, alike] > 0.5).all()
+    assert (cosines[:, ~alike] < 0.5).all()
+    assert counted(told) == pytest.approx(N_FRUITS, rel=0.1)
+
+
+def test_where_all_sides_are_known_they_stay() -> None:
+    looks = from_sides("AAAB", np.random.default_rng(0))
+    known = replace(looks, towards=np.tile([0.0, 1.0, 0.0], (*looks.seen.shape, 1)))
     assert sided(known, 14.0 * np.arange(4)) is known

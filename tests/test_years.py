@@ -9,6 +9,8 @@ import pytest
 from orchard_maker import frame_of_its_own, grow_map
 from pomona import FruitCloud
 from pomona.growth.measured import measured_fruits
+from pomona.growth.season_growth import grow_season
+from pomona.growth.visit_warnings import of_visits
 from pomona.identity import seasons_of
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.orchard.hanging import hang_chances
@@ -59,6 +61,16 @@ def test_a_winter_lies_between_visits_that_are_months_apart() -> None:
     days = np.array([0.0, 30.0, 160.0, 365.0, 366.0, 900.0])
     assert seasons_of(days) == [slice(0, 3), slice(3, 5), slice(5, 6)]
     assert seasons_of(days[:3]) == [slice(0, 3)]
+
+
+def test_somebody_may_come_by_in_the_winter() -> None:
+    """What is longer than a season is parted at its longest pauses; fruits that hang all year are visited all year."""
+    year = np.array([0.0, 30.0, 80.0])
+    assert seasons_of(np.concatenate([year, [220.0], 365.0 + year])) == [slice(0, 3), slice(3, 4), slice(4, 7)]
+    assert seasons_of(np.concatenate([year, year + 240.0])) == [slice(0, 3), slice(3, 6)]
+    assert seasons_of(np.array([0.0, 160.0])) == [slice(0, 2)]
+    assert seasons_of(np.arange(0.0, 800.0, 60.0)) == [slice(0, 14)]
+    assert seasons_of(np.empty(0)) == [slice(0, 0)]
 
 
 def test_no_fruit_is_one_of_last_year(map_of_years: Path) -> None:
@@ -129,3 +141,23 @@ def test_a_stretch_that_this_year_has_not_visited_is_found_by_last_year(
     assert add_session(path, replace(new[0], cloud=first)).is_added
     added = add_session(path, replace(new[1], cloud=beyond))
     assert (added.is_added, added.n_matched) == (True, 0)
+
+
+def test_growth_names_a_part_that_this_year_has_not_visited(
+    years: tuple[list[Session], list[Session]], tmp_path: Path
+) -> None:
+    other = [replace(visit, name=f"other {visit.name}", cloud=scattered_wood(visit)) for visit in years[0]]
+    path = grow_map(tmp_path / "orchard.gpkg", years[0][:1])
+    for session in [years[0][1], *other, *years[1]]:
+        assert add_session(path, session, new_part=True).is_added
+    assert {visit.name: visit.part for visit in OrchardMap(path).visits()}[other[0].name] == 2
+    growth = grow_season(path)
+    assert growth.blocks[0].n_fruits == pytest.approx(len(growth.fruits.ids), rel=0.2)
+    assert f"part 2 of the map was visited on {LAST_YEAR[-1]} last" in "; ".join(of_visits(growth))
+
+
+def scattered_wood(visit: Session) -> FruitCloud:
+    """Another row, that has nothing in common with that one: each of its fruits at a place of its own."""
+    places = scene_pair("base", seed=11).map.positions[: len(visit.cloud)]
+    first = places + np.random.default_rng(int(visit.date[-2:])).normal(0.0, 0.006, places.shape)
+    return replace(visit.cloud.select(np.arange(len(first))), positions=first)

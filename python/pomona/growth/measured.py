@@ -52,6 +52,8 @@ class MeasuredFruits:
         Of visits that measured no fruit, ascending.
     parts : (N,) int64
         Number of the part of the map that each is of, from 1, as `Visit.part`; empty where there is one.
+    left_out : mapping of int to date
+        Parts of the map that nobody visited in its last season, and when they were visited last.
     unmeasured : mapping of str to float
         How many are expected to hang that no visit measured, by tree: none of the N.
     """
@@ -67,6 +69,7 @@ class MeasuredFruits:
     days_without_sizes: tuple[date, ...] = ()
     unmeasured: Mapping[str, float] = field(default_factory=dict)
     parts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    left_out: Mapping[int, date] = field(default_factory=dict)
 
     @property
     def days(self) -> tuple[date, ...]:
@@ -116,7 +119,8 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
     orchard = OrchardMap(path)
     if orchard.kind != "map":
         raise PomonaError(f"{path}: found a session, expected a map (.gpkg), which `pomona map add` makes of sessions")
-    visits = _of_last_season(orchard.visits())
+    all_visits = orchard.visits()
+    visits = _of_last_season(all_visits)
     names = tuple(visit.name for visit in visits)
     seen = orchard.observations().of_sessions(names)
     everything = orchard.fruits()
@@ -148,6 +152,7 @@ def measured_fruits(path: str | Path) -> MeasuredFruits:
         days_without_sizes=tuple(sorted(without)),
         unmeasured=_unmeasured(cloud, trees, fruits),
         parts=everything.parts[in_season][fruits] + 1,
+        left_out=_left_out(all_visits, visits),
     )
 
 
@@ -157,6 +162,13 @@ def _of_last_season(visits: Sequence[Visit]) -> list[Visit]:
     days = np.array([datetime.fromisoformat(visit.date).toordinal() for visit in ordered], np.float64)
     of_season = {visit.name for visit in ordered[seasons_of(days)[-1]]}
     return [visit for visit in visits if visit.name in of_season]
+
+
+def _left_out(visits: Sequence[Visit], of_season: Sequence[Visit]) -> dict[int, date]:
+    """Return the parts of which none of the visits is of the season, and the day of the last of each."""
+    told = {visit.part for visit in of_season}
+    last = {visit.part: datetime.fromisoformat(visit.date).date() for visit in visits}
+    return {part: day for part, day in last.items() if part not in told}
 
 
 def _unmeasured(cloud: FruitCloud, trees: BearingTrees, measured: NDArray[np.int64]) -> dict[str, float]:

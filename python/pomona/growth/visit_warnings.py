@@ -35,7 +35,11 @@ def of_visits(growth: SeasonGrowth) -> list[str]:
         for odd in growth.odd_visits
     ]
     late = of_late_visits(fruits, "growth is told")
-    return [*late, *(off or _of_curve(growth)), *_of_still(growth), *_of_shrunk(fruits, likely)]
+    left_out = [
+        f"part {part} of the map was visited on {day} last, in a season before: what is told is of the others"
+        for part, day in fruits.left_out.items()
+    ]
+    return [*left_out, *late, *(off or _of_curve(growth)), *_of_still(growth), *_of_shrunk(fruits, likely)]
 
 
 def _of_curve(growth: SeasonGrowth) -> list[str]:

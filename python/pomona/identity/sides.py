@@ -15,13 +15,14 @@ __all__ = ["sided"]
 
 
 def sided(looks: Looks, days: NDArray[np.float64]) -> Looks:
-    """Return looks of which nobody knows the sides with two sides, where that explains what was seen far better.
+    """Return looks with two sides for visits of which nobody knows any, where that explains what was seen far better.
 
-    Where cameras or covariances tell sides, of one visit alone even, all is as they say.
+    Where cameras or covariances tell the side of a visit it is as they say; those that agree with it look from there.
     """
-    if not np.isnan(looks.towards).all():
+    untold = np.asarray(np.isnan(looks.towards).all(axis=(0, 2)), bool)
+    if not untold.any():
         return looks
-    told = _from(looks, _sides_by_agreement(looks))
+    told = _from(looks, _sides_by_agreement(looks), untold)
     as_one, as_two = (histories_of(each, days) for each in (looks, told))
     # By a glance first: most visits are of one side.
     for at_a_glance in (True, False):
@@ -43,8 +44,11 @@ def _sides_by_agreement(looks: Looks) -> NDArray[np.float64]:
     return np.where(axis * axis[0] < 0.0, -1.0, 1.0)
 
 
-def _from(looks: Looks, side: NDArray[np.float64]) -> Looks:
-    """Return looks from these sides, (V,) of 1 and -1."""
-    towards = np.zeros(looks.towards.shape)
-    towards[:, :, 1] = side
+def _from(looks: Looks, side: NDArray[np.float64], untold: NDArray[np.bool_]) -> Looks:
+    """Return looks with those of which nobody knows from these sides, (V,) of 1 and -1: 1 is where the others say."""
+    known = side[~untold, None] * looks.towards[:, ~untold]
+    known = known[~np.isnan(known).any(axis=-1)]
+    first = known.mean(axis=0) if len(known) else np.array([0.0, 1.0, 0.0])
+    towards = looks.towards.copy()
+    towards[:, untold] = side[untold, None] * first / max(float(np.linalg.norm(first)), 1e-9)
     return replace(looks, towards=towards)

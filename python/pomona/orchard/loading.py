@@ -29,7 +29,7 @@ FEWEST_REPEATED, REPEATED = 5, 0.03
 """Fruits, and their share of all, that have one diameter which is no measurement."""
 
 INSIDE, FEWEST_INSIDE, OFTEN_INSIDE = 0.5, 10, 0.1
-"""Of their mean diameter, how near two centres are where one fruit would be inside the other; and how many fruits, and
+"""Of the larger diameter, how near two centres are where one would be inside the other fruit; and how many fruits, and
 what share of all, may be so by the errors of their places: 5 % where these are 4 cm."""
 
 ALONE = 1.2
@@ -138,7 +138,7 @@ def _tell_doubled(path: Path, cloud: FruitCloud) -> None:
     sizes_m = np.where(np.isnan(cloud.diameters_m), 0.0, cloud.diameters_m)
     near = cKDTree(cloud.positions).query_pairs(INSIDE * float(np.quantile(sizes_m, 0.95)), output_type="ndarray")
     apart_m = np.linalg.norm(np.diff(cloud.positions[near], axis=1)[:, 0], axis=1)
-    doubled = np.unique(near[apart_m < INSIDE * sizes_m[near].mean(axis=1)])
+    doubled = np.unique(near[apart_m < INSIDE * sizes_m[near].max(axis=1)])
     if len(doubled) < max(FEWEST_INSIDE, OFTEN_INSIDE * len(cloud)):
         return
     example = cloud.label(int(doubled[0]))
