@@ -5,6 +5,8 @@ import json
 import re
 import shutil
 from contextlib import closing
+from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,8 @@ from growth_maker import GrownRow, grow_row
 from pomona import geopackage
 from pomona.growth.clusters import clusters_of
 from pomona.growth.fruit_drop import SURE_TO, MeasuredRates, drop_of
+from pomona.growth.season_growth import grow_season, growth_of
+from pomona.growth.thinning_plan import plan_thinning
 from pomona.viewer.season_page import Wishes, season_document
 from test_page_document import unpacked
 
@@ -48,6 +52,30 @@ def test_fruits_that_stop_growing_will_drop(pomona: Pomona, row: GrownRow, tmp_p
     assert sum(line["action"] == "thin" for line in lines) == sum(
         tree["n_to_thin"] for tree in json.loads(printed)["trees"]
     )
+
+
+def test_rows_that_are_walked_on_different_days_are_planned_together(row: GrownRow) -> None:
+    """Each part of a map by its own last two days."""
+    growth = grow_season(row.path)
+    one, fruits = plan_thinning(growth, 20), growth.fruits
+    parts = 1 + np.arange(len(fruits.ids)) % 2
+    apart_mm = np.full((len(parts), 4), np.nan)
+    for part in (1, 2):
+        apart_mm[np.ix_(parts == part, [part - 1, part + 1])] = fruits.diameters_mm[parts == part]
+    moments = tuple(moment + timedelta(days=late) for moment in fruits.moments for late in (0, 1))
+    walked = replace(
+        fruits,
+        diameters_mm=apart_mm,
+        parts=parts,
+        moments=moments,
+        sessions=("a", "b", "c", "d"),
+        labels=tuple(tuple(label for label in labels for _ in (0, 1)) for labels in fruits.labels),
+    )
+    two = plan_thinning(growth_of(walked), 20)
+    np.testing.assert_array_equal(two.rows, one.rows)
+    np.testing.assert_allclose(two.rates_mm_per_day, one.rates_mm_per_day)
+    assert two.n_days == one.n_days
+    assert np.mean([now == then for now, then in zip(two.actions, one.actions, strict=True)]) > 0.9
 
 
 def test_the_fullest_clusters_are_thinned_of_their_smallest(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import date
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,25 +147,50 @@ def rates_are_known(growth: SeasonGrowth) -> bool:
 def _rates(growth: SeasonGrowth) -> tuple[MeasuredRates, float]:
     """Growth between the last two days as it was measured, how it may be off, and the days between.
 
+    The last two of each part of the map, for rows are walked on days of their own; the days between are their mean.
     The scales that the season's fit gives the visits are not taken out of it: fruits that drop are none of the curve's,
     and what they lack of it would be put down to the visit.
     """
     fruits, shape = growth.fruits, growth.curve.fitted.likeliest
-    before, last = sorted(set(fruits.days))[-2:]
-    columns = [np.flatnonzero(np.array(fruits.days) == day) for day in (before, last)]
-    sizes_mm, counts = zip(*(_mean_of(fruits.diameters_mm[:, of_day]) for of_day in columns), strict=True)
-    moments = [CALENDAR.times([fruits.moments[column] for column in of_day]).mean() for of_day in columns]
-    n_days = float(moments[1] - moments[0])
-    of_visits = np.sqrt(sum(1.0 / len(of_day) for of_day in columns))
-    size_mm = float(np.nanmedian(fruits.diameters_mm[:, np.concatenate(columns)]))
+    parts = fruits.parts if len(fruits.parts) else np.zeros(len(fruits.ids), np.int64)
+    told = np.full((5, len(parts)), np.nan)
+    for part in np.unique(parts).tolist():
+        own = np.flatnonzero(parts == part)
+        told[:, own] = _growth_of(fruits, own)
+    mm_per_day, per_mm, *of_parts = told
+    known = ~np.isnan(told[2])
+    n_days, of_visits, size_mm = (float(each[known].mean()) if known.any() else np.nan for each in of_parts)
     rates = MeasuredRates(
-        (sizes_mm[1] - sizes_mm[0]) / n_days,
-        np.sqrt(sum(1.0 / np.maximum(count, 1) for count in counts)) / n_days,
+        mm_per_day,
+        np.where(known, per_mm, 1.0),
         noise_mm=(shape.noise_mm, _NOISE_SPREAD),
         shared_mm_per_day=shape.visit_spread * size_mm * of_visits / n_days,
         off_mm_per_day=OFF_BY * size_mm / n_days,
     )
     return rates, n_days
+
+
+def _growth_of(fruits: MeasuredFruits, own: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return of fruits that were visited together, (n,) rows, what their last two days say, (5, n); NaN after one day.
+
+    Rates, and what noise of a millimetre does to each; then of all the days between, the root of what the visits count,
+    and the size in the middle.
+    """
+    sizes_mm = fruits.diameters_mm[own]
+    by_day: dict[date, list[int]] = {}
+    for visit in np.flatnonzero(~np.isnan(sizes_mm).all(axis=0)).tolist():
+        by_day.setdefault(fruits.days[visit], []).append(visit)
+    if len(by_day) < 2:
+        return np.full((5, len(own)), np.nan)
+    columns = [by_day[day] for day in sorted(by_day)[-2:]]
+    (before_mm, n_before), (last_mm, n_last) = (_mean_of(sizes_mm[:, of_day]) for of_day in columns)
+    before, last = (CALENDAR.times([fruits.moments[visit] for visit in of_day]).mean() for of_day in columns)
+    n_days = float(last - before)
+    noise = np.sqrt(1.0 / np.maximum(n_before, 1) + 1.0 / np.maximum(n_last, 1)) / n_days
+    of_visits = np.sqrt(sum(1.0 / len(of_day) for of_day in columns))
+    size_mm = float(np.nanmedian(sizes_mm[:, list(chain(*columns))]))
+    of_all = np.tile([[n_days], [of_visits], [size_mm]], len(own))
+    return np.vstack([(last_mm - before_mm) / n_days, noise, of_all])
 
 
 def _mean_of(sizes_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
