@@ -118,7 +118,7 @@ def test_what_cannot_be_is_one_line(
     ("dates", "said"),
     [
         (
-            ("2024-01-05", "2024-05-05", "2024-08-25"),
+            ("2024-01-05", "2024-03-25", "2024-06-10", "2024-08-25"),
             "found visits from 2024-01-05 to 2024-08-25, expected those of one season",
         ),
         (("2004-06-14", "2024-06-29"), "one day"),
@@ -130,7 +130,7 @@ def test_what_cannot_be_is_one_line(
 def test_visits_that_are_not_of_one_season_are_no_growth(
     pomona: Pomona, tmp_path: Path, dates: tuple[str, ...], said: str
 ) -> None:
-    path = grow_row(tmp_path / "o.gpkg", days=(50, 65, 80)[: len(dates)], n_trees=1).path
+    path = grow_row(tmp_path / "o.gpkg", days=(50, 65, 80, 95)[: len(dates)], n_trees=1).path
     with closing(geopackage.connect(path)) as connection, connection:
         sessions = [number for (number,) in connection.execute("SELECT id FROM sessions ORDER BY date")]
         connection.executemany("UPDATE sessions SET date = ? WHERE id = ?", zip(dates, sessions, strict=True))
