@@ -41,6 +41,9 @@ class Added:
         Fruits of the map beside which it and the session are torn against each other, as a camera lost its way.
     torn_like : str, optional
         A session of the map that showed the same tear before: then it is the map that is torn.
+    season_before : str, optional
+        Of the first visit of a season to a part of the map, the date of the last one before that winter: it was found
+        by the fruits of that season, and none of its own can be one of these.
     was_there : bool
         Whether the map held the very session before, and stays as it was.
     """

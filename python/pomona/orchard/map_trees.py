@@ -17,7 +17,7 @@ from pomona.errors import PomonaError, PomonaWarning
 from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.hanging import tell_trees
-from pomona.orchard.parts import part_numbers
+from pomona.orchard.parts import part_numbers, parts_of_fruits
 from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
 from pomona.orchard.writing import update_layers
 from pomona.store.cells import finite_json
@@ -294,7 +294,7 @@ def _fruits(connection: sqlite3.Connection) -> _Fruits:
         ids=np.array(ids, np.int64),
         positions=geopackage.points_of(geoms),
         believed=tell_trees(states, chances),
-        parts=np.array([part_of.get(session, 0) for session in last_sessions], np.int64),
+        parts=parts_of_fruits(part_of, last_sessions),
         ways=camera_ways(connection, part_of),
     )
 

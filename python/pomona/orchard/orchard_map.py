@@ -21,7 +21,7 @@ from pomona.earth import Anchor
 from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.earth_layers import stored_anchor
 from pomona.orchard.fruit_ids import Change
-from pomona.orchard.parts import part_numbers
+from pomona.orchard.parts import part_numbers, parts_of_fruits
 from pomona.store.cells import finite_json
 from pomona.store.failures import told
 from pomona.store.opening import snapshot
@@ -240,7 +240,7 @@ class OrchardMap:
         with self._reading() as connection:
             part_of = part_numbers(connection)
             (last_sessions,) = columns_of(connection, "fruits", ("last_session_id",))
-            parts = np.array([part_of.get(session, 0) for session in last_sessions], np.int64)
+            parts = parts_of_fruits(part_of, last_sessions)
             ways = camera_ways(connection, part_of)
             return fruits_in_map(connection, partial(FruitsInMap, parts=parts, ways=ways))
 

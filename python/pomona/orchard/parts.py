@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pomona.store.failures import WrongContentError
 from pomona.store.rows import columns_of
 
-__all__ = ["components", "part_numbers", "parts_of_map", "parts_with"]
+__all__ = ["components", "part_numbers", "parts_of_fruits", "parts_of_map", "parts_with"]
 
 
 def components(members: Sequence[int], pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -39,6 +42,11 @@ def parts_of_map(connection: sqlite3.Connection) -> list[list[int]]:
 def part_numbers(connection: sqlite3.Connection) -> dict[int, int]:
     """Return the number of the part of each session."""
     return {session_id: number for number, part in enumerate(parts_of_map(connection)) for session_id in part}
+
+
+def parts_of_fruits(part_of: Mapping[int, int], last_session_ids: Iterable[int]) -> NDArray[np.int64]:
+    """Return the number of the part of each fruit, (N,), by the session that saw it last."""
+    return np.array([part_of.get(session_id, 0) for session_id in last_session_ids], np.int64)
 
 
 def parts_with(connection: sqlite3.Connection, session_ids: Iterable[int]) -> list[int]:

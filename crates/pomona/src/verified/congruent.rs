@@ -32,7 +32,7 @@ const AT_ONCE: usize = 8;
 const ANY: u64 = 4_000;
 
 /// Poses that are refined: of thousands that a sparse visit lets pass at first the right one is seldom among the best.
-const REFINED: usize = 1_500;
+const MOST_REFINED: usize = 1_500;
 
 /// Length of a seed in standard deviations of the noise, at the least.
 const LEAST: f64 = 10.0;
@@ -46,7 +46,7 @@ impl<'a> Search<'a> {
         let (mut candidates, effort) = self.congruent();
         findings.log.effort = findings.log.effort + effort;
         candidates.sort_unstable_by(by_evidence);
-        let best = distinct(self.query, self.map.spacing, &candidates, REFINED);
+        let best = distinct(self.query, self.map.spacing, &candidates, MOST_REFINED);
         let hypotheses = self.refined(&best);
         findings.log.refined += hypotheses.len();
         self.grow_distinct(&hypotheses, findings);

@@ -42,7 +42,8 @@ pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Conten
         }
         let rotation = candidate.pose.rotation.matrix();
         let [row, column] = [rotation[(0, 0)], rotation[(1, 2)]].map(|entry| ((entry + 1.0) / turn_rad) as usize + 1);
-        let mut near = (row - 1..=row + 1).flat_map(|row| &cells[row * across + column - 1..=row * across + column + 1]);
+        let mut near =
+            (row - 1..=row + 1).flat_map(|row| &cells[row * across + column - 1..=row * across + column + 1]);
         if !near.any(|cell| cell.iter().any(|&other| same(candidate, &kept[other]))) {
             cells[row * across + column].push(kept.len());
             kept.push(*candidate);
