@@ -1,6 +1,7 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
 use super::acceptance::{KEPT, VerifiedConfig, WORTH_IT, poses, reached};
+use super::decision::SURE;
 use super::doubts::Rated;
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
@@ -240,20 +241,18 @@ impl<'a> Search<'a> {
     pub(super) fn settle(&self, finding: &mut Finding<'a>) -> f64 {
         let Finding { growth, settled, .. } = finding;
         let settled = settled.get_or_insert_with(|| {
-            let as_grown = settle(growth, self.noise_m);
-            if growth.whole {
-                return as_grown;
-            }
             let mut bridged = growth.clone();
-            if !bridged.reach_all() {
-                return as_grown;
+            if growth.whole || !bridged.reach_all() {
+                return settle(growth, self.noise_m);
             }
             let beyond = settle(&bridged, self.noise_m);
-            if beyond.evidence > as_grown.evidence {
+            // What is sure by itself needs no comparison.
+            let is_sure = bridged.overlap().log_odds - growth.overlap().log_odds > SURE * self.least();
+            let as_grown = (!is_sure).then(|| settle(growth, self.noise_m));
+            as_grown.filter(|as_grown| as_grown.evidence >= beyond.evidence).unwrap_or_else(|| {
                 *growth = bridged;
-                return beyond;
-            }
-            as_grown
+                beyond
+            })
         });
         settled.evidence
     }

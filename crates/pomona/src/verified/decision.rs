@@ -3,7 +3,7 @@
 use super::acceptance::{KEPT, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::congruent::is_sparser;
-use super::contender::Contender;
+use super::contender::{Contender, by_evidence};
 use super::growth::{grow, hold};
 use super::hypothesis::{Hypothesis, Model};
 use super::landscape::Landscape;
@@ -29,6 +29,9 @@ pub(super) const RIVAL_SEED: f64 = 0.3;
 
 /// Fruits of the map for one of the query, at the most, where the map is looked for in the query, too: nine in ten were picked.
 const EXCHANGED: usize = 10;
+
+/// Candidates of a round that are refined before all others.
+const FIRST_REFINED: usize = 8;
 
 /// Hypotheses of a round that are grown.
 const GROWN: usize = 6;
@@ -139,10 +142,32 @@ impl<'a> Search<'a> {
     }
 
     /// Grows the best of what seeds propose; returns the candidates that were not refined.
+    ///
+    /// Where one of the first few is sure, the others are no more than its rivals.
     pub(super) fn try_seeds(&self, seeds: &[Seed], findings: &mut Findings<'a>) -> Vec<Contender> {
-        let (hypotheses, rest) = self.ask(seeds, &mut findings.log);
-        self.grow_distinct(&hypotheses, findings);
+        let [best, mut rest] = self.ask(seeds, &mut findings.log);
+        let (first, others) = best.split_at(FIRST_REFINED.min(best.len()));
+        let mut hypotheses = self.refined(first);
+        if let Some(sure) = self.sure(&hypotheses, findings) {
+            findings.log.refined += hypotheses.len();
+            findings.log.grown += 1;
+            findings.accepted.push(sure);
+            rest.splice(0..0, best);
+            rest.sort_unstable_by(by_evidence);
+        } else {
+            hypotheses.extend(self.refined(others));
+            hypotheses.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+            findings.log.refined += hypotheses.len();
+            self.grow_distinct(&hypotheses, findings);
+        }
         rest
+    }
+
+    /// The best of some hypotheses as it grew, where nothing is found yet and it is sure.
+    fn sure(&self, hypotheses: &[Hypothesis], Findings { accepted, log, .. }: &Findings) -> Option<Finding<'a>> {
+        let best = hypotheses.first().filter(|best| accepted.is_empty() && best.log_odds > log.threshold)?;
+        let grown = Finding::new(grow(self.query, self.map, best, &self.model), *best);
+        (grown.overlap.log_odds > SURE * log.threshold && self.is_pose(&grown)).then_some(grown)
     }
 
     /// Weighs poses that are proposed, most evidence first, in place of rounds of seeds.
@@ -172,7 +197,7 @@ impl<'a> Search<'a> {
     pub(super) fn doubt(&self, findings: &mut Findings<'a>, rest: &[Contender]) {
         self.look_for_rivals(rest, findings);
         // A pose found with few seeds has shown little of where else the query might lie.
-        if findings.log.seeds < FIRST_FRUITS {
+        if findings.log.seeds < FIRST_FRUITS / 2 {
             let (fruits, missing) = (self.query.len(), FIRST_FRUITS - findings.log.seeds);
             let (stride, turns) = ((fruits / missing).max(1) as u64, missing.div_ceil(fruits) as u64);
             let more = of_some_fruits(self.query, stride, 2..2 + turns);

@@ -47,17 +47,18 @@ impl<'a> Search<'a> {
         self.grow_distinct(&self.refined(&others), findings);
     }
 
-    /// Whether a finding puts the fruits around the seed where the seed puts them.
+    /// Whether a finding, as it stands by now, puts the fruits around the seed where the seed puts them.
     pub(super) fn explains(&self, finding: &Finding, place: &Vector3<f64>, pose: &Similarity) -> bool {
         let (spacings, _) = SAME;
         let reach = spacings * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
+        let overlap = finding.settled.as_ref().map_or(&finding.overlap, |settled| &settled.overlap);
         let same = near
             .iter()
             .filter(|(row, _)| {
                 let p = self.query.points[*row as usize];
-                let found = match finding.overlap.predictions[*row as usize] {
+                let found = match overlap.predictions[*row as usize] {
                     Some(prediction) => prediction.place,
                     None => finding.seed.pose.image(&p),
                 };

@@ -164,7 +164,10 @@ impl Landscape {
     /// Calls `visit` for at least every point within `gate` of `place`; the caller measures.
     #[inline]
     pub(crate) fn near(&self, place: &Vector3<f64>, gate: f64, visit: impl FnMut(u32)) {
-        self.grid.near(place, gate, visit);
+        match self.vicinities.iter().find(|list| gate <= list.reach) {
+            Some(list) => list.of(place).iter().copied().for_each(visit),
+            None => self.grid.near(place, gate, visit),
+        }
     }
 }
 

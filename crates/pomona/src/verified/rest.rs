@@ -29,7 +29,8 @@ impl<'a> Search<'a> {
             for mut seeds in self.rounds() {
                 seeds.retain(|(quad, _)| quad.iter().all(|&row| alone[row as usize]));
                 let some: Vec<Seed> = seeds.iter().copied().step_by(seeds.len().div_ceil(SEEDS_ASKED).max(1)).collect();
-                let (mut hypotheses, _) = self.ask(&some, &mut more.log);
+                let [best, _] = self.ask(&some, &mut more.log);
+                let mut hypotheses = self.refined(&best);
                 hypotheses.retain(|seed| seed.log_odds > RIVAL_SEED * findings.log.threshold);
                 self.grow_distinct(&hypotheses, &mut more);
                 self.sift(&mut more);

@@ -10,8 +10,8 @@ use crate::geometry::Scale;
 use crate::random::shuffled;
 use rayon::prelude::*;
 
-/// Fruits whose seeds make the first round, at the most: where the visits overlap well, few are enough in a cloud of
-/// any size. Also the seeds that are tried at the least before an answer stands alone.
+/// Fruits whose seeds make the first round, at the most, and no less than half of them where there are as many: where the visits
+/// overlap well, few are enough in a cloud of any size.
 pub(super) const FIRST_FRUITS: usize = 256;
 
 /// Small clouds try at least this many seeds: all of them in a cloud of twelve.
@@ -55,8 +55,8 @@ impl Search<'_> {
         longest(self.query, usize::try_from(count).unwrap_or(usize::MAX), self.prepared.seeds.longest)
     }
 
-    /// Candidates of all seeds: the best of them refined, and the others in order.
-    pub(super) fn ask(&self, seeds: &[Seed], log: &mut Log) -> (Vec<Hypothesis>, Vec<Contender>) {
+    /// Candidates of all seeds, most evidence first: the best of them, one of each pose, and the others.
+    pub(super) fn ask(&self, seeds: &[Seed], log: &mut Log) -> [Vec<Contender>; 2] {
         let of_each: Vec<(Vec<Contender>, Effort)> = seeds.par_iter().map(|&seed| self.candidates_of(seed)).collect();
         log.seeds += seeds.len();
         log.effort = log.effort + of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
@@ -65,9 +65,7 @@ impl Search<'_> {
         candidates.sort_unstable_by(by_evidence);
         let best = distinct(self.query, self.map.spacing, &candidates, REFINED);
         candidates.retain(|one| best.iter().all(|other| other.key != one.key));
-        let hypotheses = self.refined(&best);
-        log.refined += hypotheses.len();
-        (hypotheses, candidates)
+        [best, candidates]
     }
 
     /// Candidates of one seed of the query that survive the fit and the first look.

@@ -187,14 +187,13 @@ impl Rows {
     /// that the mean of cells in several depths is no measure of either.
     fn expected(&self, cells: &[u16]) -> Vec<f64> {
         let ([_, high, deep], [along, up]) = (self.size, self.blocks);
-        let (mut lines, mut depths) = (vec![0.0; along * up], vec![0.0; deep]);
+        // Whole numbers, of which a processor adds many at once.
+        let (mut sums, mut depths) = (vec![0u32; along * up], vec![0u32; deep]);
         for (at, line) in cells.chunks_exact(deep).enumerate() {
-            let sum = &mut lines[self.block(at / high, at % high) / deep];
-            for (depth, &votes) in depths.iter_mut().zip(line) {
-                *sum += f64::from(votes);
-                *depth += f64::from(votes);
-            }
+            depths.iter_mut().zip(line).for_each(|(depth, &votes)| *depth += u32::from(votes));
+            sums[self.block(at / high, at % high) / deep] += line.iter().map(|&votes| u32::from(votes)).sum::<u32>();
         }
+        let [mut lines, depths] = [sums, depths].map(|sums| sums.into_iter().map(f64::from).collect::<Vec<f64>>());
         for (stride, count) in [(up, along), (1, up)] {
             smooth(&mut lines, stride, count);
         }
