@@ -291,6 +291,34 @@ def test_rows_that_are_parts_of_a_map_are_told_each_by_itself(
     assert len(names) == sum(len(row.trees) for row in alone)
 
 
+def test_trees_of_a_part_go_with_it_to_another_one(tmp_path: Path, spindles: tuple[np.ndarray, np.ndarray]) -> None:
+    """The right end of a row lay elsewhere until a visit saw both."""
+    places, trees = spindles
+    path = tmp_path / "orchard.gpkg"
+    is_left = trees <= np.unique(trees)[4]
+    aside = np.array([-4.0, 0.0, 0.0])
+    assert add_session(path, visit(places[is_left], "2024-08-01")).is_added
+    assert add_session(path, visit(places[~is_left] + aside, "2024-08-02", 1), new_part=True).is_added
+    assert [[number for _, number, _ in row.trees] for row in find_trees(path)] == [[1, 2, 3, 4, 5], [1, 2, 3]]
+    of_fruits = dict(asked(path, "SELECT id, tree_id FROM fruits"))
+    known = asked(path, "SELECT id FROM trees")
+    assert add_session(path, visit(places, "2024-08-09", 2)).is_added
+    now = dict(asked(path, "SELECT id, tree_id FROM fruits"))
+    assert all(now[fruit] == tree for fruit, tree in of_fruits.items() if fruit in now)
+    # Before anybody looks for trees anew each stands amid its fruits, and the line of its row runs by it.
+    for tree_id, geom, line in asked(path, "SELECT t.id, t.geom, r.geom FROM trees t JOIN rows r ON r.id = t.row_id"):
+        (place,) = geopackage.points_of([geom])
+        hanging = geopackage.points_of(
+            [one for (one,) in asked(path, f"SELECT geom FROM fruits WHERE tree_id = {tree_id}")]
+        )
+        assert np.abs(hanging.mean(axis=0) - place)[[0, 2]].max() < 0.3
+        assert np.abs(geopackage.line_of(line) - place)[:, 2].min() < 0.3
+    (row,) = find_trees(path)
+    assert [name for name, _, _ in row.trees] == [f"1-{number}" for number in range(1, 9)]
+    assert asked(path, "SELECT id FROM trees") == known
+    assert problems(path) == []
+
+
 def test_drawn_and_given_trees_are_taken_as_they_are(tmp_path: Path) -> None:
     places, trees = grown_row("wall", 4, 2.0, 3)
     path = tmp_path / "orchard.gpkg"

@@ -1,5 +1,6 @@
 """Maps over more than one year: rows are found again by their wood, and no fruit outlives the winter."""
 
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from pomona.growth.visit_warnings import of_visits
 from pomona.identity import seasons_of
 from pomona.orchard import OrchardMap, Session, add_session, problems, remove_session
 from pomona.orchard.hanging import hang_chances
+from pomona.orchard.map_trees import find_trees
 from pomona.synth.clouds import scene_pair
 
 LAST_YEAR, THIS_YEAR = ("2024-06-10", "2024-07-20"), ("2025-06-12", "2025-07-15")
@@ -161,3 +163,28 @@ def scattered_wood(visit: Session) -> FruitCloud:
     places = scene_pair("base", seed=11).map.positions[: len(visit.cloud)]
     first = places + np.random.default_rng(int(visit.date[-2:])).normal(0.0, 0.006, places.shape)
     return replace(visit.cloud.select(np.arange(len(first))), positions=first)
+
+
+def test_trees_stay_for_years_and_count_the_fruits_of_the_last_season(
+    years: tuple[list[Session], list[Session]], tmp_path: Path
+) -> None:
+    """Of a row whose trees the fruits of both years no longer tell, as it happens."""
+    path = grow_map(tmp_path / "orchard.gpkg", years[0])
+    (first,) = find_trees(path)
+    assert first.kind == "trees"
+    assert first.n_fruits == len(OrchardMap(path).fruits())
+    for session in years[1]:
+        assert add_session(path, session).is_added
+    hanging = [day >= "2025" for day in OrchardMap(path).fruits().extras["last_seen"]]
+    with sqlite3.connect(path) as connection:
+        counts = [count for (count,) in connection.execute("SELECT n_fruits FROM trees ORDER BY number")]
+    connection.close()
+    assert sum(counts) == sum(hanging) < len(hanging)
+    (now,) = find_trees(path)
+    assert [name for name, _, _ in now.trees] == [name for name, _, _ in first.trees]
+    assert now.n_fruits == sum(hanging)
+    assert [count for _, _, count in now.trees] == pytest.approx(counts, abs=12)
+    assert problems(path) == []
+    (forgotten,) = find_trees(path, forget=True)
+    assert forgotten.kind == "none"
+    assert forgotten.n_fruits == sum(hanging)

@@ -33,6 +33,7 @@ __all__ = [
     "create",
     "joined_points",
     "line",
+    "line_of",
     "points",
     "points_of",
     "touch",
@@ -257,6 +258,14 @@ def line(positions: ArrayLike) -> bytes:
     xyz = np.asarray(positions, dtype="<f8")
     head = b"GP\0\x01" + struct.pack("<iBII", UNDEFINED_CARTESIAN, LITTLE_ENDIAN, WKB_LINE_Z, len(xyz))
     return head + xyz.tobytes()
+
+
+def line_of(blob: bytes) -> NDArray[np.float64] | None:
+    """Decode a line to (N, 3) coordinates, the inverse of `line`; None of anything else."""
+    if len(blob) < LINE_HEAD_BYTES or (len(blob) - LINE_HEAD_BYTES) % 24:
+        return None
+    places = np.frombuffer(blob, "<f8", offset=LINE_HEAD_BYTES).reshape(-1, 3).astype(np.float64)
+    return places if line(places) == blob else None
 
 
 def points_of(blobs: Sequence[bytes]) -> NDArray[np.float64]:

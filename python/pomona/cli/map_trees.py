@@ -26,7 +26,9 @@ def map_trees(
     ),
     renumber: bool = typer.Option(False, "--renumber", help="Count from 1 again; else trees keep their numbers."),
     forget: bool = typer.Option(
-        False, "--forget", help="Look for trees where --trees gave some before; those that are drawn in the map stay."
+        False,
+        "--forget",
+        help="Look for trees anew: those that --trees gave or fruits told before stay else, and drawn ones do.",
     ),
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:

@@ -18,6 +18,7 @@ from pomona.orchard.camera_ways import camera_ways
 from pomona.orchard.given_trees import KnownTree
 from pomona.orchard.hanging import tell_trees
 from pomona.orchard.parts import part_numbers, parts_of_fruits
+from pomona.orchard.past_seasons import sessions_of_past_seasons
 from pomona.orchard.tree_tables import DRAWN, FOUND, GIVEN, StoredTree, bear, stored_trees, write_row, write_tree
 from pomona.orchard.writing import update_layers
 from pomona.store.cells import finite_json
@@ -70,6 +71,7 @@ class _Fruits:
     ids: NDArray[np.int64]
     positions: NDArray[np.float64]
     believed: NDArray[np.bool_]
+    of_last_season: NDArray[np.bool_]
     parts: NDArray[np.int64]
     ways: Mapping[int, Sequence[NDArray[np.float64]]]
 
@@ -101,7 +103,8 @@ def find_trees(
     renumber : bool
         Whether to count from 1 again; else trees keep their numbers.
     forget : bool
-        Whether to look for trees where some were given before; else those stay.
+        Whether to look for trees where some were given before, and to let go of those that fruits told before and
+        no longer tell; else those stay.
     timeout_s, waiting
         As for `add_session`.
 
@@ -123,7 +126,7 @@ def find_trees(
         fruits = _fruits(connection)
         known = [*given, *_drawn(connection, replaced=forget or bool(given))]
         known = known or _named(connection, fruits)
-        found = _Finding(connection, fruits, known, spacing_m, segment_m, renumber)
+        found = _Finding(connection, fruits, known, spacing_m, segment_m, renumber, forget)
         rows = found.rows()
         update_layers(connection)
     _tell_idle({"--spacing": spacing_m, "--segments": segment_m}, rows)
@@ -150,9 +153,11 @@ class _Finding:
         spacing_m: float | None,
         segment_m: float | None,
         renumber: bool,
+        forget: bool,
     ) -> None:
         self.connection, self.fruits, self.known = connection, fruits, list(known)
-        self.spacing_m, self.segment_m, self.renumber = spacing_m, segment_m, renumber
+        self.spacing_m, self.segment_m = spacing_m, segment_m
+        self.renumber, self.forget = renumber, forget
         self.before = [tree for tree in stored_trees(connection) if tree.source != DRAWN]
         self.taken_rows: set[int] = set()
         self.used: set[int] = set()
@@ -185,8 +190,11 @@ class _Finding:
             planting = planting_at(positions, line.along_m, line.beside_m, places)
         elif planting.crowns is None and self.segment_m is not None:
             kind, planting = "segments", _segments(line, self.segment_m)
+        elif planting.crowns is None and len(places := self._told_before(line)) > 1:
+            # What fruits come to may tell less of the trees than those before did, but takes none of them away.
+            planting = planting_at(positions, line.along_m, line.beside_m, places)
         if planting.crowns is None:
-            return TreeRow(0, "none", FOUND, len(members), planting.spacing_m, planting.log_odds, ())
+            return TreeRow(0, "none", FOUND, self._count(members), planting.spacing_m, planting.log_odds, ())
         return self._written(line, members, planting, kind, source, [self.known[number] for _, number in given])
 
     def _written(
@@ -202,15 +210,16 @@ class _Finding:
         places_m = planting.crowns.places_m
         points = np.array([tree.place_in_map for tree in given]) if given else line.places(places_m)
         same = self._same(line, places_m, planting.spacing_m)
-        numbers = self._numbers(places_m, planting.spacing_m, same)
+        row_before = self._row_before(same)
+        numbers = self._numbers(places_m, planting.spacing_m, same, row_before)
         row_id, row_number = write_row(
-            self.connection, self._row_before(same), self.taken_rows, source, planting, line.knots_m[:, 1:]
+            self.connection, row_before, self.taken_rows, source, planting, line.knots_m[:, 1:]
         )
         self.taken_rows.add(row_id)
         bearers, chances = (
             planting.bearers(line.along_m, line.beside_m) if kind == "trees" else _in_segments(line, planting.crowns)
         )
-        counts = np.bincount(bearers[bearers >= 0], minlength=len(places_m))
+        counts = [self._count(members[bearers == tree]) for tree in range(len(places_m))]
         told, tree_ids = [], np.zeros(len(places_m), np.int64)
         for tree in range(len(places_m)):
             name = (given[tree].name if given else "") or f"{row_number}-{numbers[tree]}"
@@ -220,15 +229,25 @@ class _Finding:
                 self.connection,
                 StoredTree(
                     before, name, row_id, int(numbers[tree]), float(places_m[tree]), points[tree],
-                    "tree" if kind == "trees" else "segment", source, int(counts[tree]),
+                    "tree" if kind == "trees" else "segment", source, counts[tree],
                 ),
                 is_drawn=bool(given and given[tree].tree_id),
             )  # fmt: skip
             self.used.add(int(tree_ids[tree]))
-            told.append((name, int(numbers[tree]), int(counts[tree])))
+            told.append((name, int(numbers[tree]), counts[tree]))
         bear(self.connection, self.fruits.ids[members], np.where(bearers >= 0, tree_ids[bearers], 0), chances)
         log_odds = planting.log_odds
-        return TreeRow(row_number, kind, source, len(members), planting.spacing_m, log_odds, tuple(told))
+        return TreeRow(row_number, kind, source, self._count(members), planting.spacing_m, log_odds, tuple(told))
+
+    def _told_before(self, line: RowLine) -> NDArray[np.float64]:
+        """Return where along a row the trees stand that its fruits told before, ascending."""
+        told = [tree for tree in self.before if tree.kind == "tree" and tree.source == FOUND]
+        beside = [tree.place_in_map for tree in told if not self.forget and _is_beside(line, tree.place_in_map)]
+        return np.sort(line.along_of(np.array(beside))) if beside else np.empty(0)
+
+    def _count(self, members: NDArray[np.int64]) -> int:
+        """Count fruits of the last season: trees are told by those of all."""
+        return int(self.fruits.of_last_season[members].sum())
 
     def _same(self, line: RowLine, places_m: NDArray[np.float64], spacing_m: float) -> NDArray[np.int64]:
         """Return which tree of before each tree is, (K,), -1 for none."""
@@ -243,13 +262,18 @@ class _Finding:
         same = same_trees(places_m, known_m, spacing_m)
         return np.where(same >= 0, np.array(beside)[same], -1)
 
-    def _numbers(self, places_m: NDArray[np.float64], spacing_m: float, same: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _numbers(
+        self, places_m: NDArray[np.float64], spacing_m: float, same: NDArray[np.int64], row_before: int
+    ) -> NDArray[np.int64]:
         if self.renumber:
             return numbers_along(places_m, spacing_m)
-        known = [self.before[number].number if number >= 0 else None for number in same.tolist()]
-        return numbers_along(
-            places_m, spacing_m, np.array([UNNUMBERED if number is None else number for number in known], np.int64)
-        )
+        known = np.full(len(same), UNNUMBERED)
+        for tree in np.flatnonzero(same >= 0).tolist():
+            before = self.before[same[tree]]
+            # Trees of a row that came to this one count from its numbers on.
+            if before.number is not None and before.row_id in (row_before, 0):
+                known[tree] = before.number
+        return numbers_along(places_m, spacing_m, known)
 
     def _row_before(self, same: NDArray[np.int64]) -> int:
         """Return the row of most of the trees of before, 0 for none."""
@@ -294,6 +318,7 @@ def _fruits(connection: sqlite3.Connection) -> _Fruits:
         ids=np.array(ids, np.int64),
         positions=geopackage.points_of(geoms),
         believed=tell_trees(states, chances),
+        of_last_season=~np.isin(last_sessions, sessions_of_past_seasons(connection)),
         parts=parts_of_fruits(part_of, last_sessions),
         ways=camera_ways(connection, part_of),
     )

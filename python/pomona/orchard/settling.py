@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pomona.identity import Conclusion
 from pomona.orchard.evidence import Evidence
 from pomona.orchard.fruit_ids import Change, changes_between, ids_of_clusters
-from pomona.orchard.moving import move_session
+from pomona.orchard.moving import JOINED_M, move_session, move_trees
 from pomona.orchard.writing import nullable
 from pomona.store.numbering import last_ids
 from pomona.store.rows import columns_of, one_of
@@ -108,10 +108,13 @@ def settlement_of(connection: sqlite3.Connection, evidence: Evidence) -> Settlem
 def settle(connection: sqlite3.Connection, settlement: Settlement) -> None:
     """Bring sessions, fruits and observations of the parts up to date; all of them are in the map already.
 
-    Sessions move first, then come new fruits, then observations change theirs, then fruits without any go.
+    Sessions move first, with their trees, then come new fruits, then observations change theirs, then fruits without any
+    go.
     """
+    moves: dict[int, NDArray[np.float64]] = {}
     for part in settlement.parts:
-        _move_sessions(connection, part)
+        moves |= _move_sessions(connection, part)
+    move_trees(connection, moves)
     rows = {fruit_id: row for part in settlement.parts for fruit_id, row in fruit_rows(connection, part).items()}
     _write_fruits(connection, rows, settlement.before)
     for part in settlement.parts:
@@ -120,10 +123,16 @@ def settle(connection: sqlite3.Connection, settlement: Settlement) -> None:
     connection.executemany("DELETE FROM fruits WHERE id = ?", ((fruit_id,) for fruit_id in gone))
 
 
-def _move_sessions(connection: sqlite3.Connection, part: SettledPart) -> None:
+def _move_sessions(connection: sqlite3.Connection, part: SettledPart) -> dict[int, NDArray[np.float64]]:
+    """Move the sessions that lie elsewhere now; return how those moved that came to another part."""
+    moves = {}
     for visit, frame in zip(part.evidence.visits, part.conclusion.frames, strict=True):
         if np.abs(frame - visit.map_from_session).max() > UNMOVED_M:
-            move_session(connection, visit.session_id, frame, visit.cloud.transformed(frame), visit.observation_ids)
+            before, now = (visit.cloud.transformed(one) for one in (visit.map_from_session, frame))
+            move_session(connection, visit.session_id, frame, now, visit.observation_ids)
+            if np.linalg.norm(now.positions - before.positions, axis=1).max(initial=0.0) > JOINED_M:
+                moves[visit.session_id] = frame @ np.linalg.inv(visit.map_from_session)
+    return moves
 
 
 def fruit_rows(connection: sqlite3.Connection, part: SettledPart) -> dict[int, FruitRow]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import geopackage
+from pomona.orchard.past_seasons import sessions_of_past_seasons
 from pomona.store.rows import columns_of, one_of
 from pomona.tree_rows import Planting
 
@@ -142,7 +143,9 @@ def trees_of(connection: sqlite3.Connection, fruit_ids: Iterable[int]) -> set[in
 
 
 def follow_trees(connection: sqlite3.Connection, fruit_ids: Collection[int], trees_before: Collection[int]) -> None:
-    """Give those of some fruits that have no tree that of their neighbours, and count again; nothing without trees.
+    """Give those of some fruits that have no tree that of their neighbours, and count again those of the last season.
+
+    Nothing without trees.
 
     Parameters
     ----------
@@ -163,8 +166,10 @@ def follow_trees(connection: sqlite3.Connection, fruit_ids: Collection[int], tre
     if new:
         _follow_neighbours(connection, np.array(ids, np.int64)[new], geopackage.points_of([geoms[row] for row in new]))
     counted = trees_of(connection, fruit_ids) | set(trees_before)
+    past = ", ".join(f"{one:d}" for one in sessions_of_past_seasons(connection))
     connection.executemany(
-        "UPDATE trees SET n_fruits = (SELECT count(*) FROM fruits WHERE tree_id = trees.id) WHERE id = ?",
+        f"""UPDATE trees SET n_fruits = (SELECT count(*) FROM fruits
+        WHERE tree_id = trees.id AND last_session_id NOT IN ({past})) WHERE id = ?""",
         ((tree_id,) for tree_id in sorted(counted)),
     )
 

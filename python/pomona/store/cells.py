@@ -196,6 +196,7 @@ HASHES = _json("a JSON object of texts", _texts_by_name)
 TRANSFORM = _parsed("a 4x4 rigid or similarity transform as JSON", similarity)
 PAIRS = _parsed("a JSON list of [observation id, observation id, probability]", _pairs)
 POINT = CellKind("a little-endian POINT Z with coordinates in metres", bytes, _are_places)
+GEOMETRY = CellKind("a geometry", bytes, lambda _: True)
 PICTURE = CellKind("a WebP or JPEG picture of at most 1 MiB", bytes, _are_pictures)
 LONGITUDE = _number("degrees from -180 to 180", -180.0, 180.0)
 LATITUDE = _number("degrees from -90 to 90", -90.0, 90.0)
@@ -253,6 +254,7 @@ COLUMNS: Mapping[str, Mapping[str, CellKind]] = {
     },
     "rows": {
         "id": ID,
+        "geom": _or_null(GEOMETRY),
         "name": _or_null(TEXT),
         "number": _or_null(WHOLE),
         "source": _or_null(TEXT),
