@@ -92,6 +92,13 @@ impl Conditioned {
         }
     }
 
+    /// What is known of the conditioned fruits, in the caller's rows; `other` where one has no part.
+    pub(crate) fn given_rows<T: Copy>(&self, of_fruits: &[T], other: T) -> Vec<T> {
+        let mut all = vec![other; self.given];
+        self.rows.iter().zip(of_fruits).for_each(|(&row, &one)| all[row] = one);
+        all
+    }
+
     /// Turned into its principal axes.
     #[must_use]
     pub(crate) fn turned(mut self) -> Self {

@@ -134,6 +134,17 @@ impl MapIndex {
         matches!(self.prepared, PreparedMap::Compact(_))
     }
 
+    /// Strangers in a cubic metre about each fruit of the map that was given, as the verified method has them; without end
+    /// where it takes no part.
+    pub(crate) fn densities(&self) -> Vec<f64> {
+        let of_conditioned = match &self.prepared {
+            PreparedMap::Verified(map) => map.densities(),
+            PreparedMap::Compact(index) => index.densities(),
+            PreparedMap::Paper(_) | PreparedMap::TooFew => Vec::new(),
+        };
+        self.map.given_rows(&of_conditioned, f64::INFINITY)
+    }
+
     /// Finds `query` in the map.
     ///
     /// # Errors

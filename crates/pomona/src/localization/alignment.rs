@@ -1,11 +1,11 @@
 //! The pose that lays sightings on the map's fruits, nobody said to be who.
 //!
 //! A sighting p shows the fruit m of the map with a density N(m - T p; S), S the covariances of both and of the pose as it
-//! is known so far, or a stranger, of which there are rho in a cubic metre. With a share s of sightings in the map, the
-//! weights of expectation and maximisation are
+//! is known so far, or a stranger, of which there are rho in a cubic metre about m. With q = N / rho and a share s of sightings
+//! in the map, the weights of expectation and maximisation are
 //!
-//! w = s N / ((1 - s) rho + s sum N), and the evidence is the sum of v ln(1 - s + s sum N / rho), v one over how often
-//! the sighting's fruit was seen.
+//! w = s q / (1 - s + s sum q), and the evidence is the sum of v ln(1 - s + s sum q), v one over how often the sighting's
+//! fruit was seen. On wires rho is that of the wire: a wrong pose that lays wires on wires has two numbers of three for nothing.
 //!
 //! Each turn takes a step of Gauss and Newton under these weights. The pose's own covariance widens S at first and
 //! shrinks from turn to turn, so that the first turns see past the nearest fruit.
@@ -76,7 +76,7 @@ pub(super) struct Say {
     pub pull: Vector3<f64>,
     /// Sum of the weighted squared Mahalanobis distances.
     pub squared: f64,
-    /// The sum of N over rho.
+    /// The sum of q.
     ratio: f64,
 }
 
@@ -169,9 +169,8 @@ pub(super) fn say(
     let slopes = slip.slopes(seen, &by_pose);
     let own = pose.covariance_to_session(&seen.covariance) + slopes * doubt * slopes.transpose();
     let near: Vec<Candidate> = map.near(&place).filter_map(|row| candidate(map, row, &place, &own)).collect();
-    let density = KnownFruits::density(near.len());
-    let total: f64 = near.iter().map(|one| one.height).sum();
-    let whole = (1.0 - share) * density + share * total;
+    let ratio: f64 = near.iter().map(|one| one.ratio).sum();
+    let whole = 1.0 - share + share * ratio;
     let mut says = Say {
         place,
         weight: 0.0,
@@ -183,10 +182,10 @@ pub(super) fn say(
         best_weight: 0.0,
         pull: Vector3::zeros(),
         squared: 0.0,
-        ratio: total / density,
+        ratio,
     };
     for one in &near {
-        let weight = share * one.height / whole;
+        let weight = share * one.ratio / whole;
         says.weight += weight;
         says.information += one.inverse * weight;
         says.pull += one.inverse * one.error * weight;
@@ -196,7 +195,7 @@ pub(super) fn say(
         }
     }
     if let Some((sighting, links)) = links {
-        let link = |one: &Candidate| Link { sighting, map: one.row, probability: share * one.height / whole };
+        let link = |one: &Candidate| Link { sighting, map: one.row, probability: share * one.ratio / whole };
         links.extend(near.iter().map(link));
     }
     says
@@ -208,8 +207,8 @@ struct Candidate {
     /// From where the sighting lies to the fruit.
     error: Vector3<f64>,
     inverse: Matrix3<f64>,
-    /// Density N of the error.
-    height: f64,
+    /// Density N of the error over that of strangers.
+    ratio: f64,
     /// Squared Mahalanobis distance.
     squared: f64,
 }
@@ -220,7 +219,8 @@ fn candidate(map: &KnownFruits, row: usize, place: &Vector3<f64>, own: &Matrix3<
     let error = map.places[row] - place;
     let squared = error.dot(&(inverse * error));
     let peak = (2.0 * std::f64::consts::PI).powi(3) * covariance.determinant();
-    Some(Candidate { row, error, inverse, height: (-0.5 * squared).exp() / peak.sqrt(), squared })
+    let ratio = (-0.5 * squared).exp() / (peak.sqrt() * map.densities[row]);
+    Some(Candidate { row, error, inverse, ratio, squared })
 }
 
 fn normal(says: &[Say], slip: &Slip) -> (Joint, SVector<f64, UNKNOWNS>) {

@@ -95,8 +95,8 @@ impl Localizer {
         let index = index(of_search)?;
         let config = config.localization;
         Ok(Self {
+            map: KnownFruits::new(map, &index, config.own_m),
             index,
-            map: KnownFruits::new(map, config.own_m),
             config,
             belief: None,
             doubt: Doubt::default(),

@@ -39,6 +39,15 @@ impl VerifiedMap {
         Self { fruits: landscape.len(), landscape, seeds, scale }
     }
 
+    /// Strangers in a cubic metre about each fruit of the cloud.
+    pub(crate) fn densities(&self) -> Vec<f64> {
+        let mut of_cloud = vec![0.0; self.landscape.len()];
+        for (row, density) in self.landscape.rows.iter().zip(&self.landscape.density) {
+            of_cloud[*row as usize] = *density;
+        }
+        of_cloud
+    }
+
     /// Where no seeds are looked up, as poses are proposed.
     pub(crate) fn without_seeds(map: &FruitCloud) -> Self {
         Self { landscape: Landscape::new(map), seeds: SeedIndex::empty(), scale: Scale::Metric, fruits: map.len() }

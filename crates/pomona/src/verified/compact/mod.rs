@@ -37,7 +37,7 @@ use crate::neighbours::code_grid::Cells;
 use columns::Column;
 use nalgebra::Vector3;
 use seed_blocks::Block;
-use surroundings::Surroundings;
+use surroundings::{Surroundings, density_of};
 
 /// Fruits of a map at the most: rows have 32 bits, and so have seeds.
 pub(crate) const MOST: usize = 10_000_000;
@@ -92,5 +92,11 @@ impl CompactMap {
     /// The caller's row of each fruit.
     pub(crate) fn rows(&self) -> &[u32] {
         self.rows.get()
+    }
+
+    /// Strangers in a cubic metre about each fruit; without end where a damaged file says what cannot be.
+    pub(crate) fn densities(&self) -> Vec<f64> {
+        let sound = |density: f64| if density.is_normal() && density > 0.0 { density } else { f64::INFINITY };
+        self.surroundings.get().iter().map(|one| sound(density_of(one))).collect()
     }
 }

@@ -1,0 +1,60 @@
+"""A camera before rows on wires, where a wrong pose lays wires on wires and fruits on fruits' places."""
+
+import numpy as np
+import pytest
+from benchmarks.row_drive import Array, Row, pose_at, seen_from, step_to
+
+from pomona import Localizer
+
+HEIGHTS_M = (0.7, 1.1, 1.5, 1.9)
+STEP_M, FILLED = 0.15, 0.75
+DRIVES, FRAMES, AHEAD_M = 5, 30, 0.08
+OFF_SLOT_M = pytest.mark.parametrize("off_slot_m", [0.02, 0.04])
+
+
+def wires(rng: np.random.Generator, off_slot_m: float) -> Array:
+    """Fruits on slots of four wires 24 m long, 2 cm off the wire and farther along it."""
+    slots = [
+        np.column_stack([STEP_M * taken, 0.0 * taken, np.full(len(taken), height)])
+        for height in HEIGHTS_M
+        for taken in [np.flatnonzero(rng.random(int(24.0 / STEP_M)) < FILLED)]
+    ]
+    places = np.concatenate(slots)
+    return places + rng.normal(size=places.shape) * (off_slot_m, 0.02, 0.02)
+
+
+def driven(row: Row, on_map: Array, seed: int) -> list[tuple[bool, float]]:
+    """Whether each frame of a drive along a row was found in a map, and how far off, metres."""
+    localizer = Localizer(on_map, threads=1)
+    poses = [pose_at(3.0 + AHEAD_M * k, turn_deg=2.0 * np.sin(0.3 * k)) for k in range(FRAMES)]
+    told = []
+    for number, pose in enumerate(poses):
+        moved = np.linalg.solve(poses[number - 1], pose) if number else None
+        found = localizer.update(seen_from(row, pose, 100 * seed + number), moved)
+        off_m = np.linalg.norm(step_to(found.map_from_camera, pose)[:3]) if found else np.nan
+        told.append((bool(found), float(off_m)))
+    return told
+
+
+@OFF_SLOT_M
+def test_a_row_on_wires_that_the_map_does_not_have_is_not_found(off_slot_m: float) -> None:
+    """The map is another row on the same wires, at the same steps."""
+    found = []
+    for seed in range(DRIVES):
+        rng = np.random.default_rng(4200 + seed)
+        theirs, ours = wires(rng, off_slot_m), wires(rng, off_slot_m)
+        found += [one for one, _ in driven(Row(ours, ours), theirs, seed)]
+    assert not any(found)
+
+
+@OFF_SLOT_M
+def test_a_row_on_wires_is_found_in_its_map(off_slot_m: float) -> None:
+    told = []
+    for seed in range(DRIVES):
+        rng = np.random.default_rng(4300 + seed)
+        hanging = wires(rng, off_slot_m)
+        on_map = hanging[rng.random(len(hanging)) < 0.75]
+        row = Row(on_map, hanging + rng.normal(0, 0.01, hanging.shape))
+        told += driven(row, on_map + rng.normal(0, 0.008, on_map.shape), seed)
+    assert np.mean([one for one, _ in told]) > 0.9
+    assert np.nanmax([off_m for _, off_m in told]) < 0.15
