@@ -1,6 +1,7 @@
 """Tracks through a rendered row, true poses and exact depth; what the Python face promises."""
 
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -152,7 +153,13 @@ def test_wrong_input_is_one_line() -> None:
     with pytest.raises(PomonaError, match=r"found an array of shape \(3, 3\)"):
         tracker.update(0, np.eye(3), Detections.none(), lifted([]))
     tracker.update(7, np.eye(4), Detections.none(), lifted([]))
-    with pytest.raises(PomonaError, match="frame 7: found after frame 7"):
+    with pytest.raises(PomonaError, match=r"^frame 7: found after frame 7"):
         tracker.update(7, np.eye(4), Detections.none(), lifted([]))
+    with pytest.raises(PomonaError, match=r"^frame_number: found '7\.5', expected a whole number"):
+        tracker.update(7.5, np.eye(4), Detections.none(), lifted([]))  # type: ignore[arg-type]
+    one = lifted([[0.0, 0.0, 1.0]])
+    with pytest.raises(PomonaError, match=r"^frame 8: covariances: row 0 is not symmetric positive semi-definite"):
+        box = Detections(np.array([[300.0, 220.0, 340.0, 260.0]]), np.ones(1))
+        tracker.update(8, np.eye(4), box, replace(one, covariances=-one.covariances))
     with pytest.raises(PomonaError, match=r"lifted\.rows"):
         tracker.update(8, np.eye(4), Detections.none(), lifted([[0.0, 0.0, 1.0]]))

@@ -4,6 +4,7 @@ mod appearance;
 mod bundle;
 mod camera;
 mod cloud;
+mod config;
 mod descriptor;
 mod identity;
 mod lifting;

@@ -2,6 +2,7 @@
 
 use crate::bundle::{array, wrong};
 use crate::cloud::Arrays;
+use crate::config::parsed;
 use crate::matching::{mapped, status};
 use crate::pose::{pose, pose_array};
 use crate::threads::PyThreads;
@@ -142,7 +143,7 @@ impl PyLocalizer {
         threads: Option<&PyThreads>,
         make: impl FnOnce(&FruitCloud, Config) -> pomona::Result<Localizer> + Send,
     ) -> PyResult<Self> {
-        let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
+        let config = parsed(config)?;
         let pool = threads.map(PyThreads::pool);
         let cloud = map.to_cloud()?;
         let make = || make(&cloud, config);

@@ -1,6 +1,7 @@
 //! The facade: an index of a map, its answers, the settings.
 
 use crate::cloud::Arrays;
+use crate::config::parsed;
 use memmap2::{Mmap, MmapOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
@@ -140,7 +141,7 @@ impl PyMapIndex {
     ) -> PyResult<Self> {
         let method: Method = parse("method", method)?;
         let scale: Scale = parse("scale", scale)?;
-        let config = config_of(config)?;
+        let config = parsed(config)?;
         let cloud = map.to_cloud()?;
         Self::made(py, threads, || MapIndex::new(&cloud, method, scale, config))
     }
@@ -149,7 +150,7 @@ impl PyMapIndex {
     #[staticmethod]
     #[pyo3(signature = (map, *, config, threads=None))]
     fn compact(py: Python<'_>, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
-        let config = config_of(config)?;
+        let config = parsed(config)?;
         let cloud = map.to_cloud()?;
         Self::made(py, threads, || MapIndex::compact(&cloud, config))
     }
@@ -158,7 +159,7 @@ impl PyMapIndex {
     #[staticmethod]
     #[pyo3(signature = (path, map, *, config, threads=None))]
     fn opened(py: Python<'_>, path: PathBuf, map: Arrays<'_>, config: &str, threads: Option<usize>) -> PyResult<Self> {
-        let config = config_of(config)?;
+        let config = parsed(config)?;
         let bytes: Bytes = Arc::new(mapped(&path)?);
         let cloud = map.to_cloud()?;
         Self::made(py, threads, || MapIndex::opened(&bytes, &cloud, config))
@@ -252,7 +253,7 @@ pub fn match_expected(
     noise_m: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<PyMatch> {
-    let config = config_of(config)?;
+    let config = parsed(config)?;
     let pool = threads.map(pool_of).transpose()?;
     let (query, map) = (&query.0, &map.0);
     let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
@@ -278,10 +279,6 @@ impl PyMapIndex {
         });
         Ok(Self { index: made.map_err(wrong)?, pool })
     }
-}
-
-fn config_of(text: &str) -> PyResult<Config> {
-    serde_json::from_str(text).map_err(|error| wrong(format!("configuration: {error}")))
 }
 
 /// A file as bytes that are read as they are needed.

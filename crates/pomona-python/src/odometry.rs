@@ -3,17 +3,18 @@
 use crate::bundle::{array, blocks, matrices, wrong};
 use crate::camera::Calibration;
 use crate::cloud::points;
+use crate::config::parsed;
 use crate::pose::{pose, pose_array, pose_arrays};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pomona::nalgebra::{Vector2, Vector3};
 use pomona::odometry::{
-    Eyes, FoundAgain, Lens, Motion, Odometry, OdometryConfig, Passage, PicturesConfig, Places, corners, disparities,
+    Eyes, FoundAgain, Lens, Motion, Odometry, Passage, PicturesConfig, Places, corners, disparities,
     follow, rejoined,
 };
 use pomona::row_search::Grey;
-use pomona::{Config, Pose};
+use pomona::Pose;
 use pyo3::prelude::*;
 
 /// What goes wrong in Python, or in the core.
@@ -112,7 +113,7 @@ pub struct PyLooking(PicturesConfig);
 impl PyLooking {
     #[new]
     fn new(config: &str) -> PyResult<Self> {
-        Ok(Self(parsed(config)?.pictures))
+        Ok(Self(parsed(config)?.odometry.pictures))
     }
 
     /// The table `odometry.pictures` as JSON.
@@ -176,12 +177,6 @@ impl PyLooking {
     }
 }
 
-fn parsed(config: &str) -> PyResult<OdometryConfig> {
-    let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-    config.validate().map_err(wrong)?;
-    Ok(config.odometry)
-}
-
 /// Motion of a camera, frame by frame.
 #[pyclass(name = "Odometry", module = "pomona._core")]
 pub struct PyOdometry(Odometry);
@@ -192,7 +187,7 @@ impl PyOdometry {
     #[new]
     #[pyo3(signature = (camera, *, config))]
     fn new(camera: Calibration, config: &str) -> PyResult<Self> {
-        let config = parsed(config)?;
+        let config = parsed(config)?.odometry;
         Ok(Self(Odometry::new(Lens::new(&camera.to_camera()?, &config), config)))
     }
 

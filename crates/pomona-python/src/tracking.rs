@@ -2,26 +2,21 @@
 
 use crate::camera::Calibration;
 use crate::cloud::{matrices, points, rows};
+use crate::config::parsed;
 use crate::lifting::boxes;
 use crate::pose::{pose, poses};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
+use pomona::Pose;
 use pomona::stereo::Picture;
 use pomona::tracking::{Body, Boxes, Colours, LiftedBoxes, TrackViews, Tracker, Tracks, belief, merge_duplicates};
-use pomona::{Config, Pose};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
-}
-
-fn parsed(config: &str) -> PyResult<Config> {
-    let config: Config = serde_json::from_str(config).map_err(|error| wrong(format!("configuration: {error}")))?;
-    config.validate().map_err(wrong)?;
-    Ok(config)
 }
 
 /// Boxes that have a depth, as Python passes them.

@@ -98,7 +98,7 @@ impl FruitCloud {
 }
 
 /// Symmetric to rounding and without a negative eigenvalue beyond rounding.
-fn is_covariance(matrix: &Matrix3<f64>) -> bool {
+pub(crate) fn is_covariance(matrix: &Matrix3<f64>) -> bool {
     let size = matrix.norm();
     size.is_finite()
         && (matrix - matrix.transpose()).norm() <= 1e-9 * size.max(1e-30)

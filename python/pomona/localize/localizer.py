@@ -130,7 +130,9 @@ class Localizer:
             else:
                 self._core = out_of_index(Path(index), read, make, absent=make)
         except (ValueError, TypeError, OverflowError) as error:
-            raise PomonaError(f"map: {error}") from None
+            # What is wrong with settings says so by itself.
+            is_setting = str(error).startswith(("configuration:", "setting "))
+            raise PomonaError(str(error) if is_setting else f"map: {error}") from None
 
     def __len__(self) -> int:
         return len(self._rows)

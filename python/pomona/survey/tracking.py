@@ -16,6 +16,7 @@ from pomona import _core
 from pomona.core_settings import core_settings
 from pomona.detect import Detections
 from pomona.errors import PomonaError
+from pomona.reading import shown
 from pomona.recording.calibration import Calibration
 from pomona.survey.depth import Lifted
 
@@ -314,11 +315,14 @@ class Tracker:
         Raises
         ------
         PomonaError
-            Arrays do not fit together, the pose is not rigid, or the frame does not follow the last one.
+            Arrays do not fit together, a covariance is none, the pose is not rigid, or the frame does not follow the
+            last one. A depth that is no number, or lies behind the camera, is none: then its box counts alone.
         """
         pose = np.asarray(session_from_camera, np.float64)
         if pose.shape != (4, 4):
             raise PomonaError(f"session_from_camera: found an array of shape {pose.shape}, expected (4, 4)")
+        if not isinstance(frame_number, int | np.integer):
+            raise PomonaError(f"frame_number: found {shown(str(frame_number))}, expected a whole number")
         # A depth guessed from the size tells the tracker nothing that it does not know of sizes itself.
         measured = lifted.measured
         arrays: _core._Lifted = {
@@ -332,7 +336,9 @@ class Tracker:
         try:
             return self._core.update(frame_number, pose, detections.boxes_px, detections.scores, arrays)
         except ValueError as error:
-            raise PomonaError(f"frame {frame_number}: {error}") from None
+            # That frames come out of order says which it is by itself.
+            where = f"frame {frame_number}: "
+            raise PomonaError(f"{where}{str(error).removeprefix(where)}") from None
 
     def glimpse(self, picture: NDArray[np.uint8]) -> None:
         """Look in the colour picture of the last frame, (H, W, 3), for fruits that the detector gave no box."""

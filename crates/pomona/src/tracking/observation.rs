@@ -2,6 +2,7 @@
 
 use super::sphere::Interval;
 use crate::camera::Camera;
+use crate::cloud::is_covariance;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
@@ -124,10 +125,12 @@ fn check_lengths(boxes: &Boxes<'_>, lifted: &LiftedBoxes<'_>) -> Result<()> {
             return Err(Error::Length { what, found, expected });
         }
     }
-    match lifted.rows.iter().find(|&&row| row >= n_boxes) {
-        Some(&found) => Err(Error::Row { what: "lifted.rows", found, below: n_boxes }),
-        None => Ok(()),
+    if let Some(&found) = lifted.rows.iter().find(|&&row| row >= n_boxes) {
+        return Err(Error::Row { what: "lifted.rows", found, below: n_boxes });
     }
+    // A depth that is no number is none; one that has no spread would draw every fruit to it.
+    let is_wrong = |matrix: &Matrix3<f64>| matrix.iter().all(|x| x.is_finite()) && !is_covariance(matrix);
+    lifted.covariances.iter().position(is_wrong).map_or(Ok(()), |row| Err(Error::Covariance { row }))
 }
 
 fn sides(camera: &Camera, [xmin, ymin, xmax, ymax]: [f64; 4]) -> [PixelSide; 2] {
