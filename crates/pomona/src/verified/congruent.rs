@@ -71,20 +71,27 @@ impl<'a> Search<'a> {
         seeds.retain(|(_, code)| f64::from(code[0]) < LONGEST * map.spacing);
         seeds.sort_unstable_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.0.cmp(&b.0)));
         seeds.truncate((TRIED / map.len()).clamp(1, MOST));
-        let of_seed = |&(quad, _): &Seed| {
-            let (mut found, mut effort) = (Vec::new(), Effort { codes: 1, ..Effort::default() });
-            if let Some(proposer) = Proposer::new(query, map, &model, quad) {
-                let fruits = quad.map(|row| query.points[row as usize]);
-                each_alike(&fruits, map, WITHIN * sigma, &mut |target| {
-                    effort.candidates += 1;
-                    found.extend(proposer.contender(&target, most, &mut effort));
-                });
-            }
-            (found, effort)
-        };
         let (mut contenders, mut effort) = (Vec::new(), Effort::default());
         for some in seeds.chunks(AT_ONCE) {
-            let of_each: Vec<(Vec<Contender>, Effort)> = some.par_iter().map(of_seed).collect();
+            let proposed = some.iter().filter_map(|&(quad, _)| {
+                let proposer = Proposer::new(query, map, &model, quad)?;
+                Some((proposer, quad.map(|row| query.points[row as usize])))
+            });
+            let laid: Vec<(Proposer<_>, [Vector3<f64>; STARS])> = proposed.collect();
+            let reach = laid.iter().map(|(_, fruits)| (fruits[0] - fruits[1]).norm()).fold(0.0, f64::max);
+            let at = |first: u32| {
+                let (mut found, mut effort) = (Vec::new(), Effort::default());
+                let around = Around::new(map, first, reach + WITHIN * sigma);
+                for (proposer, fruits) in &laid {
+                    around.each_alike(fruits, WITHIN * sigma, &mut |target| {
+                        effort.candidates += 1;
+                        found.extend(proposer.contender(&target, most, &mut effort));
+                    });
+                }
+                (found, effort)
+            };
+            let of_each: Vec<(Vec<Contender>, Effort)> = (0..map.len() as u32).into_par_iter().map(at).collect();
+            effort.codes += some.len() as u64;
             let before = effort.candidates;
             effort = of_each.iter().fold(effort, |sum, &(_, spent)| sum + spent);
             if effort.candidates - before > ANY * some.len() as u64 {
@@ -96,17 +103,37 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Calls `take` with every four fruits of a cloud whose distances differ from those of `fruits` by less than `within`.
-fn each_alike(fruits: &[Vector3<f64>; STARS], cloud: &Landscape, within: f64, take: &mut impl FnMut(Quad)) {
-    // A and B are the farthest apart, so all four lie within that of A.
-    let reach = (fruits[0] - fruits[1]).norm() + within;
-    for a in 0..cloud.len() as u32 {
-        let near = cloud.within(&cloud.points[a as usize], reach);
-        each_alike_among(fruits, cloud, [&[a], &near, &near, &near], within, take);
+/// The fruits around one of a cloud, nearest first: those at a distance are next to each other.
+struct Around<'a> {
+    cloud: &'a Landscape,
+    first: u32,
+    rows: Vec<u32>,
+    distances: Vec<f64>,
+}
+
+impl<'a> Around<'a> {
+    fn new(cloud: &'a Landscape, first: u32, reach: f64) -> Self {
+        let place = cloud.points[first as usize];
+        let apart = |row: u32| ((cloud.points[row as usize] - place).norm(), row);
+        let mut near: Vec<(f64, u32)> = cloud.within(&place, reach).into_iter().map(apart).collect();
+        near.sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+        let (distances, rows) = near.into_iter().unzip();
+        Self { cloud, first, rows, distances }
+    }
+
+    /// Calls `take` with every four fruits, this the first, whose distances differ from those of `fruits` by less than `within`.
+    fn each_alike(&self, fruits: &[Vector3<f64>; STARS], within: f64, take: &mut impl FnMut(Quad)) {
+        let shell = |star: usize| {
+            let apart = (fruits[0] - fruits[star]).norm();
+            let [low, high] =
+                [apart - within, apart + within].map(|end| self.distances.partition_point(|&distance| distance < end));
+            &self.rows[low..high]
+        };
+        each_alike_among(fruits, self.cloud, [&[self.first], shell(1), shell(2), shell(3)], within, take);
     }
 }
 
-/// The same of four fruits one of which is of each list.
+/// Calls `take` with every four fruits, one of each list, whose distances differ from those of `fruits` by less than `within`.
 pub(super) fn each_alike_among(
     fruits: &[Vector3<f64>; STARS],
     cloud: &Landscape,
@@ -150,12 +177,14 @@ mod tests {
         order = ends.into_iter().fold(order, |best, next| if apart(next) > apart(best) { next } else { best });
         fruits = order.map(|at| fruits[at]);
         let (mut found, mut wrong) = (Vec::new(), 0);
-        each_alike(&fruits, &map, 0.01, &mut |four| {
+        let mut take = |four: Quad| {
             found.push(four);
             let places = four.map(|row| map.points[row as usize]);
             let off = |i: usize, j: usize| ((places[i] - places[j]).norm() - (fruits[i] - fruits[j]).norm()).abs();
             wrong += usize::from((0..STARS).any(|i| (0..i).any(|j| off(i, j) >= 0.01)));
-        });
+        };
+        let reach = (fruits[0] - fruits[1]).norm() + 0.01;
+        (0..map.len() as u32).for_each(|first| Around::new(&map, first, reach).each_alike(&fruits, 0.01, &mut take));
         assert!(found.contains(&order.map(|at| rows[at])));
         assert_eq!(wrong, 0);
     }
