@@ -9,7 +9,7 @@ use super::contender::{Contender, by_evidence, distinct};
 use super::hypothesis::Model;
 use super::landscape::Landscape;
 use super::proposal::{Effort, Proposer};
-use super::seeds::{COMPANIONS, Quad, STARS, Seed, WITHIN, enumerate};
+use super::seeds::{COMPANIONS, Quad, STARS, WITHIN, enumerate};
 use crate::geometry::Scale;
 use nalgebra::Vector3;
 use rayon::prelude::*;
