@@ -48,6 +48,18 @@ impl Slip {
         Self { since, total: Vector6::zeros(), covariance: *covariance, expected: *covariance }
     }
 
+    /// Others that chance may have made of it, to look from there: a standard deviation either way along each axis, each known to
+    /// half of one.
+    pub fn others(&self) -> impl Iterator<Item = Self> + '_ {
+        let sigmas = self.expected.diagonal().map(f64::sqrt);
+        let aside = move |axis: usize, sign: f64| {
+            let mut total = Vector6::zeros();
+            total[axis] = sign * sigmas[axis];
+            Self { total, covariance: self.expected * 0.25, ..*self }
+        };
+        (0..6).flat_map(move |axis| [-1.0, 1.0].map(|sign| aside(axis, sign)))
+    }
+
     /// What is not known of it once it is taken off: a slip of the next motion.
     pub fn left(&self) -> Self {
         let part = self.part(1);

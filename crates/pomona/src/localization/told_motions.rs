@@ -143,22 +143,23 @@ impl ToldMotions {
     ) -> Settled {
         let sightings = window.sightings(enough);
         let joined = oldest(&sightings) > 0;
-        let aligned = if joined {
+        let (aligned, spread) = if joined {
             let before = Belief { covariance: told.covariance - expected, ..*told };
-            align(&sightings, map, &before, &Slip::by_chance(1, expected))
+            let slip = Slip::by_chance(1, expected);
+            // Few fruits may fit others of the map after another motion nearly as well.
+            let from = |slip: &Slip| align(&sightings, map, &before, slip);
+            let aligned = from(&slip);
+            let found = std::iter::once((aligned.pose, evidence(&aligned)));
+            let others = slip.others().map(|other| from(&other)).map(|one| (one.pose, evidence(&one)));
+            let poses: Vec<Weighed> = distinct(found.chain(others));
+            let spread = spread(&aligned.pose, &poses);
+            (aligned, spread)
         } else {
-            align(&sightings, map, told, &Slip::none())
+            (align(&sightings, map, told, &Slip::none()), Matrix6::zeros())
         };
         let mut window = window.clone();
         window.slip(&aligned.slip);
-        Settled {
-            sightings,
-            aligned,
-            motions: Self::default(),
-            spread: Matrix6::zeros(),
-            predicted: Some(*told),
-            window: Some(window),
-        }
+        Settled { sightings, aligned, motions: Self::default(), spread, predicted: Some(*told), window: Some(window) }
     }
 
     /// Settles the pose by motions that are as before or right.
@@ -211,6 +212,20 @@ fn spread(chosen: &Pose, poses: &[Weighed]) -> Matrix6<f64> {
         weights += weight;
     }
     sum / weights
+}
+
+/// Two searches that end no farther apart, metres and radians together, have found one pose.
+const ONE_POSE: f64 = 1e-3;
+
+/// The first of those that are one pose.
+fn distinct(poses: impl Iterator<Item = Weighed>) -> Vec<Weighed> {
+    let mut kept: Vec<Weighed> = Vec::new();
+    for one in poses {
+        if kept.iter().all(|other| logarithm(&one.0.seen_from(&other.0)).norm() > ONE_POSE) {
+            kept.push(one);
+        }
+    }
+    kept
 }
 
 /// Motions since the oldest sighting.
