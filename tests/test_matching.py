@@ -315,6 +315,13 @@ def test_clouds_that_are_found_are_looked_at_too() -> None:
     assert pomona.Index(1000 * row()).match(1000 * row())
 
 
+def test_a_cloud_that_holds_every_fruit_twice_is_told_of() -> None:
+    with pytest.warns(
+        pomona.PomonaWarning, match=r"^query: \d+ of \d+ fruits lie where another one does, .* each once$"
+    ):
+        assert pomona.match(np.concatenate([row(), row()]), row())
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_coordinates_in_steps_as_coarse_as_the_spacing_are_told_of(turned: bool, tmp_path: Path) -> None:
     """Those of UTM in 32 bits, be the row along the northing or across."""

@@ -116,6 +116,10 @@ def doubt_of_places(positions: NDArray[np.float64]) -> PlacesDoubt | None:
         return None
     spacing_m = _spacing_m(positions)
     reach_m = np.hypot.reduce(positions - np.median(positions, axis=0), axis=1)  # squares may overflow
+    copies = len(positions) - len(np.unique(positions, axis=0))
+    if spacing_m < MIN_SPACING_M and 2 * copies >= len(positions):
+        found = f"{copies} of {len(positions)} fruits lie where another one does, to the last digit"
+        return PlacesDoubt(f"{found}, expected each once", is_of_unit=False)
     if not MIN_SPACING_M <= spacing_m <= MAX_SPACING_M:
         found = f"neighbouring fruits are {spacing_m:.3g} m apart (median), expected {MIN_SPACING_M:g} to"
         return PlacesDoubt(f"{found} {MAX_SPACING_M:g} m", is_of_unit=True)
