@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.recordings import true_boxes
+from scipy.spatial.transform import Rotation
 
 from pomona import PomonaError, default_config
 from pomona.detect import Detections
@@ -45,9 +46,17 @@ def pose(x_m: float) -> np.ndarray:
     return matrix
 
 
+Tracked = tuple[Tracks, dict[tuple[int, int], str], list[np.ndarray]]
+
+
 @pytest.fixture(scope="module")
-def row(shared_data: Path) -> tuple[Tracks, dict[tuple[int, int], str], list[np.ndarray]]:
-    """Tracks of one date, the fruit behind each box, the online numbers."""
+def row(shared_data: Path) -> Tracked:
+    """Tracks of one date by true poses."""
+    return tracked(shared_data, 0, np.eye(4))
+
+
+def tracked(shared_data: Path, jumps_at: int, off: np.ndarray) -> Tracked:
+    """Tracks of one date, the fruit behind each box, the online numbers; from a frame on all poses are `off`."""
     source = shared_data / "rendered_row" / "2024-08-28"
     recording = open_recording(source)
     of_frame = defaultdict(list)
@@ -58,14 +67,13 @@ def row(shared_data: Path) -> tuple[Tracks, dict[tuple[int, int], str], list[np.
         found = of_frame[frame.number]
         boxes_px = np.array([box.box_px for box in found], float)
         fruits = lift(frame.read_depth(), boxes_px, recording.calibration)
-        online.append(
-            tracker.update(frame.number, frame.session_from_camera, Detections(boxes_px, np.ones(len(found))), fruits)
-        )
+        given = frame.session_from_camera @ (off if frame.number >= jumps_at else np.eye(4))
+        online.append(tracker.update(frame.number, given, Detections(boxes_px, np.ones(len(found))), fruits))
         names |= {(frame.number, row): box.fruit for row, box in enumerate(found)}
     return tracker.finish(), names, online
 
 
-def test_a_rendered_row_is_counted(row: tuple[Tracks, dict[tuple[int, int], str], list[np.ndarray]]) -> None:
+def test_a_rendered_row_is_counted(row: Tracked) -> None:
     tracks, names, _ = row
     often = {name for name, views in Counter(names.values()).items() if views >= 5}
     assert abs(len(tracks) - len(often)) <= 0.02 * len(often)
@@ -78,7 +86,7 @@ def test_a_rendered_row_is_counted(row: tuple[Tracks, dict[tuple[int, int], str]
     assert strange <= 0.01 * len(tracks.frames)
 
 
-def test_tracks_are_consistent(row: tuple[Tracks, dict[tuple[int, int], str], list[np.ndarray]]) -> None:
+def test_tracks_are_consistent(row: Tracked) -> None:
     tracks, _, online = row
     assert np.array_equal(np.bincount(tracks.fruits, minlength=len(tracks)), tracks.n_views)
     assert tracks.n_views.min() >= default_config()["tracking"]["min_views"]
@@ -95,6 +103,20 @@ def test_tracks_are_consistent(row: tuple[Tracks, dict[tuple[int, int], str], li
     assert same > 0.9
     # The tracked places are good enough to start a refinement.
     assert np.median(np.sqrt(np.linalg.eigvalsh(tracks.covariances).max(axis=1))) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "z_m", "turn_deg"), [(0.15, 0.0, 0.0, 0.0), (-0.4, 0.1, 0.2, 0.0), (0.05, 0.0, 0.0, 5.0)]
+)
+def test_a_row_is_counted_once_where_poses_jump(
+    row: Tracked, shared_data: Path, x_m: float, y_m: float, z_m: float, turn_deg: float
+) -> None:
+    """As odometry does that slips amid the row: the fruits in view say where the camera is."""
+    off = np.eye(4)
+    off[:3, :3] = Rotation.from_euler("y", turn_deg, degrees=True).as_matrix()
+    off[:3, 3] = (x_m, y_m, z_m)
+    tracks, _, _ = tracked(shared_data, 20, off)
+    assert len(tracks) == pytest.approx(len(row[0]), rel=0.02)
 
 
 def test_numbers_follow_a_fruit_and_come_back_after_a_gap() -> None:
@@ -158,8 +180,8 @@ def test_wrong_input_is_one_line() -> None:
     with pytest.raises(PomonaError, match=r"^frame_number: found '7\.5', expected a whole number"):
         tracker.update(7.5, np.eye(4), Detections.none(), lifted([]))  # type: ignore[arg-type]
     one = lifted([[0.0, 0.0, 1.0]])
+    box = boxes([[0.0, 0.0, 1.0]])
     with pytest.raises(PomonaError, match=r"^frame 8: covariances: row 0 is not symmetric positive semi-definite"):
-        box = Detections(np.array([[300.0, 220.0, 340.0, 260.0]]), np.ones(1))
         tracker.update(8, np.eye(4), box, replace(one, covariances=-one.covariances))
     with pytest.raises(PomonaError, match=r"lifted\.rows"):
         tracker.update(8, np.eye(4), Detections.none(), lifted([[0.0, 0.0, 1.0]]))

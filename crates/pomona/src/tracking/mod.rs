@@ -26,6 +26,7 @@ mod belief;
 mod birth;
 mod config;
 mod glimpse;
+mod jump;
 mod known;
 mod landmark;
 mod likelihood;

@@ -5,6 +5,7 @@ use super::association::{Association, associate};
 use super::birth::birth;
 use super::config::TrackingConfig;
 use super::glimpse::{Expected, Glimpses, OwnedPicture};
+use super::jump::after_jump;
 use super::known::{Instant, Known};
 use super::likelihood::Weighed;
 use super::observation::{Boxes, LiftedBoxes, Observation, observations};
@@ -173,19 +174,28 @@ impl Tracker {
     /// Assigns boxes to known fruits, from where these say that the camera is.
     fn look(&mut self, given: &Pose, observations: &[Observation], unknown: &[Unknown]) -> View {
         let mut pose = self.correction.after(given);
+        let mut view = self.view(pose, &self.unaligned, observations, unknown);
+        let fruits = (view.predictions.as_slice(), &view.association);
+        if let Some(there) = after_jump(fruits, observations, &self.known, &self.camera) {
+            view = self.corrected(given, there, observations, unknown);
+            pose = there;
+        }
         for _ in 0..ALIGNMENTS {
-            let View { predictions, association, .. } = &self.view(pose, &self.unaligned, observations, unknown);
-            let fruits = (predictions.as_slice(), association, &self.known);
-            let Some(better) = aligned(&pose, fruits, &self.camera, &self.unaligned) else {
-                return self.view(pose, &self.unaligned, observations, unknown);
-            };
+            let fruits = (view.predictions.as_slice(), &view.association, &self.known);
+            let Some(better) = aligned(&pose, fruits, &self.camera, &self.unaligned) else { return view };
             if better == pose {
                 break;
             }
+            view = self.corrected(given, better, observations, unknown);
             pose = better;
-            self.correction = pose.after(&given.inverse());
         }
         self.view(pose, &self.config, observations, unknown)
+    }
+
+    /// Learns where the camera is in place of the given pose, and looks from there.
+    fn corrected(&mut self, given: &Pose, pose: Pose, observations: &[Observation], unknown: &[Unknown]) -> View {
+        self.correction = pose.after(&given.inverse());
+        self.view(pose, &self.unaligned, observations, unknown)
     }
 
     fn view(&self, pose: Pose, config: &TrackingConfig, observations: &[Observation], unknown: &[Unknown]) -> View {
