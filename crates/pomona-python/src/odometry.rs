@@ -8,13 +8,12 @@ use crate::pose::{pose, pose_array, pose_arrays};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
+use pomona::Pose;
 use pomona::nalgebra::{Vector2, Vector3};
 use pomona::odometry::{
-    Eyes, FoundAgain, Lens, Motion, Odometry, Passage, PicturesConfig, Places, corners, disparities,
-    follow, rejoined,
+    Eyes, FoundAgain, Lens, Motion, Odometry, Passage, PicturesConfig, Places, corners, disparities, follow, rejoined,
 };
 use pomona::row_search::Grey;
-use pomona::Pose;
 use pyo3::prelude::*;
 
 /// What goes wrong in Python, or in the core.

@@ -9,7 +9,7 @@
 //! 2. Each is projected: the outline of its sphere, the covariance of its middle and depth (`prediction`).
 //! 3. Each box is weighed against each such fruit by the log-odds against a box of something new (`likelihood`).
 //! 4. The assignment with the largest sum of log-odds is taken ([`crate::assignment`]), once to see where the fruits say that
-//!    the camera is (`alignment`), and then from there.
+//!    the camera is (`alignment`; `jump` where the given pose has leapt), and then from there.
 //! 5. Boxes left over may be a second piece of an assigned fruit, or the outline of two fruits (`sharing`); the others
 //!    are born as fruits, by their depth or by their size (`birth`).
 //! 6. Assigned fruits take up what was seen (`landmark`); two that cannot both be there become one (`merging`).
