@@ -108,8 +108,8 @@ def settlement_of(connection: sqlite3.Connection, evidence: Evidence) -> Settlem
 def settle(connection: sqlite3.Connection, settlement: Settlement) -> None:
     """Bring sessions, fruits and observations of the parts up to date; all of them are in the map already.
 
-    Sessions move first, with their trees, then come new fruits, then observations change theirs, then fruits without any
-    go.
+    Sessions move first, with their trees, then come new fruits, then observations change theirs, then fruits without
+    any go.
     """
     moves: dict[int, NDArray[np.float64]] = {}
     for part in settlement.parts:
