@@ -15,6 +15,7 @@ from pomona import geopackage
 from pomona.amounts import amount
 from pomona.orchard.besides import POINT_NAMES, Besides, KnownRow
 from pomona.orchard.earth_layers import stored_anchor
+from pomona.orchard.moving import moved_places
 from pomona.orchard.tree_tables import DRAWN, NEAR_M, StoredTree, bear, stored_trees
 from pomona.store.numbering import last_ids
 from pomona.store.rows import columns_of
@@ -70,15 +71,11 @@ def carry_anchor(connection: sqlite3.Connection, theirs: Besides, map_from_other
         ),
     )  # fmt: skip
     places = geopackage.points_of([point[0] for point in theirs.control_points])
-    moved = geopackage.points(_moved(map_from_other, places))
+    moved = geopackage.points(moved_places(map_from_other, places))
     connection.executemany(
         f"INSERT INTO control_points ({', '.join(POINT_NAMES)}) VALUES ({', '.join('?' * len(POINT_NAMES))})",
         ((geom, *point[1:]) for geom, point in zip(moved, theirs.control_points, strict=True)),
     )
-
-
-def _moved(transform: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(places @ transform[:3, :3].T + transform[:3, 3])
 
 
 def carry_trees(
@@ -94,7 +91,7 @@ def carry_trees(
     names = {tree.name for tree in before}
     for row_id in sorted({tree.row_id for tree in theirs.trees}):
         trees = [
-            replace(tree, place_in_map=_moved(map_from_other, tree.place_in_map))
+            replace(tree, place_in_map=moved_places(map_from_other, tree.place_in_map))
             for tree in theirs.trees
             if tree.row_id == row_id
         ]

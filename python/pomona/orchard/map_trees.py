@@ -66,9 +66,10 @@ class TreeRow:
 
 @dataclass(frozen=True, eq=False)
 class _Fruits:
-    """All fruits of the map, and where cameras went."""
+    """All fruits of the map, the tree of each, 0 for none, and where cameras went."""
 
     ids: NDArray[np.int64]
+    tree_ids: NDArray[np.int64]
     positions: NDArray[np.float64]
     believed: NDArray[np.bool_]
     of_last_season: NDArray[np.bool_]
@@ -190,7 +191,7 @@ class _Finding:
             planting = planting_at(positions, line.along_m, line.beside_m, places)
         elif planting.crowns is None and self.segment_m is not None:
             kind, planting = "segments", _segments(line, self.segment_m)
-        elif planting.crowns is None and len(places := self._told_before(line)) > 1:
+        elif planting.crowns is None and len(places := self._told_before(line, members)) > 1:
             # What fruits come to may tell less of the trees than those before did, but takes none of them away.
             planting = planting_at(positions, line.along_m, line.beside_m, places)
         if planting.crowns is None:
@@ -239,11 +240,13 @@ class _Finding:
         log_odds = planting.log_odds
         return TreeRow(row_number, kind, source, self._count(members), planting.spacing_m, log_odds, tuple(told))
 
-    def _told_before(self, line: RowLine) -> NDArray[np.float64]:
-        """Return where along a row the trees stand that its fruits told before, ascending."""
-        told = [tree for tree in self.before if tree.kind == "tree" and tree.source == FOUND]
-        beside = [tree.place_in_map for tree in told if not self.forget and _is_beside(line, tree.place_in_map)]
-        return np.sort(line.along_of(np.array(beside))) if beside else np.empty(0)
+    def _told_before(self, line: RowLine, members: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return where along a row the trees stand that fruits told before and its own hung on, ascending."""
+        hung_on = set() if self.forget else set(self.fruits.tree_ids[members].tolist())
+        told = [
+            tree for tree in self.before if tree.tree_id in hung_on and tree.kind == "tree" and tree.source == FOUND
+        ]
+        return np.sort(line.along_of(np.array([tree.place_in_map for tree in told]))) if told else np.empty(0)
 
     def _count(self, members: NDArray[np.int64]) -> int:
         """Count fruits of the last season: trees are told by those of all."""
@@ -311,11 +314,12 @@ def _in_segments(line: RowLine, crowns: Crowns) -> tuple[NDArray[np.int64], NDAr
 
 
 def _fruits(connection: sqlite3.Connection) -> _Fruits:
-    names = ("id", "geom", "state", "fruit_probability", "last_session_id")
-    ids, geoms, states, chances, last_sessions = columns_of(connection, "fruits", names)
+    names = ("id", "tree_id", "geom", "state", "fruit_probability", "last_session_id")
+    ids, tree_ids, geoms, states, chances, last_sessions = columns_of(connection, "fruits", names)
     part_of = part_numbers(connection)
     return _Fruits(
         ids=np.array(ids, np.int64),
+        tree_ids=np.array([tree_id or 0 for tree_id in tree_ids], np.int64),
         positions=geopackage.points_of(geoms),
         believed=tell_trees(states, chances),
         of_last_season=~np.isin(last_sessions, sessions_of_past_seasons(connection)),

@@ -18,7 +18,7 @@ from pomona.store.cells import finite_json
 from pomona.store.rows import columns_of
 from pomona.trajectory import Trajectory
 
-__all__ = ["JOINED_M", "move_session", "move_trees"]
+__all__ = ["JOINED_M", "move_session", "move_trees", "moved_places"]
 
 JOINED_M = 0.5
 """Sessions whose fruits move farther came to another part of the map. By less they are laid better where they are, and
@@ -88,12 +88,14 @@ def move_trees(connection: sqlite3.Connection, moves: Mapping[int, NDArray[np.fl
         # A tree on which nothing hangs goes with its row.
         move = moves.get(of_tree.get(tree_id, of_row.get(row_id or 0, 0)))
         if move is not None and geom is not None:
-            place = _moved(move, geopackage.points_of([geom]))
+            place = moved_places(move, geopackage.points_of([geom]))
             connection.execute("UPDATE trees SET geom = ? WHERE id = ?", (geopackage.points(place)[0], tree_id))
     for row_id, geom in zip(*columns_of(connection, "rows", ("id", "geom")), strict=True):
         move, line = moves.get(of_row.get(row_id, 0)), None if geom is None else geopackage.line_of(geom)
         if move is not None and line is not None:
-            connection.execute("UPDATE rows SET geom = ? WHERE id = ?", (geopackage.line(_moved(move, line)), row_id))
+            connection.execute(
+                "UPDATE rows SET geom = ? WHERE id = ?", (geopackage.line(moved_places(move, line)), row_id)
+            )
 
 
 def _most_of_each(counts: Mapping[tuple[int, int], int]) -> dict[int, int]:
@@ -104,5 +106,6 @@ def _most_of_each(counts: Mapping[tuple[int, int], int]) -> dict[int, int]:
     return best
 
 
-def _moved(move: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def moved_places(move: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return places, (..., 3) metres, after a motion, (4, 4)."""
     return np.asarray(places @ move[:3, :3].T + move[:3, 3])

@@ -19,6 +19,7 @@ use super::slip::{Slip, evidence};
 use super::window::Window;
 use crate::bundle::steps::{logarithm, moved};
 use crate::pose::Pose;
+use crate::verified::first_of_each;
 use nalgebra::{Matrix6, Vector6};
 
 /// Motions that a slip is tried for: what began between two of them shows under both.
@@ -151,7 +152,8 @@ impl ToldMotions {
             let aligned = from(&slip);
             let found = std::iter::once((aligned.pose, evidence(&aligned)));
             let others = slip.others().map(|other| from(&other)).map(|one| (one.pose, evidence(&one)));
-            let poses: Vec<Weighed> = distinct(found.chain(others));
+            let same = |one: &Weighed, other: &Weighed| logarithm(&one.0.seen_from(&other.0)).norm() < ONE_POSE;
+            let poses = first_of_each(found.chain(others), usize::MAX, same);
             let spread = spread(&aligned.pose, &poses);
             (aligned, spread)
         } else {
@@ -216,17 +218,6 @@ fn spread(chosen: &Pose, poses: &[Weighed]) -> Matrix6<f64> {
 
 /// Two searches that end no farther apart, metres and radians together, have found one pose.
 const ONE_POSE: f64 = 1e-3;
-
-/// The first of those that are one pose.
-fn distinct(poses: impl Iterator<Item = Weighed>) -> Vec<Weighed> {
-    let mut kept: Vec<Weighed> = Vec::new();
-    for one in poses {
-        if kept.iter().all(|other| logarithm(&one.0.seen_from(&other.0)).norm() > ONE_POSE) {
-            kept.push(one);
-        }
-    }
-    kept
-}
 
 /// Motions since the oldest sighting.
 fn oldest(sightings: &[Sighting]) -> usize {

@@ -37,10 +37,7 @@ pub(crate) fn aligned(
     camera: &Camera,
     config: &TrackingConfig,
 ) -> Option<Pose> {
-    let is_placed = |prediction: &Prediction| {
-        let landmark = &known.landmarks[prediction.landmark];
-        landmark.views >= 2 && landmark.doubt.is_none()
-    };
+    let is_placed = |prediction: &Prediction| known.landmarks[prediction.landmark].is_placed();
     let pulls: Vec<Pull> = predictions
         .iter()
         .enumerate()

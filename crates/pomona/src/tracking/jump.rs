@@ -23,7 +23,8 @@ const LEAST_FRUITS: usize = 10;
 /// Of these, the part that is met where poses are right: nine in ten, and half where a third are hidden.
 const MET: f64 = 0.25;
 
-/// The pose by the fruits that are known, where the given one, by which these are predicted, has jumped; `None` where it has not or they do not say.
+/// The pose by the fruits that are known, where the given one, by which these are predicted, has jumped; `None` where it has
+/// not, or they do not say.
 pub(super) fn after_jump(
     (predictions, association): (&[Prediction], &Association),
     observations: &[Observation],
@@ -32,10 +33,7 @@ pub(super) fn after_jump(
 ) -> Option<Pose> {
     let seen: Vec<Vector3<f64>> =
         observations.iter().filter_map(|one| Some(camera.unproject(&one.lift.as_ref()?.seen))).collect();
-    let is_placed = |prediction: &Prediction| {
-        let landmark = &known.landmarks[prediction.landmark];
-        landmark.views >= 2 && landmark.doubt.is_none()
-    };
+    let is_placed = |prediction: &Prediction| known.landmarks[prediction.landmark].is_placed();
     let should_show = |prediction: &Prediction| is_placed(prediction) && camera.sees(&prediction.likely.seen, 0.0);
     let shown: Vec<usize> = (0..predictions.len()).filter(|&p| should_show(&predictions[p])).collect();
     let fewer = shown.len().min(seen.len());

@@ -55,6 +55,11 @@ pub(crate) struct Landmark {
 }
 
 impl Landmark {
+    /// Whether several frames say where it is, and nothing speaks for another place.
+    pub fn is_placed(&self) -> bool {
+        self.views >= 2 && self.doubt.is_none()
+    }
+
     pub fn born(birth: Birth, now: Instant) -> Self {
         let Birth { estimate, doubt, size, evidence } = birth;
         Self {

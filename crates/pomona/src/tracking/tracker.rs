@@ -245,7 +245,7 @@ impl Tracker {
                 landmark.size.observe(lift, &self.config);
             }
             // Two sightings across the ray say where it is, whatever their depths said.
-            if landmark.views >= 2 && landmark.doubt.is_none() {
+            if landmark.is_placed() {
                 let is_nearer = lift.seen.z < prediction.likely.seen.z;
                 self.reliability.learn(lift.support, likely.depth_fits, is_nearer);
             }

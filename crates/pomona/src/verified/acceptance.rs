@@ -90,6 +90,9 @@ pub(super) const KEPT: Kept = Kept { threshold: [0.8, 0.9], outlier: [0.9; 2], l
 /// in twenty.
 pub(super) const PATTERN: f64 = 0.05;
 
+/// A pose with this many times the evidence needed is no local optimum, no pattern of the planting and no mirror image.
+pub(super) const SURE: f64 = 6.0;
+
 /// Log-odds, in nats, that the best of many wrong poses exceeds with a probability of `rate` where the second best has
 /// `second`.
 ///

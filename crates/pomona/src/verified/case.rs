@@ -1,7 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{KEPT, VerifiedConfig, WORTH_IT, poses, reached};
-use super::decision::SURE;
+use super::acceptance::{KEPT, SURE, VerifiedConfig, WORTH_IT, poses, reached};
 use super::doubts::Rated;
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};

@@ -1,8 +1,7 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::acceptance::PATTERN;
+use super::acceptance::{PATTERN, SURE};
 use super::case::{Finding, Findings, Search};
-use super::decision::SURE;
 use super::doubts::Rated;
 use super::overlap::Overlap;
 use super::settlement::Settled;

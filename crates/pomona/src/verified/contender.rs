@@ -53,7 +53,7 @@ pub(super) fn distinct(query: &Landscape, map_spacing: f64, candidates: &[Conten
 }
 
 /// The first `most` of those that are not the `same` as one before.
-pub(super) fn first_of_each<T>(some: impl Iterator<Item = T>, most: usize, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+pub(crate) fn first_of_each<T>(some: impl Iterator<Item = T>, most: usize, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for one in some {
         if kept.len() == most {

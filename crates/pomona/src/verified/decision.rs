@@ -1,6 +1,6 @@
 //! The story of one query: seeds, hypotheses, growth, acceptance, pairs.
 
-use super::acceptance::{KEPT, VerifiedConfig};
+use super::acceptance::{KEPT, SURE, VerifiedConfig};
 use super::case::{Finding, Findings, Search, VerifiedMap, best_first};
 use super::congruent::is_sparser;
 use super::contender::{Contender, by_evidence};
@@ -42,9 +42,6 @@ const CLEAR: f64 = 2.0;
 
 /// Poses that a search by seeds has to have grown before one can stand out: fewer do not say what chance reaches.
 const SHOWN: usize = 4;
-
-/// A pose with this many times the evidence needed is no local optimum, no pattern of the planting and no mirror image.
-pub(super) const SURE: f64 = 6.0;
 
 /// Finds the query in the map.
 pub(crate) fn search(map: &VerifiedMap, query: &FruitCloud, request: &Request, config: &VerifiedConfig) -> Match {

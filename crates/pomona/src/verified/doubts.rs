@@ -1,8 +1,8 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
+use super::acceptance::SURE;
 use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
-use super::decision::SURE;
 use super::growth::grow;
 use super::hypothesis::{GATE, Model, refined};
 use super::landscape::Landscape;

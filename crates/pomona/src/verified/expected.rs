@@ -5,11 +5,11 @@
 //! grows out of it, follows from the two clouds alone: by how much the expectation is off changes nothing. An answer
 //! that leaves a doubt is none: the other poses that would rule it out were not looked for.
 
-use super::acceptance::VerifiedConfig;
+use super::acceptance::{SURE, VerifiedConfig};
 use super::case::{Search, VerifiedMap};
 use super::congruent::each_alike_among;
 use super::contender::{Contender, REFINED, by_evidence, distinct};
-use super::decision::{MIN_FRUITS, SURE};
+use super::decision::MIN_FRUITS;
 use super::proposal::{Effort, Proposer};
 use super::search::of_some_fruits;
 use super::seeds::{SHORTEST, Seed, WITHIN};

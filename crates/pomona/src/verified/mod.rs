@@ -66,6 +66,7 @@ mod votes;
 
 pub use acceptance::VerifiedConfig;
 pub(crate) use case::{SEED_SIGMA, VerifiedMap};
+pub(crate) use contender::first_of_each;
 pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
 pub(crate) use landscape::Landscape;
