@@ -17,7 +17,7 @@ from pomona.survey.slam import Anchors, Constellations, FruitSlam, FruitWay, cha
 from pomona.survey.slam.consistency import explained
 from pomona.survey.slam.fruit_graph import FruitGraph
 from pomona.survey.slam.identities_of_links import joined_fruits
-from pomona.survey.slam.loops import Loop, joined
+from pomona.survey.slam.loops import Loop, SeenMap, joined, recognised
 from pomona.survey.slam.spanning import spanned_poses
 
 NO_FRUITS = SeenFruits(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)))
@@ -340,6 +340,27 @@ def test_two_parts_are_joined_by_what_several_of_their_frames_saw() -> None:
         ]
         assert np.linalg.norm(places[0] - places[1]) < 0.1
     assert len(join.pairs) > 10
+
+
+def mapped(rng: np.random.Generator, fruits: np.ndarray) -> SeenMap:
+    """A part whose two frames saw some fruits from one place."""
+    n, poses = len(fruits), np.tile(np.eye(4), (2, 1, 1))
+    centres = fruits + rng.normal(0, 0.005, (n, 3))
+    covariances = np.tile(0.01**2 * np.eye(3), (n, 1, 1))
+    return SeenMap(poses, np.repeat(np.arange(2), n), np.tile(np.arange(n), 2), centres, covariances)
+
+
+@pytest.mark.parametrize(("apart_m", "known_again"), [(0.02, True), (2.0, False)])
+def test_a_fruit_held_twice_is_no_copy_of_a_tree(apart_m: float, known_again: bool) -> None:
+    """Where a copy stands within centimetres it is the tree itself; one that stands elsewhere may be either."""
+    rng = np.random.default_rng(12)
+    fruits, others = drawn_row(rng, 1.5), drawn_row(rng, 6.0) + np.array([5.0, 0, 0])
+    there = mapped(rng, np.concatenate([fruits, fruits + np.array([apart_m, 0, 0]), others]))
+    here = mapped(rng, fruits)
+    loop = recognised(there, here, [0], Constellations((), threads=1))
+    assert (loop is not None) == known_again
+    if loop is not None:
+        assert np.linalg.norm(loop.first_from_second[:3, 3]) < 0.03
 
 
 def world(rng: np.random.Generator, seen_from_first: np.ndarray) -> np.ndarray:

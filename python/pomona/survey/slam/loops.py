@@ -25,6 +25,10 @@ Rows = NDArray[np.int64]
 TOGETHER = 6
 """Neighbouring frames whose fruits are looked for together."""
 
+SAME_PLACE_M = 0.1
+"""Nearer than this no two trees stand that are copies of each other: it is one tree, whose fruits were not told as
+the same from frame to frame."""
+
 LEAST_VIEWS = 2
 """Of a fruit that is looked for, or looked at: what one frame saw alone is often nothing."""
 
@@ -185,7 +189,10 @@ def _elsewhere(seen: SeenMap, fruits: Rows, constellations: Constellations) -> b
     if min(len(others), len(fruits)) < LEAST_FRUITS:
         return False
     found = constellations.of(seen.cloud(others, np.eye(4))).locate(seen.cloud(fruits, np.eye(4)))
-    return found.status in (Verdict.FOUND, Verdict.AMBIGUOUS)
+    if found.map_from_camera is None:
+        return found.status is Verdict.AMBIGUOUS
+    same = seen.centres[np.stack((fruits[found.pairs[:, 0]], others[found.pairs[:, 1]]))]
+    return bool(np.median(np.linalg.norm(same[1] - same[0], axis=1)) > SAME_PLACE_M)
 
 
 def joined(before: SeenMap, after: SeenMap, constellations: Constellations) -> Loop | None:
