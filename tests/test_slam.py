@@ -363,6 +363,17 @@ def test_a_fruit_held_twice_is_no_copy_of_a_tree(apart_m: float, known_again: bo
         assert np.linalg.norm(loop.first_from_second[:3, 3]) < 0.03
 
 
+def test_a_part_that_saw_two_others_joins_both() -> None:
+    rng = np.random.default_rng(21)
+    fruits = drawn_row(rng, 8.0)
+    drives = np.arange(0, 1.5, 0.2), np.arange(5, 7.4, 0.2), np.arange(0, 7.4, 0.2)
+    true = np.array([facing(x) for drive in drives for x in drive])
+    way = way_by_fruits([seen(rng, fruits, pose) for pose in true], threads=1)
+    assert not way.parts.any()
+    errors = log_all(np.linalg.inv(way.session_from_camera) @ np.linalg.inv(true[0]) @ true)
+    assert np.linalg.norm(errors[:, :3], axis=1).max() < 0.05
+
+
 def world(rng: np.random.Generator, seen_from_first: np.ndarray) -> np.ndarray:
     """The poses in a frame with z up, in which the row runs north-east."""
     upright = np.eye(4)

@@ -108,8 +108,10 @@ def adjusted_way(known: Known) -> FruitWay:
     """Lay out what is known of the frames, join parts, close loops, and adjust it all."""
     known = replace(known, motions=learnt_errors(known.motions, known.links).mended(known.motions))
     parts, start = known.laid_out()
-    if joins := list(_joins(known, parts, start)):
-        known = replace(known, joins=joins)
+    # Parts that were joined have seen more together, by which others join them.
+    tried: set[tuple[int, ...]] = set()
+    while joins := list(_joins(known, parts, start, tried)):
+        known = replace(known, joins=[*known.joins, *joins])
         parts, start = known.laid_out()
     n = len(known.constellations)
     way = FruitWay(parts, start, np.zeros((n, 6, 6)), (), len(known.links), (), 0)
@@ -143,14 +145,20 @@ class Known:
         )
 
 
-def _joins(known: Known, parts: Rows, start: NDArray[np.float64]) -> Iterator[Loop]:
-    """Look for the beginning of each part where one of the two before ended, else for any of it anywhere before."""
+def _joins(known: Known, parts: Rows, start: NDArray[np.float64], tried: set[tuple[int, ...]]) -> Iterator[Loop]:
+    """Look for the beginning of each part where one of the two before ended, else for any of it anywhere before.
+
+    Parts of which each has the frames that it had when they were tried are not tried again.
+    """
     rows = _rows_of(parts)
     maps = [known.graph(ours, start)[1] for ours in rows] if len(rows) > 1 else []
+    names = [(int(ours[0]), len(ours)) for ours in rows]
     for second in range(1, len(maps)):
-        before = range(second - 1, -1, -1)
+        before = [first for first in range(second - 1, -1, -1) if (*names[first], *names[second]) not in tried]
+        tried |= {(*names[first], *names[second]) for first in before}
+        just_before = [first for first in before if first >= second - 2]
         begins = range(0, len(rows[second]), TOGETHER)
-        ends = ((first, joined(maps[first], maps[second], known.constellations)) for first in before[:2])
+        ends = ((first, joined(maps[first], maps[second], known.constellations)) for first in just_before)
         anywhere = ((first, recognised(maps[first], maps[second], begins, known.constellations)) for first in before)
         for first, join in chain(ends, anywhere):
             if join is not None:
