@@ -1,14 +1,17 @@
 """Maps over more than one year: rows are found again by their wood, and no fruit outlives the winter."""
 
+import re
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from orchard_maker import frame_of_its_own, grow_map
 from pomona import FruitCloud
+from pomona.cli import app
 from pomona.growth.measured import measured_fruits
 from pomona.growth.season_growth import grow_season
 from pomona.growth.visit_warnings import of_visits
@@ -119,6 +122,15 @@ def test_the_order_of_years_changes_nothing(
     for session in years[0]:
         assert remove_session(other, session.name) is not None
     assert counted(other) == pytest.approx(counted(map_of_years), rel=0.01)
+
+
+def test_maps_of_two_years_merge_and_say_that_no_fruit_was_known(
+    years: tuple[list[Session], list[Session]], tmp_path: Path
+) -> None:
+    one, other = (grow_map(tmp_path / f"{visits[0].name}.gpkg", visits) for visits in years)
+    told = CliRunner().invoke(app, ["map", "merge", str(one), str(other)]).stdout
+    assert re.search(r"found by where \d+ fruits hung; none was known, for none outlives the winter", told), told
+    assert counted(one) == pytest.approx(counted(other), rel=0.01)
 
 
 def test_growth_is_of_the_last_year(map_of_years: Path, years: tuple[list[Session], list[Session]]) -> None:

@@ -77,11 +77,12 @@ def _merged_as_lines(other: Path, merged: Merged) -> list[str]:
         assert merged.match is not None
         return [f"{other}: {merged.match.status.value}, not found in the map, which stays as it was"]
     n_fruits, n_came, n_shared = len(merged.fruit_ids), len(merged.sessions), len(merged.shared)
-    told = (
-        f"{other}: sessions that came: {n_came}, in both: {n_shared}; {merged.n_known} of {n_fruits} fruits were known"
-    )
+    known = f"{merged.n_known} of {n_fruits} fruits were known"
+    if merged.match is not None and not merged.n_known:
+        # Two maps are one by what hung in the same places, and of that nothing is left only where a winter passed.
+        known = f"found by where {len(merged.match.pairs)} fruits hung; none was known, for none outlives the winter"
     return [
-        told,
+        f"{other}: sessions that came: {n_came}, in both: {n_shared}; {known}",
         *(f"{name}: another session is called so, here it is {now}" for name, now in merged.renamed.items()),
         *map(change_as_text, merged.changes),
         *(f"left out: {what}" for what in merged.left_out),
