@@ -59,9 +59,9 @@ class SeenMap:
         return np.unique(self.fruits[(self.frames >= first) & (self.frames < end)])
 
     def often(self, fruits: Rows) -> Rows:
-        """Leave out fruits that hardly any frame saw."""
+        """Leave out fruits that hardly any frame saw, unless there is but one."""
         views = np.bincount(self.fruits, minlength=len(self.centres))
-        return fruits[views[fruits] >= LEAST_VIEWS]
+        return fruits[views[fruits] >= min(LEAST_VIEWS, len(self.poses))]
 
     def sightings_of(self, fruits: Rows) -> Rows:
         """Give the frame and the row in it of the first sighting of each fruit, (..., 2)."""
