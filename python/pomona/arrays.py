@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["checked_array", "definite_matrices", "rigid_matrices"]
+__all__ = ["checked_array", "definite_matrices", "rigid_matrices", "rigid_motions"]
 
 RIGID = 1e-3
 """How far a rotation may be from one: its numbers may come from text, or from sums of many motions."""
+
+FARTHEST_M = 1e6
+"""No two frames of a recording are farther apart, metres; the core has the same bound."""
 
 SYMMETRIC = 1e-6
 """The same of a symmetric matrix, relative to its largest number."""
@@ -58,6 +61,21 @@ def rigid_matrices(name: str, values: Any, shape: tuple[int | None, ...] = (4, 4
     if not is_rigid.all():
         raise PomonaError(f"{name}: {_which(is_rigid)}found a matrix that does not turn and move, expected a rigid one")
     return poses
+
+
+def rigid_motions(name: str, values: Any, shape: tuple[int | None, ...] = (4, 4)) -> NDArray[np.float64]:
+    """Return rigid transforms from one frame to another one, (4, 4) or (N, 4, 4).
+
+    Raises
+    ------
+    PomonaError
+        One of them is not rigid, or leads farther than any row is long.
+    """
+    motions = rigid_matrices(name, values, shape)
+    is_near = np.abs(motions[..., :3, 3]).max(axis=-1) <= FARTHEST_M
+    if not is_near.all():
+        raise PomonaError(f"{name}: {_which(is_near)}found one beyond 1,000 km, expected metres between two frames")
+    return motions
 
 
 def definite_matrices(name: str, values: Any, shape: tuple[int | None, ...]) -> NDArray[np.float64]:

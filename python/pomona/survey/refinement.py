@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona import _core
-from pomona.arrays import checked_array, definite_matrices, rigid_matrices
+from pomona.arrays import checked_array, definite_matrices, rigid_motions
 from pomona.errors import PomonaError
 
 __all__ = ["Motions", "Refined", "SeenFruits", "refine"]
@@ -131,7 +131,7 @@ class Motions:
         return Motions(
             first,
             second,
-            rigid_matrices("motions.first_from_second", self.first_from_second, (n, 4, 4)),
+            rigid_motions("motions.first_from_second", self.first_from_second, (n, 4, 4)),
             definite_matrices("motions.information", self.information, (n, 6, 6)),
             checked_array("motions.doubtful", self.which_are_doubtful(), np.bool_, (n,)),
         )

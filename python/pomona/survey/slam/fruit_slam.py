@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pomona.arrays import definite_matrices, rigid_matrices
+from pomona.arrays import definite_matrices, rigid_motions
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaError
 from pomona.survey.refinement import Motions
@@ -263,7 +263,7 @@ def _checked_motion(row: int, moved: Array | None, information: Array | None, *,
     return Motions(
         np.array([row - 1]),
         np.array([row]),
-        rigid_matrices("moved", moved)[None],
+        rigid_motions("moved", moved)[None],
         definite_matrices("information", information, (6, 6))[None],
         np.array([doubtful]),
     )
