@@ -66,6 +66,58 @@ def test_a_knocked_camera_is_told_and_taken_out(tmp_path: Path) -> None:
     assert (straight.numbers, len(straight), straight.path) == (knocked.numbers, len(knocked), knocked.path)
 
 
+def rewritten(row: Recording, eyes: tuple[str, ...], seen_from: np.ndarray) -> Recording:
+    """The recording whose eyes show what was seen at other places, (H, W, 2) in pixels."""
+    for file in (file for eye in eyes for file in (row.path / eye).iterdir()):
+        moved = cv2.remap(cv2.imread(str(file)), *np.moveaxis(seen_from.astype(np.float32), -1, 0), cv2.INTER_CUBIC)
+        cv2.imwrite(str(file), moved)
+    return open_recording(row.path)
+
+
+def normalised() -> np.ndarray:
+    """Places of the pixels from the principal point in focal lengths, (H, W, 2)."""
+    columns, rows = np.meshgrid(np.arange(CALIBRATION.width) + 0.5, np.arange(CALIBRATION.height) + 0.5)
+    return np.stack([(columns - CALIBRATION.cx) / CALIBRATION.fx, (rows - CALIBRATION.cy) / CALIBRATION.fy], axis=-1)
+
+
+def in_pixels(places: np.ndarray) -> np.ndarray:
+    return places * (CALIBRATION.fx, CALIBRATION.fy) + (CALIBRATION.cx - 0.5, CALIBRATION.cy - 0.5)
+
+
+@pytest.mark.parametrize("k1", [-0.25, -0.12, 0.12])
+def test_a_lens_that_is_not_taken_out_is_told(pomona, tmp_path: Path, k1: float) -> None:
+    """Not as right pictures that are turned, or late; of both eyes alike."""
+    bent = normalised()
+    straight = bent
+    for _ in range(20):
+        straight = bent / (1 + k1 * (straight**2).sum(axis=-1, keepdims=True))
+    row = rewritten(recording(tmp_path / "row", frames=6), ("left", "right"), in_pixels(straight))
+    found = alignment_of(row)
+    assert found is not None
+    assert found.bend is not None
+    assert found.bend.k1 == pytest.approx(k1, rel=0.5)
+    with pytest.warns(
+        PomonaWarning, match=r"rows of left and right part towards the corners, .*: rectify the pictures"
+    ):
+        assert straightened(row) is row
+    code, printed, _ = pomona("info", row.path, "--check")
+    assert code == 1
+    assert "a lens that is not taken out" in printed
+
+
+@pytest.mark.parametrize("turned_deg", [-1.0, 0.5])
+def test_an_eye_that_is_turned_about_the_vertical_is_told(tmp_path: Path, turned_deg: float) -> None:
+    turn = np.radians(turned_deg)
+    rays = np.concatenate([normalised(), np.ones((CALIBRATION.height, CALIBRATION.width, 1))], axis=-1)
+    rays = rays @ np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    found = alignment_of(
+        rewritten(recording(tmp_path / "row", frames=6), ("right",), in_pixels(rays[..., :2] / rays[..., 2:]))
+    )
+    assert found is not None
+    assert found.bend is not None
+    assert abs(np.degrees(found.bend.turned_rad)) == pytest.approx(abs(turned_deg), rel=0.3)
+
+
 def test_what_no_knock_does_is_told_and_left(tmp_path: Path) -> None:
     odd = recording(tmp_path / "row", 4.0)
     with pytest.warns(PomonaWarning, match="calibrate the cameras again"):

@@ -24,6 +24,7 @@ from pomona.errors import PomonaWarning
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
 from pomona.recording.late_eye import FEWEST, SURE_SHARE, frames_late
+from pomona.recording.lens_bend import Bend, bend_of
 from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.recording.row_corners import row_errors
@@ -77,6 +78,8 @@ class Alignment:
         Whether the pair lies on its side: corners keep their column, not their row.
     frames_late : int
         By how many frames the right pictures are late; below 0, early.
+    bend : Bend or None
+        What parts the rows towards the corners, where something does.
     """
 
     lower_px: float
@@ -86,8 +89,11 @@ class Alignment:
     is_correctable: bool
     is_on_side: bool = False
     frames_late: int = 0
+    bend: Bend | None = None
 
     def __str__(self) -> str:
+        if self.bend is not None:
+            return str(self.bend)
         if self.is_on_side:
             return "corners keep their column in the right picture and not their row, the pair is turned on its side"
         if self.frames_late:
@@ -101,6 +107,10 @@ class Alignment:
     @property
     def advice(self) -> str:
         """What to do where it is not taken out."""
+        if self.bend is not None:
+            return (
+                "rectify the pictures with the cameras' own calibration, or calibrate again; places and sizes are off"
+            )
         if self.is_on_side:
             return "give the pictures as the cameras took them, side by side"
         if self.frames_late:
@@ -133,6 +143,10 @@ def alignment_of(recording: Recording) -> Alignment | None:
     within_px = max(AT_ONCE_WIDTHS * recording.calibration.width, LEAST_AT_ONCE_PX)
     agreeing = partial(_agreeing, centre_px=centre_px, within_px=within_px)
     n_agreeing = agreeing(found)
+    bend = bend_of(found, centre_px, recording.calibration.fx)
+    # Most corners of pictures that were not taken at once agree on nothing, bent or not.
+    if bend is not None and agreeing(bend.taken_out_of(found)) >= SURE_SHARE * len(found):
+        return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, bend=bend)
     if n_agreeing >= max(SURE, SURE_SHARE * len(found)):
         return _fitted(found, centre_px)
     if len(found) >= FEWEST and (late := frames_late(recording, rows, n_agreeing, agreeing)):
@@ -155,7 +169,8 @@ def _corners(recording: Recording, rows: list[int], find: Callable[[Picture, Pic
 
 
 def _fitted(corners: Array, centre_px: tuple[float, float]) -> Alignment | None:
-    """Fit column there, row here and difference of the rows, (N, 3); rows farther down tell the stretch."""
+    """Fit column there, row here and difference of the rows, (N, 3) and more; rows farther down tell the stretch."""
+    corners = np.ascontiguousarray(corners[:, :3])
     fitted = _core.row_alignment(corners, centre_px)
     below = _core.row_alignment(corners, (centre_px[0], centre_px[1] + APART_ROWS))
     if fitted is None or below is None:

@@ -62,7 +62,7 @@ def _keeps_its_height(recording: Recording, rows: list[int], agreeing: Callable[
 
 def _corners(recording: Recording, rows: list[int], away: int, eye: str = "read_right") -> Array:
     """Find the corners of left pictures in the pictures of an eye so many frames away."""
-    found = [np.zeros((0, 3))]
+    found = [np.zeros((0, 4))]
     for row in rows:
         if 0 <= row + away < len(recording):
             here, there = recording.numbers[row], recording.numbers[row + away]

@@ -24,7 +24,7 @@ LARGEST_SHARE = 0.25
 
 
 def row_errors(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Find corners of the left picture in the right one: column there, row here and difference of the rows, (N, 3)."""
+    """Find corners of the left picture in the right one, (N, 4): column there, row here, rows apart, column here."""
     import cv2
 
     greys = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) if one.ndim == 3 else one for one in (left, right)]
@@ -44,8 +44,8 @@ def row_errors(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.
         similar = cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED)
         row, column = np.unravel_index(int(similar.argmax()), similar.shape)
         if similar[row, column] >= LEAST_CORRELATION and 0 < row < 2 * reach:
-            found.append((low + half + column, y, row - reach + _vertex(similar[row - 1 : row + 2, column])))
-    return np.array(found, np.float64).reshape(-1, 3)
+            found.append((low + half + column, y, row - reach + _vertex(similar[row - 1 : row + 2, column]), x))
+    return np.array(found, np.float64).reshape(-1, 4)
 
 
 def _vertex(three: NDArray[Any]) -> float:
