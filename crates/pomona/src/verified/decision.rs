@@ -186,7 +186,7 @@ impl<'a> Search<'a> {
     }
 
     /// Accepts the best of the other poses where it stands out of them and has the `least` evidence.
-    fn accept_outlier(&self, Findings { accepted, others, log }: &mut Findings<'a>, least: f64) {
+    fn accept_outlier(&self, Findings { accepted, others, log, .. }: &mut Findings<'a>, least: f64) {
         accepted.extend(self.single_out(others, least, KEPT.outlier, log));
     }
 
@@ -214,8 +214,15 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            let enough = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
-            (if enough { &mut findings.accepted } else { &mut findings.others }).push(finding);
+            if !self.holds(&mut finding, KEPT.threshold, &mut findings.log) {
+                findings.others.push(finding);
+            } else if finding.overlap.log_odds > SURE * findings.log.threshold
+                || self.stands_out_of_the_planting(&finding, 1.0)
+            {
+                findings.accepted.push(finding);
+            } else {
+                findings.patterns.push(finding);
+            }
         }
     }
 

@@ -25,7 +25,7 @@ const LEAST_AGAIN: f64 = 0.5 * offsets::FEW_AGAIN;
 
 impl<'a> Search<'a> {
     /// Asks the offsets of all fruits, where too few are in common for any seed.
-    pub(super) fn lay_along(&self, Findings { accepted, others, log }: &mut Findings<'a>) {
+    pub(super) fn lay_along(&self, Findings { accepted, others, log, .. }: &mut Findings<'a>) {
         let few = offsets::few_again(self.map, &self.model);
         let hypotheses = offsets::hypotheses(self.query, self.map, &few);
         log.refined += hypotheses.len();

@@ -32,7 +32,9 @@ impl<'a> Search<'a> {
         }
         log.best = log.best.max(best);
         log.threshold = stands_out.max(least);
-        self.holds(&mut others[distinct[0]], kept, log).then(|| others.swap_remove(distinct[0]))
+        let best = &mut others[distinct[0]];
+        (self.holds(best, kept, log) && self.stands_out_of_the_planting(best, 1.0))
+            .then(|| others.swap_remove(distinct[0]))
     }
 
     /// Most evidence of those after the best, each by the share that it puts elsewhere: a row turned a little, about its middle
