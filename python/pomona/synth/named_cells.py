@@ -280,6 +280,14 @@ PLANTING_CELLS = tuple(
 )
 """The same questions on every planting: two of five trees in common with 45 % hidden, and none."""
 
+_LONG = Cell("long", seen=40, row=PLANTINGS["singles"])
+
+LONG_CELLS = (
+    replace(_LONG, name="long-part35", shared=4, hidden=0.35, false_rate=0.10),
+    replace(_LONG, name="long-noov", shared=0, right_answers=_NO_ANSWER),
+)
+"""Walls of single fruits 45 m long: four of forty trees in common, and none."""
+
 _FRAME25 = replace(_BASE, name="frame25", frame=25)
 _FRAME25_NOOV = replace(_NOOV, name="frame25-noov", frame=25)
 
@@ -349,6 +357,7 @@ CELLS: dict[str, Cell] = {
         *VARIANT_CELLS,
         *ROW_CELLS,
         *PLANTING_CELLS,
+        *LONG_CELLS,
         *FRAME_CELLS,
         *CHANGE_CELLS,
         *ADVERSARIAL_CELLS,
