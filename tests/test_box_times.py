@@ -46,12 +46,12 @@ def row(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return open_recording(folder)
 
 
-def told(row: Recording, late: int) -> str:
-    """What is said of boxes that are so many frames late."""
+def told(row: Recording, late: int, size: float = 1.0, down_px: float = 0.0) -> str:
+    """What is said of boxes that are so many frames late, in pictures of another size, or lower."""
     found = [(frame, places(frame - late)) for frame in range(N_FRAMES) if frame - late >= 0]
     frames = np.repeat([frame for frame, _ in found], [len(middles) for _, middles in found])
     middles = np.concatenate([middles for _, middles in found])
-    boxes_px = np.hstack([middles - RADIUS_PX, middles + RADIUS_PX])
+    boxes_px = size * (np.hstack([middles - RADIUS_PX, middles + RADIUS_PX]) + np.tile([0.0, down_px], 2))
     boxes = Boxes(frames, boxes_px, np.ones(len(frames)), np.full(len(frames), -1))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", PomonaWarning)
@@ -64,12 +64,17 @@ def test_boxes_of_their_own_pictures_are_left_alone(row: Recording) -> None:
 
 
 @pytest.mark.parametrize(
-    ("late", "where"), [(1, "a frame before"), (2, "2 frames before"), (-1, "a frame after"), (-2, "2 frames after")]
+    ("late", "where"), [(1, "a frame before"), (2, "2 frames before"), (-1, "a frame after"), (-5, "5 frames after")]
 )
 def test_boxes_of_other_pictures_are_told(row: Recording, late: int, where: str) -> None:
     assert f"the boxes fit the pictures {where} theirs, and not their own" in told(row, late)
 
 
+@pytest.mark.parametrize(("size", "times"), [(0.5, "2"), (1 / 3, "3")])
+def test_boxes_of_smaller_pictures_are_told(row: Recording, size: float, times: str) -> None:
+    assert f"the boxes fit the pictures when they are {times} times as large, and not as they are" in told(row, 0, size)
+
+
 def test_boxes_of_no_picture_say_nothing(row: Recording) -> None:
-    assert told(row, 5) == ""
+    assert told(row, 0, down_px=25.0) == ""
     check_box_times(row, [])

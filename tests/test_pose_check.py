@@ -85,3 +85,33 @@ def test_the_order_of_quaternions_is_told(row) -> None:
 def test_the_axes_of_a_vehicle_are_told(row) -> None:
     camera_from_body = np.linalg.inv(np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]))
     assert "x ahead, y left, z up" in told(row, lambda pose: pose @ camera_from_body)
+
+
+def test_the_axes_of_opengl_are_told(row) -> None:
+    """Of a camera that goes sideways most of the way is the same in both."""
+    assert "x right, y up, z back, as OpenGL has them" in told(row, lambda pose: pose @ np.diag([1.0, -1.0, -1.0, 1.0]))
+
+
+def test_poses_that_stray_are_told(row) -> None:
+    rng = np.random.default_rng(4)
+    walked = np.zeros(3)
+
+    def stray(pose: Array) -> Array:
+        nonlocal walked
+        walked = walked + rng.normal(0, 0.03, 3)
+        strayed = pose.copy()
+        strayed[:3, 3] += walked
+        return strayed
+
+    assert "find others with --odometry" in told(row, stray)
+
+
+def test_poses_of_a_few_millimetres_are_left_alone(row) -> None:
+    rng = np.random.default_rng(4)
+
+    def shake(pose: Array) -> Array:
+        shaken = pose.copy()
+        shaken[:3, 3] += rng.normal(0, 0.003, 3)
+        return shaken
+
+    assert told(row, shake) == ""

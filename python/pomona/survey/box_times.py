@@ -1,4 +1,4 @@
-"""Whether boxes are of their pictures, or of those of the frames before or after."""
+"""Whether boxes are of their pictures, or of those of frames before or after, or of pictures of another size."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from pomona.recording import Recording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 
-__all__ = ["check_box_times"]
+__all__ = ["check_box_times", "evenly"]
 
 LOOKED_AT = 5
 """Frames, evenly over those with boxes."""
 
-FRAMES_AWAY = (-2, -1, 1, 2)
+FRAMES_AWAY = (-1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6, -7, 7, -8, 8)
+"""A program that skips what cannot be read, or begins when all is warm, counts some frames less."""
+
+SIZES = (2.0, 0.5, 3.0, 1 / 3, 1.5, 2 / 3)
+"""Of the picture, over those of the one that boxes were made in."""
 
 SURE = 0.3
 """By which colours in boxes and elsewhere differ in pictures that are theirs, at least on the rendered row."""
@@ -31,32 +35,50 @@ Box = NDArray[np.float64]
 
 
 def check_box_times(recording: Recording, parts: Sequence[Boxes]) -> None:
-    """Warn where boxes go with the pictures of other frames than theirs; without colour, nothing is said.
+    """Warn where boxes go with pictures of other frames than theirs, or of another size; without colour, say nothing.
 
     Boxes that are around fruits tell two kinds of colours apart, whatever the fruits; boxes beside them do not.
     """
     if "left" not in recording.description()["pictures"]:
         return
-    shown = _evenly([frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())])
+    shown = evenly([frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())], LOOKED_AT)
     boxes_of = {
         frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames
     }
     own = _told_apart(recording, boxes_of, 0)
     if not len(own) or own.mean() >= SURE:
         return
-    others = {away: _told_apart(recording, boxes_of, away) for away in FRAMES_AWAY}
-    means = {away: float(told.mean()) for away, told in others.items() if len(told)}
-    best = max(means, key=means.__getitem__, default=0)
-    if best and means[best] > max(LEAST, TIMES * float(own.mean())):
-        frames = "a frame" if abs(best) == 1 else f"{abs(best)} frames"
-        when = "before" if best < 0 else "after"
-        found = f"the boxes fit the pictures {frames} {when} theirs, and not their own"
-        advice = "check how the program that wrote them counts frames"
+    tried = [
+        *((_of_frame(away), _told_apart(recording, boxes_of, away)) for away in FRAMES_AWAY),
+        *((_of_size(size), _told_apart(recording, _sized(boxes_of, size), 0)) for size in SIZES),
+    ]
+    means = [(float(told.mean()), words) for words, told in tried if len(told)]
+    best, (found, advice) = max(means, key=lambda one: one[0], default=(0.0, ("", "")))
+    if best > max(LEAST, TIMES * float(own.mean())):
         warnings.warn(f"{recording.path}: {found}: {advice}", PomonaWarning, stacklevel=3)
 
 
-def _evenly(frames: Sequence[int]) -> list[int]:
-    rows = (2 * np.arange(LOOKED_AT) + 1) * len(frames) // (2 * LOOKED_AT)
+def _of_frame(away: int) -> tuple[str, str]:
+    """Say that boxes are of the pictures so many frames away."""
+    frames = "a frame" if abs(away) == 1 else f"{abs(away)} frames"
+    when = "before" if away < 0 else "after"
+    found = f"the boxes fit the pictures {frames} {when} theirs, and not their own"
+    return found, "check how the program that wrote them counts frames"
+
+
+def _of_size(size: float) -> tuple[str, str]:
+    """Say that boxes are of pictures of another size."""
+    found = f"the boxes fit the pictures when they are {size:.2g} times as large, and not as they are"
+    return found, "give them in pixels of these pictures"
+
+
+def _sized(boxes_of: dict[int, Box], size: float) -> dict[int, Box]:
+    return {frame: size * boxes_px for frame, boxes_px in boxes_of.items()}
+
+
+def evenly(frames: Sequence[int], count: int) -> list[int]:
+    """Take so many, evenly."""
+    rows = (2 * np.arange(count) + 1) * len(frames) // (2 * count)
     return [frames[row] for row in dict.fromkeys(rows.tolist())] if frames else []
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from pomona.amounts import amount
 from pomona.cards import as_table
 from pomona.cloud import FruitCloud
-from pomona.cloud.files import PLAUSIBLE_DIAMETER_M
 from pomona.detect import Detector
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.recording import Frame, Recording
@@ -26,6 +25,7 @@ from pomona.survey.believing import Believing
 from pomona.survey.box_check import check_boxes, check_long_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
+from pomona.survey.depth_check import check_depth_pictures
 from pomona.survey.kept import Kept
 from pomona.survey.mapped_way import mapped_way
 from pomona.survey.part import OpenPart, Part
@@ -44,8 +44,12 @@ __all__ = ["Progress", "Survey", "scan"]
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
 
-SMALLEST_MEDIAN_M = 0.01
-"""Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm. Single fruits may be smaller."""
+MEDIAN_M = (0.01, 0.25)
+"""Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm, in one of five times as much 30 cm. Single
+fruits may be smaller, or larger."""
+
+OFF_CENTRE = 0.25
+"""Part of a side of the pictures by which the principal point may lie off their middle."""
 
 FEW_FRAMES = 5
 """Frames in view below which a count errs by more than a tenth: half as many boxes make a fruit, and one misses."""
@@ -165,6 +169,7 @@ def scan(
         recording = straightened(recording)
     if not (odometry or slam):
         check_poses(recording)
+    _check_centre(recording)
     seeing = Seeing(recording, detector, depth=depth)
     look_at = keep.remembering(seeing) if keep is not None else seeing
     camera: PoseSource
@@ -192,6 +197,8 @@ def scan(
     boxes = [part.boxes for part in survey.parts]
     check_boxes(recording.path, boxes)
     check_box_times(recording, boxes)
+    if depth == "auto":
+        check_depth_pictures(recording, boxes)
     check_long_boxes(recording.path, recording.calibration, survey.parts)
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
@@ -281,9 +288,21 @@ def _check_pace(recording: Recording, survey: Survey) -> None:
             return
 
 
+def _check_centre(recording: Recording) -> None:
+    """Warn where the principal point is far from the middle of the pictures: all places are turned aside by it."""
+    calibration = recording.calibration
+    sides = {"cx": (calibration.cx, calibration.width), "cy": (calibration.cy, calibration.height)}
+    for name, (found_px, size_px) in sides.items():
+        if abs(found_px / size_px - 0.5) > OFF_CENTRE:
+            expected = f"about the middle of {size_px} pixels, unless the pictures are cut out of larger ones"
+            warnings.warn(
+                f"{recording.path}: {name}: found {found_px:g}, expected {expected}", PomonaWarning, stacklevel=3
+            )
+
+
 def _check_sizes(recording: Recording, survey: Survey) -> None:
     """Warn when the fruits cannot be fruits: then a unit is wrong, mostly that of depth or baseline."""
-    low_m, high_m = SMALLEST_MEDIAN_M, PLAUSIBLE_DIAMETER_M[1]
+    low_m, high_m = MEDIAN_M
     diameters_m = np.concatenate([part.cloud.diameters_m for part in survey.parts])
     if len(diameters_m) and not low_m <= (median_m := float(np.median(diameters_m))) <= high_m:
         expected = f"{1000 * low_m:g} to {1000 * high_m:g} mm"

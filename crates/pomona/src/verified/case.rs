@@ -242,7 +242,7 @@ impl<'a> Search<'a> {
     ///
     /// If what they have falls off exponentially from what a pose has that is moved along the row, the largest of N is expected `ln N`
     /// standard deviations above the mean. Of 389 true answers of the test cells that are not sure the least are 12 to 17, on wires,
-    /// where `ln N` is 10; of 22 wrong ones on rows of 40 and 90 m on wires none has more than 10, where it is 11 to 14.
+    /// where `ln N` is 10; of 27 wrong ones on rows of 40 and 90 m on wires none has more than 10, where it is 11 to 14.
     pub(super) fn stands_out_of_the_planting(&self, finding: &Finding, times: f64) -> bool {
         let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         finding.deviations_from_moved().is_none_or(|deviations| deviations > times * offered.ln())

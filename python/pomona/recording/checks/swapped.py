@@ -69,7 +69,9 @@ def check_sides(recording: Recording) -> None:
     negative = int((found < 0).sum())
     if len(found) >= ENOUGH and negative >= SWAPPED_SHARE * len(found):
         seen = f"{negative} of {len(found)} corners farther right in the right picture than in the left one"
-        raise PomonaError(f"{recording.path}: left and right are swapped: found {seen}, expected farther left")
+        raise PomonaError(
+            f"{recording.path}: left and right are swapped, or not of one time: found {seen}, expected farther left"
+        )
 
 
 def _is_same(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bool:
