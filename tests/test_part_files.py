@@ -105,6 +105,16 @@ def test_the_summary_says_which_file_holds_what(tmp_path: Path, recording: Recor
     ]
 
 
+def test_of_many_parts_without_fruits_the_first_are_named(tmp_path: Path, recording: Recording) -> None:
+    found = survey((5, 3), *((2, 0) for _ in range(12)), (9, 2))
+    about = {"name": "row", "date": "2024-08-09", "configuration": {}, "inputs": []}
+    files = write_survey(tmp_path / "row.gpkg", found, recording, **about)  # type: ignore[arg-type]
+    lines = as_lines(summary(recording, found, files), found)
+    assert sum("not written: frames" in line for line in lines) == 3
+    assert "  not written: 9 more parts of 18 frames without fruits" in lines
+    assert any("row.gpkg: frames 29 to 37, 2 fruits" in line for line in lines)
+
+
 def test_parts_of_an_earlier_scan_are_told_and_stay(tmp_path: Path, recording: Recording) -> None:
     written(tmp_path / "row.gpkg", survey((5, 3), (9, 2), (4, 1)), recording)
     before = (tmp_path / "row-part3.gpkg").read_bytes()

@@ -11,13 +11,16 @@ from pomona.cli.terminal import tell
 
 if TYPE_CHECKING:
     from collections import Counter
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
     from pomona.recording import Recording
     from pomona.survey import Part, Progress, Survey
     from pomona.survey.tally import Tally
+
+MOST_EMPTY = 3
+"""Parts without fruits that are listed one by one."""
 
 
 @contextmanager
@@ -80,6 +83,7 @@ def _of_part(part: Part, path: Path | None) -> dict[str, Any]:
         "output": None if path is None else str(path),
         "first_frame": min(frames, default=None),
         "last_frame": max(frames, default=None),
+        "n_frames": len(frames),
         "n_fruits": len(part.cloud),
         "began": part.began,
     }
@@ -91,7 +95,7 @@ def as_lines(found: dict[str, Any], survey: Survey) -> list[str]:
     if found["stopped_after_frame"] is not None:
         lines.append(f"  stopped after frame {found['stopped_after_frame']}: what was found till then is written")
     if len(found["parts"]) > 1:
-        lines += [f"  {_part_in_words(part)}" for part in found["parts"]]
+        lines += _parts_in_words(found["parts"])
     if left_out := found["tracks"].get("behind", 0):
         lines.append(
             f"  left out {amount(left_out, 'fruit')} in rows behind the one that was scanned: --all-rows keeps them"
@@ -134,6 +138,21 @@ def _fruits(found: dict[str, Any]) -> str:
         fruits += f" ({found['n_fruits']} in all, some maybe twice)"
     size = found["median_diameter_mm"]
     return fruits if size is None else f"{fruits}, median diameter {size:.1f} mm"
+
+
+def _parts_in_words(parts: Sequence[dict[str, Any]]) -> list[str]:
+    """Say what each part has; of many that are not written the first few, and how many more."""
+    written = [part for part in parts if part["output"] is not None]
+    others = [part for part in parts if part["output"] is None]
+    shown = others[:MOST_EMPTY]
+    told = sorted([*written, *shown], key=lambda part: part["first_frame"])
+    lines = [f"  {_part_in_words(part)}" for part in told]
+    if len(shown) < len(others):
+        frames = sum(part["n_frames"] for part in others[len(shown) :])
+        lines.append(
+            f"  not written: {len(others) - len(shown)} more parts of {amount(frames, 'frame')} without fruits"
+        )
+    return lines
 
 
 def _part_in_words(part: dict[str, Any]) -> str:
