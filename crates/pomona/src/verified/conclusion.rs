@@ -58,10 +58,7 @@ impl<'a> Search<'a> {
 
     /// Drops findings behind the best that fit moved: what a planting repeats is no part of an answer, and no rival.
     fn drop_patterns(&self, accepted: &mut Vec<Finding>, clear: f64) {
-        let keeps = |at: usize| {
-            let finding = &accepted[at];
-            at == 0 || self.moved(finding, accepted, clear).is_empty() && self.stands_out_of_the_planting(finding, 1.0)
-        };
+        let keeps = |at: usize| at == 0 || self.moved(&accepted[at], accepted, clear).is_empty();
         let mut kept: Vec<bool> = (0..accepted.len()).map(keeps).collect();
         kept.reverse();
         accepted.retain(|_| kept.pop().unwrap_or(true));

@@ -94,13 +94,18 @@ fn ways(laid: &Patchwork, pairs: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// By how many standard deviations `evidence` is more than that of the pose moved.
+///
+/// The one place with most of it is left out, for that may be a second tree that looks the same: a rival, and no pattern.
 fn deviations(laid: &Patchwork, evidence: f64, pairs: &[Vector3<f64>]) -> Option<f64> {
     let mut ways = ways(laid, pairs);
     ways.extend(along_the_row(laid.map)?);
-    let found: Vec<f64> = moved(laid, &ways, GATE).into_iter().flatten().map(|(nats, _)| nats).collect();
+    let found = ways.iter().zip(moved(laid, &ways, GATE)).filter_map(|(by, moved)| Some((by, moved?.0)));
+    let mut found: Vec<(&Vector3<f64>, f64)> = found.collect();
+    let &(most, _) = found.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    found.retain(|(by, _)| (*by - most).norm() > BEYOND_A_CLUSTER * laid.map.spacing);
     let count = found.len() as f64;
-    let mean = found.iter().sum::<f64>() / count;
-    let variance = found.iter().map(|nats| (nats - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let mean = found.iter().map(|(_, nats)| nats).sum::<f64>() / count;
+    let variance = found.iter().map(|(_, nats)| (nats - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (found.len() >= LEAST_PLACES).then(|| (evidence - mean) / variance.sqrt())
 }
 

@@ -58,7 +58,9 @@ impl Search<'_> {
             if joined.parts.is_empty() {
                 joined.parts.push(at);
                 joined.pairs = expected(finding.settled.iter());
-            } else if contradicted(finding, joined.parts.iter().map(|&part| &findings[part])) >= EXCLUDED {
+            } else if contradicted(finding, joined.parts.iter().map(|&part| &findings[part])) >= EXCLUDED
+                || !self.stands_out_of_the_planting(finding, 1.0)
+            {
                 joined.others.push(at);
             } else {
                 let settled = self.settled_together(joined.parts.iter().chain([&at]).map(|&part| &findings[part]));
