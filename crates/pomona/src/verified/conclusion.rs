@@ -11,7 +11,7 @@ use crate::geometry::Similarity;
 use nalgebra::Vector3;
 
 /// Times as many deviations as wrong poses reach, by which an answer has more evidence than it has moved and that the planting repeats others
-/// is no doubt: true ones among trees of one clone have 3 to 8 times as many, wrong ones on fans of equal trees up to 1.5.
+/// is no doubt: true ones among trees of one clone have 3 to 8 times as many, wrong ones on fans of equal trees up to 1.7.
 const CLEAR_OF_PATTERNS: f64 = 2.0;
 
 /// What speaks against the best finding.

@@ -24,7 +24,8 @@ struct Joined {
 }
 
 impl Search<'_> {
-    /// Joins the best finding with those that do not contradict it, and these with each other; the others stay behind it.
+    /// Joins the best finding with those that do not contradict it, and these with each other, unless the planting gives as much to wrong
+    /// poses; the others stay behind it.
     ///
     /// The best is the one with most evidence as it stands in the end, or as it grew: a row that is torn may bend to one pose beyond the
     /// gap, and a tree grows to more than another that the whole row is found from. What expects more pairs is the answer.
