@@ -29,7 +29,11 @@ SURE = 0.3
 """By which colours in boxes and elsewhere differ in pictures that are theirs, at least on the rendered row."""
 
 LEAST, TIMES = 0.1, 2.0
-"""By which they differ in other pictures that are to be told, and how many times as much as in their own."""
+"""By which they differ in other pictures that are to be told, and how many times as much as in their own. Farther than
+two frames away, and in other sizes, `SURE` is asked for: much is tried."""
+
+NEAR, SOME = 2, 20
+"""Frames away that are near, and boxes without which nothing else is tried."""
 
 Box = NDArray[np.float64]
 
@@ -48,28 +52,36 @@ def check_box_times(recording: Recording, parts: Sequence[Boxes]) -> None:
     own = _told_apart(recording, boxes_of, 0)
     if not len(own) or own.mean() >= SURE:
         return
-    tried = [
-        *((_of_frame(away), _told_apart(recording, boxes_of, away)) for away in FRAMES_AWAY),
-        *((_of_size(size), _told_apart(recording, _sized(boxes_of, size), 0)) for size in SIZES),
-    ]
-    means = [(float(told.mean()), words) for words, told in tried if len(told)]
-    best, (found, advice) = max(means, key=lambda one: one[0], default=(0.0, ("", "")))
-    if best > max(LEAST, TIMES * float(own.mean())):
-        warnings.warn(f"{recording.path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+    near = [away for away in FRAMES_AWAY if abs(away) <= NEAR]
+    if told := _best([(_of_frame(away), _told_apart(recording, boxes_of, away)) for away in near], LEAST, own):
+        warnings.warn(f"{recording.path}: {told}", PomonaWarning, stacklevel=3)
+    elif sum(map(len, boxes_of.values())) >= SOME:
+        tried = [
+            *((_of_frame(away), _told_apart(recording, boxes_of, away)) for away in FRAMES_AWAY if away not in near),
+            *((_of_size(size), _told_apart(recording, _sized(boxes_of, size), 0)) for size in SIZES),
+        ]
+        if told := _best(tried, SURE, own):
+            warnings.warn(f"{recording.path}: {told}", PomonaWarning, stacklevel=3)
 
 
-def _of_frame(away: int) -> tuple[str, str]:
+def _best(tried: list[tuple[str, NDArray[np.float64]]], least: float, own: NDArray[np.float64]) -> str | None:
+    """Give the words of what tells colours apart best, where that is enough."""
+    best, words = max(((float(told.mean()), words) for words, told in tried if len(told)), default=(0.0, ""))
+    return words if best > max(least, TIMES * float(own.mean())) else None
+
+
+def _of_frame(away: int) -> str:
     """Say that boxes are of the pictures so many frames away."""
     frames = "a frame" if abs(away) == 1 else f"{abs(away)} frames"
     when = "before" if away < 0 else "after"
     found = f"the boxes fit the pictures {frames} {when} theirs, and not their own"
-    return found, "check how the program that wrote them counts frames"
+    return f"{found}: check how the program that wrote them counts frames"
 
 
-def _of_size(size: float) -> tuple[str, str]:
+def _of_size(size: float) -> str:
     """Say that boxes are of pictures of another size."""
     found = f"the boxes fit the pictures when they are {size:.2g} times as large, and not as they are"
-    return found, "give them in pixels of these pictures"
+    return f"{found}: give them in pixels of these pictures"
 
 
 def _sized(boxes_of: dict[int, Box], size: float) -> dict[int, Box]:
