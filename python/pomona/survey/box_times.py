@@ -13,11 +13,9 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Recording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
+from pomona.survey.sampled_boxes import frames_in_words, sampled_boxes
 
-__all__ = ["check_box_times", "evenly"]
-
-LOOKED_AT = 5
-"""Frames, evenly over those with boxes."""
+__all__ = ["check_box_times"]
 
 FRAMES_AWAY = (-1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6, -7, 7, -8, 8)
 """A program that skips what cannot be read, or begins when all is warm, counts some frames less."""
@@ -45,10 +43,7 @@ def check_box_times(recording: Recording, parts: Sequence[Boxes]) -> None:
     """
     if "left" not in recording.description()["pictures"]:
         return
-    shown = evenly([frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())], LOOKED_AT)
-    boxes_of = {
-        frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames
-    }
+    boxes_of = sampled_boxes(parts)
     own = _told_apart(recording, boxes_of, 0)
     if not len(own) or own.mean() >= SURE:
         return
@@ -72,9 +67,8 @@ def _best(tried: list[tuple[str, NDArray[np.float64]]], least: float, own: NDArr
 
 def _of_frame(away: int) -> str:
     """Say that boxes are of the pictures so many frames away."""
-    frames = "a frame" if abs(away) == 1 else f"{abs(away)} frames"
     when = "before" if away < 0 else "after"
-    found = f"the boxes fit the pictures {frames} {when} theirs, and not their own"
+    found = f"the boxes fit the pictures {frames_in_words(away)} {when} theirs, and not their own"
     return f"{found}: check how the program that wrote them counts frames"
 
 
@@ -86,12 +80,6 @@ def _of_size(size: float) -> str:
 
 def _sized(boxes_of: dict[int, Box], size: float) -> dict[int, Box]:
     return {frame: size * boxes_px for frame, boxes_px in boxes_of.items()}
-
-
-def evenly(frames: Sequence[int], count: int) -> list[int]:
-    """Take so many, evenly."""
-    rows = (2 * np.arange(count) + 1) * len(frames) // (2 * count)
-    return [frames[row] for row in dict.fromkeys(rows.tolist())] if frames else []
 
 
 def _told_apart(recording: Recording, boxes_of: dict[int, Box], away: int) -> NDArray[np.float64]:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from pomona.errors import PomonaWarning
 from pomona.recording import Calibration, Recording
 from pomona.recording.pictures import UnreadablePictureError
-from pomona.survey.box_times import evenly
 from pomona.survey.part import Boxes
+from pomona.survey.sampled_boxes import frames_in_words, sampled_boxes
 
 __all__ = ["check_depth_pictures"]
 
-LOOKED_AT, MOST_BOXES = 5, 100
-"""Frames, evenly over those with boxes, and boxes of them, evenly, that are looked at."""
+MOST_BOXES = 100
+"""Of those of a few frames, evenly, that are looked at."""
 
 SOME = 20
 """Boxes with depth in them below which nothing is said."""
@@ -50,10 +50,7 @@ def check_depth_pictures(recording: Recording, parts: Sequence[Boxes]) -> None:
     """Warn where the boxes fit the pictures of depth elsewhere than where they are."""
     if "depth" not in recording.description()["pictures"]:
         return
-    shown = evenly([frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())], LOOKED_AT)
-    boxes_of = {
-        frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames
-    }
+    boxes_of = sampled_boxes(parts)
     step = max(sum(map(len, boxes_of.values())) // MOST_BOXES, 1)
     boxes_of = {frame: boxes_px[::step] for frame, boxes_px in boxes_of.items()}
     depths = _depths(recording, {frame: frame for frame in boxes_of})
@@ -104,8 +101,7 @@ def _tried_in_time(recording: Recording, boxes_of: dict[int, Box]) -> list[tuple
         rows = {frame: row_of[frame] + away for frame in boxes_of if 0 <= row_of[frame] + away < len(recording)}
         depths = _depths(recording, {frame: recording.numbers[row] for frame, row in rows.items()})
         share = _of_one_surface(depths, boxes_of, recording.calibration) or 0.0
-        frames = "a frame" if abs(away) == 1 else f"{abs(away)} frames"
-        found.append((share, f"{frames} {'earlier' if away < 0 else 'later'}"))
+        found.append((share, f"{frames_in_words(away)} {'earlier' if away < 0 else 'later'}"))
     return found
 
 
