@@ -38,7 +38,9 @@ def clusters(counts: list[int], pairs: list[VisitPair]) -> list[int]:
     visits = [visit(number, np.zeros((count, 3))) for number, count in enumerate(counts)]
     sights = all_sights(visits)
     links = links_of(sights, pairs)
-    return _core.contracted(sights.visits, len(visits), links.sights, links.log_odds, links.matched).tolist()
+    return _core.contracted(
+        sights.visits, len(visits), links.sights, links.log_odds, links.matched, links.against
+    ).tolist()
 
 
 def test_links_join_through_all_visits() -> None:
@@ -46,7 +48,7 @@ def test_links_join_through_all_visits() -> None:
 
 
 def test_two_of_one_visit_never_join() -> None:
-    pairs = [pair(0, 1, [(0, 0)]), pair(1, 2, [(0, 0)]), pair(0, 2, [(1, 0)], DOUBTED)]
+    pairs = [pair(0, 1, [(0, 0)]), pair(1, 2, [(0, 0)], DOUBTED), pair(0, 2, [(1, 0)])]
     labels = clusters([2, 1, 1], pairs)
     assert labels[0] != labels[1]
     assert labels[0] == labels[2]
@@ -64,6 +66,18 @@ def test_what_matched_visits_leave_unpaired_speaks_against() -> None:
     assert clusters([1, 1, 1], doubted) == [0, 0, 0]
     # Visits 0 and 2 were found in one another, and did not pair the two.
     assert clusters([1, 1, 1], [*doubted, pair(0, 2, [])]) == [0, 0, 1]
+
+
+@pytest.mark.parametrize(("left_out", "apart"), [(1, True), (30, False)])
+def test_a_match_that_leaves_out_much_of_what_others_pair_speaks_little_against(left_out: int, apart: bool) -> None:
+    """As of visits from two sides of a row; who is the last of forty its match with a third visit doubts."""
+    rows = [(row, row) for row in range(40)]
+    probabilities = np.where(np.arange(40) == 39, DOUBTED, SURE)
+    doubted = replace(pair(1, 2, rows), probabilities=probabilities)
+    labels = np.reshape(clusters([40] * 3, [pair(0, 1, rows), doubted, pair(0, 2, rows[: 40 - left_out])]), (3, 40))
+    assert (labels[:, :39] == np.arange(39)).all()
+    assert labels[0, 39] == labels[1, 39]
+    assert (labels[2, 39] != labels[1, 39]) == apart
 
 
 def test_sizes_that_grew_as_all_did_speak_for_one_fruit() -> None:

@@ -29,11 +29,19 @@ pub fn contracted<'py>(
     links: PyReadonlyArray2<'py, i64>,
     log_odds: PyReadonlyArray1<'py, f64>,
     matched: PyReadonlyArray2<'py, i64>,
+    against: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let visits = rows("visits", &visits)?;
     let (links, matched) = (pairs("links", &links)?, pairs("matched", &matched)?);
-    let log_odds = log_odds.as_array().to_vec();
-    let evidence = Evidence { visits: &visits, n_visits, links: &links, log_odds: &log_odds, matched: &matched };
+    let [log_odds, against] = [log_odds, against].map(|nats| nats.as_array().to_vec());
+    let evidence = Evidence {
+        visits: &visits,
+        n_visits,
+        links: &links,
+        log_odds: &log_odds,
+        matched: &matched,
+        against: &against,
+    };
     let labels = py.detach(|| identity::contracted(&evidence)).map_err(wrong)?;
     Ok(labels.into_iter().map(|label| label as i64).collect::<Vec<_>>().into_pyarray(py))
 }

@@ -81,7 +81,7 @@ def conclude(
     seasons = seasons_of(sights.days)
     season_of = np.repeat(np.arange(len(seasons)), [one.stop - one.start for one in seasons])
     links = links_of(sights, [pair for pair in pairs if season_of[pair.first] == season_of[pair.second]])
-    labels = _core.contracted(sights.visits, len(visits), links.sights, links.log_odds, links.matched)
+    labels = _core.contracted(sights.visits, len(visits), links.sights, links.log_odds, links.matched, links.against)
     frames = frames_of_visits(visits, pairs, known, keepers)
     positions = np.concatenate(
         [visit.positions @ frame[:3, :3].T + frame[:3, 3] for visit, frame in zip(visits, frames, strict=True)]

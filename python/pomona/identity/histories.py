@@ -57,8 +57,9 @@ WEEK = 7.0
 BELIEF_GONE = 25.0
 """Fruits that this belief is worth: few against the hundreds of a row, so that thinning shows."""
 
-CLEARED = 0.02
-"""Of the times between visits a week apart or more, those in which any share goes, as likely: people thin and pick.
+CLEARED = 0.1
+"""Of the times between visits a week apart or more, those in which any share goes, as likely: people thin and pick,
+once or so in a season of ten visits.
 By the belief in a usual week alone, two thirds thinned at once were sooner two thirds of false points on the visit
 before, of which no other visit has any."""
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.identity.left_out import nats_against
 from pomona.identity.sizes import size_log_odds
 from pomona.identity.visits import Sights, VisitPair
 
 __all__ = ["Links", "links_of"]
 
 SUREST = 8.0
-"""Nats of a pair at most. Less `UNCOVERED`, a little less than what a match left out speaks against: two sights that
-their own visits left apart are not one because another visit has something between them."""
+"""Nats of a pair at most: of 3,000 that a match is surest of one may be wrong."""
 
 UNCOVERED = 0.4
 """Nats against a pair beforehand: where a fruit went, its neighbour in the cluster may be seen for the first time, and
@@ -41,11 +41,14 @@ class Links:
         That the two are one fruit; positive and negative.
     matched : (M, 2) int64
         Visits that were found in one another: then a pair that is not there speaks against.
+    against : (M,) float64
+        How much it speaks against, nats.
     """
 
     sights: NDArray[np.int64]
     log_odds: NDArray[np.float64]
     matched: NDArray[np.int64]
+    against: NDArray[np.float64]
 
 
 def links_of(sights: Sights, pairs: Sequence[VisitPair]) -> Links:
@@ -58,7 +61,7 @@ def links_of(sights: Sights, pairs: Sequence[VisitPair]) -> Links:
         by_place = _by_place(pair.probabilities) - (UNCOVERED if goes else 0.0)
         log_odds.append(by_place + _by_size(sights, pair, linked))
     matched = np.array([(pair.first, pair.second) for pair in pairs], np.int64).reshape(-1, 2)
-    return Links(np.concatenate(found), np.concatenate(log_odds), matched)
+    return Links(np.concatenate(found), np.concatenate(log_odds), matched, nats_against(sights, pairs))
 
 
 def _by_place(probabilities: NDArray[np.float64]) -> NDArray[np.float64]:

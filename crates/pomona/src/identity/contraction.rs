@@ -2,14 +2,10 @@
 //!
 //! Greedy contraction (Keuper and others, 2015): the two clusters with the most evidence for being one are joined until
 //! no two are better joined. Evidence of two clusters is the sum over all pairs of their sights, of which most are links
-//! or speak against by [`UNPAIRED`]. The most evidence goes first whatever the order of the visits' coming.
+//! or were left apart by a match of their visits. The most evidence goes first whatever the order of the visits' coming.
 
 use crate::error::{Error, Result};
 use std::collections::BinaryHeap;
-
-/// Nats against two sights of matched visits that the match left unpaired. Of the fruits that both have seen it pairs all
-/// but 3 in 100, which were 3.5 nats; twice that keeps a fruit apart from the neighbour of one that was thinned.
-pub const UNPAIRED: f64 = 7.0;
 
 /// Bits of a mask's word.
 const WORD: usize = u64::BITS as usize;
@@ -27,6 +23,8 @@ pub struct Evidence<'a> {
     pub log_odds: &'a [f64],
     /// Visits that were found in one another: then a pair that is not there speaks against.
     pub matched: &'a [[usize; 2]],
+    /// How much it speaks against, of each two of them, nats.
+    pub against: &'a [f64],
 }
 
 impl Evidence<'_> {
@@ -35,8 +33,14 @@ impl Evidence<'_> {
             let (found, expected) = (self.log_odds.len(), self.links.len());
             return Err(Error::Length { what: "log_odds", found, expected });
         }
-        if let Some(row) = self.log_odds.iter().position(|nats| !nats.is_finite()) {
-            return Err(Error::NotFinite { what: "log_odds", row });
+        if self.against.len() != self.matched.len() {
+            let (found, expected) = (self.against.len(), self.matched.len());
+            return Err(Error::Length { what: "against", found, expected });
+        }
+        for (what, nats) in [("log_odds", self.log_odds), ("against", self.against)] {
+            if let Some(row) = nats.iter().position(|nats| !nats.is_finite()) {
+                return Err(Error::NotFinite { what, row });
+            }
         }
         below("visits", self.visits.iter(), self.n_visits)?;
         below("links", self.links.iter().flatten(), self.visits.len())?;
@@ -103,8 +107,9 @@ impl Eq for Candidate {}
 struct Clusters {
     /// Visits of each cluster, as masks of `words` words.
     visits: Vec<u64>,
-    /// Visits that each visit was matched with.
-    matched: Vec<u64>,
+    /// Nats against sights of any two visits that are no pair; 0 where they were not matched.
+    against: Vec<f64>,
+    n_visits: usize,
     words: usize,
     /// The cluster that each was joined to; itself while it stands.
     joined_to: Vec<usize>,
@@ -118,7 +123,8 @@ impl Clusters {
         let (n_sights, words) = (evidence.visits.len(), evidence.n_visits.div_ceil(WORD).max(1));
         let mut clusters = Self {
             visits: vec![0; n_sights * words],
-            matched: vec![0; evidence.n_visits * words],
+            against: vec![0.0; evidence.n_visits * evidence.n_visits],
+            n_visits: evidence.n_visits,
             words,
             joined_to: (0..n_sights).collect(),
             grown: vec![0; n_sights],
@@ -127,13 +133,14 @@ impl Clusters {
         for (sight, &visit) in evidence.visits.iter().enumerate() {
             clusters.visits[sight * words + visit / WORD] |= 1 << (visit % WORD);
         }
-        for &[one, other] in evidence.matched {
-            clusters.matched[one * words + other / WORD] |= 1 << (other % WORD);
-            clusters.matched[other * words + one / WORD] |= 1 << (one % WORD);
+        for (&[one, other], &nats) in evidence.matched.iter().zip(evidence.against) {
+            clusters.against[one * evidence.n_visits + other] = nats;
+            clusters.against[other * evidence.n_visits + one] = nats;
         }
         for (&[one, other], nats) in evidence.links.iter().zip(evidence.log_odds) {
-            clusters.linked[one].push((other, nats + UNPAIRED));
-            clusters.linked[other].push((one, nats + UNPAIRED));
+            let beyond = nats + clusters.against(evidence.visits[one], evidence.visits[other]);
+            clusters.linked[one].push((other, beyond));
+            clusters.linked[other].push((one, beyond));
         }
         clusters
     }
@@ -154,11 +161,12 @@ impl Clusters {
         if visits.iter().zip(others).any(|(a, b)| a & b != 0) {
             return f64::NEG_INFINITY;
         }
-        let shared = |visit| -> u32 {
-            self.mask(&self.matched, visit).iter().zip(others).map(|(a, b)| (a & b).count_ones()).sum()
-        };
-        let n_against: u32 = bits(visits).map(shared).sum();
-        linked - UNPAIRED * f64::from(n_against)
+        let of = |visit| bits(others).map(|other| self.against(visit, other)).sum::<f64>();
+        linked - bits(visits).map(of).sum::<f64>()
+    }
+
+    fn against(&self, visit: usize, other: usize) -> f64 {
+        self.against[visit * self.n_visits + other]
     }
 
     fn mask<'a>(&self, masks: &'a [u64], row: usize) -> &'a [u64] {
@@ -224,11 +232,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const UNPAIRED: f64 = 7.0;
     const EVERY_TWO: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
     fn labels(visits: &[usize], links: &[[usize; 2]], log_odds: &[f64], matched: &[[usize; 2]]) -> Vec<usize> {
         let n_visits = visits.iter().max().map_or(0, |most| most + 1);
-        contracted(&Evidence { visits, n_visits, links, log_odds, matched }).expect("valid")
+        let against = vec![UNPAIRED; matched.len()];
+        contracted(&Evidence { visits, n_visits, links, log_odds, matched, against: &against }).expect("valid")
     }
 
     #[test]
@@ -244,6 +254,25 @@ mod tests {
     }
 
     #[test]
+    fn a_match_that_leaves_out_much_speaks_less_against() {
+        let labels = |against: &[f64]| {
+            let (links, log_odds) = ([[0, 1], [1, 2]], [8.0, 6.0]);
+            let evidence = Evidence {
+                visits: &[0, 1, 2],
+                n_visits: 3,
+                links: &links,
+                log_odds: &log_odds,
+                matched: &EVERY_TWO,
+                against,
+            };
+            contracted(&evidence)
+        };
+        assert_eq!(labels(&[7.0, 7.0, 7.0]).expect("valid"), [0, 0, 1]);
+        assert_eq!(labels(&[7.0, 2.0, 7.0]).expect("valid"), [0, 0, 0]);
+        assert!(labels(&[7.0, 7.0]).is_err() && labels(&[7.0, f64::NAN, 7.0]).is_err());
+    }
+
+    #[test]
     fn every_bit_of_a_mask_is_told_once() {
         let mask = [1 << 63 | 0b1001, 0, u64::MAX];
         let told: Vec<usize> = bits(&mask).collect();
@@ -253,7 +282,7 @@ mod tests {
     #[test]
     fn numbers_that_name_nothing_are_refused() {
         let wrong = |links: &[[usize; 2]], log_odds: &[f64]| {
-            contracted(&Evidence { visits: &[0, 1], n_visits: 2, links, log_odds, matched: &[] }).is_err()
+            contracted(&Evidence { visits: &[0, 1], n_visits: 2, links, log_odds, matched: &[], against: &[] }).is_err()
         };
         assert!(wrong(&[[0, 2]], &[1.0]) && wrong(&[[0, 1]], &[]) && wrong(&[[0, 1]], &[f64::NAN]));
     }

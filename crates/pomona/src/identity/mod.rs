@@ -9,5 +9,5 @@
 mod contraction;
 mod whereabouts;
 
-pub use contraction::{Evidence, UNPAIRED, contracted};
+pub use contraction::{Evidence, contracted};
 pub use whereabouts::{Whereabouts, whereabouts};
