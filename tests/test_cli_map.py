@@ -53,10 +53,11 @@ def test_info_tells_people_and_programs(orchard: Path) -> None:
     assert (info["kind"], info["format_version"]) == ("map", FORMAT_VERSION)
     assert [visit["name"] for visit in info["sessions"]] == ["august", "september"]
     assert info["n_observations"] == sum(visit["n_fruits"] for visit in info["sessions"])
+    assert 0 < info["n_hanging"] <= info["n_fruits"]
     assert info["n_fruits"] == sum(visit["n_new"] for visit in info["sessions"]) == sum(info["states"].values())
     assert np.shape(info["extent_m"]) == (2, 3)
     text = run("info", orchard).stdout
-    assert text.startswith(f"{orchard}: map, format {FORMAT_VERSION}\n{info['n_fruits']} fruits (")
+    assert text.startswith(f"{orchard}: map, format {FORMAT_VERSION}\n{info['n_fruits']} fruits seen so far (")
     assert text.splitlines()[-1].split()[-1] == "september"
 
 
@@ -66,7 +67,7 @@ def test_info_keeps_its_columns_whatever_a_session_is_called(tmp_path: Path) -> 
     long = "row 4, from the road to the shed, " * 20
     add_session(path, Session(long, "2024-08-01", "drawn", few))
     add_session(path, Session("b", "2024-09-01", "drawn", many), new_part=True)
-    header, *rows = run("info", path).stdout.splitlines()[3:]
+    header, *rows = run("info", path).stdout.splitlines()[4:]
     assert [header.split(), *(row.split()[:7] for row in rows)] == [
         ["part", "date", "fruits", "matched", "new", "method", "noise", "session"],
         ["1", "2024-08-01", "9", "0", "9", "-", "-"],

@@ -53,7 +53,10 @@ def test_the_names_of_a_session_are_shown_harmlessly(pomona: Pomona, evil: Path)
     code, printed, told = pomona("map", "info", evil)
     assert (code, told) == (0, "")
     assert_harmless(printed)
-    assert len(printed.splitlines()) == 5  # the name begins no lines
+    plain = evil.with_name("plain.gpkg")
+    cloud = FruitCloud([[0.1 * row, 0.3 * row**2, 1.0] for row in range(8)])
+    write_session(plain, cloud, name="plain", date="2024-08-09", recording="plain")
+    assert len(printed.splitlines()) == len(pomona("map", "info", plain)[1].splitlines())  # the name begins no lines
     code, printed, _ = pomona("map", "add", evil.with_name("orchard.gpkg"), evil)
     assert code == 0
     assert_harmless(printed)

@@ -32,6 +32,7 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
     from collections import Counter
 
     from pomona.orchard import FORMAT_VERSION
+    from pomona.orchard.hanging import hang_chances
 
     fruits, visits = orchard.fruits(), orchard.visits()
     low, high = (fruits.positions.min(axis=0), fruits.positions.max(axis=0)) if len(fruits) else (None, None)
@@ -40,6 +41,7 @@ def _info(orchard: OrchardMap) -> dict[str, Any]:
         "kind": orchard.kind,
         "format_version": FORMAT_VERSION,
         "n_fruits": len(fruits),
+        "n_hanging": round(float(hang_chances(fruits).sum()), 1),
         "n_observations": sum(visit.n_fruits for visit in visits),
         "states": dict(sorted(Counter(fruits.extras["state"]).items())),
         "extent_m": None if low is None or high is None else [low.tolist(), high.tolist()],
@@ -85,8 +87,9 @@ def _info_as_lines(info: dict[str, Any]) -> list[str]:
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in (header, *rows)]
     return [
         f"{info['path']}: {info['kind']}, format {info['format_version']}",
-        f"{amount(info['n_fruits'], 'fruit')} ({states}), {amount(info['n_observations'], 'observation')} "
+        f"{amount(info['n_fruits'], 'fruit')} seen so far ({states}), {amount(info['n_observations'], 'observation')} "
         f"in {amount(len(rows), 'session')}",
+        f"some {info['n_hanging']:.0f} of them hang now; the others went, or were none (how sure: pomona growth)",
         "",
         *(line.rstrip() for line in table),
     ]
