@@ -152,7 +152,8 @@ def test_poses_by_poor_odometry_are_as_uncertain_as_it_is_told_to_be():
                 if found and number >= 4:
                     step = step_to(found.map_from_camera, true)
                     squared.append(step @ np.linalg.solve(found.covariance, step))
-    assert np.mean(told) < 6.5 < np.mean(untold)
+    # A camera whose fruits lie far from where they should is looked for anew: without that the untold have 7.
+    assert np.mean(told) < 5.0 < np.mean(untold)
 
 
 @pytest.mark.parametrize("moved_is_known", [True, False])

@@ -83,3 +83,21 @@ def test_few_of_many_fruits_after_motions_that_nobody_told() -> None:
     assert len(squared) > 0.87 * n_frames, len(squared) / n_frames
     assert np.mean(squared) < 9.0
     assert np.mean(np.array(squared) > 22.5) < 0.03
+
+
+def test_a_motion_told_a_metre_off_is_not_borne_out_by_two_or_three_strangers() -> None:
+    """Few fruits in view, most of them found: the frames before have all the evidence for where they are laid."""
+    off_m = []
+    for seed in range(50):
+        row, before = drawn_row(seed, length_m=14.0, n=560), None
+        localizer = Localizer(row.map, threads=1)
+        for number in range(10):
+            true, fruits = pose_at(2.0 + 0.1 * number), 60 if number < 4 else 10 + seed % 9
+            moved = None if before is None else np.linalg.solve(before, true)
+            if number == 8 and moved is not None:
+                moved[0, 3] += 1.0 if seed % 2 else -1.0
+            found = localizer.update(seen_from(row, true, 100 * seed + number, most=fruits, share=0.8), moved)
+            off_m.append(np.linalg.norm(step_to(found.map_from_camera, true)[:3]) if found else np.nan)
+            before = true
+    assert np.mean(np.isfinite(off_m)) > 0.98
+    assert np.nanmax(off_m) < 0.3

@@ -105,7 +105,20 @@ pub(super) struct Aligned {
 impl Aligned {
     /// What the fruits of the newest frame say of it, each for itself, nats.
     pub fn own_nats(&self) -> f64 {
-        self.says.iter().filter(|say| say.age == 0).map(|say| say.evidence(self.share)).sum()
+        self.nats_of(|age| age == 0).0
+    }
+
+    /// How much more as many fruits of the frames before say, nats; none where there are none.
+    pub fn own_nats_short(&self) -> f64 {
+        let (own, fruits) = self.nats_of(|age| age == 0);
+        let (before, as_many) = self.nats_of(|age| age > 0);
+        if as_many > 0.0 { before / as_many * fruits - own } else { 0.0 }
+    }
+
+    /// What fruits of these ages say, nats, and how many they are.
+    fn nats_of(&self, aged: impl Fn(usize) -> bool) -> (f64, f64) {
+        let those = self.says.iter().filter(|say| aged(say.age));
+        those.fold((0.0, 0.0), |(nats, fruits), say| (nats + say.evidence(self.share), fruits + 1.0))
     }
 }
 

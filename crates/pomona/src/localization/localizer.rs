@@ -145,7 +145,7 @@ impl Localizer {
         let mut guess = predicted.map(|predicted| self.guess(&predicted, untold.as_ref(), up));
         let agreed = guess.as_mut().and_then(Guess::agreed);
         let found = if let Some((expected, followed)) = agreed {
-            self.follow(&expected, followed)
+            self.found_elsewhere(&followed, up)?.unwrap_or_else(|| self.follow(&expected, followed))
         } else {
             if untold.is_some() {
                 // Nobody knows where the frames before lie.
@@ -213,6 +213,24 @@ impl Localizer {
             self.window = window;
         }
         Self::answer(&settled.aligned, &settled.sightings, expected, true)
+    }
+
+    /// From nothing, where the newest frame says so much less for its fruits than those before that it could say enough for another pose:
+    /// after a motion that was told wrong two or three strangers may bear out a pose for which those before have all the evidence.
+    fn found_elsewhere(&mut self, followed: &Followed, up: Option<[Vector3<f64>; 2]>) -> Result<Option<Localization>> {
+        let aligned = &followed.settled.aligned;
+        let needed = FITTED_NATS + SEARCHED_NATS;
+        if aligned.own_nats_short() < needed {
+            return Ok(None);
+        }
+        let frame = self.window.newest();
+        let found = self.search(frame, &cloud_of(frame), up)?;
+        let more = found.log_odds - aligned.own_nats();
+        let elsewhere = found.verdict == Verdict::Found && more > needed;
+        if elsewhere {
+            self.window.keep(1);
+        }
+        Ok(elsewhere.then_some(found))
     }
 
     /// From nothing; else by the motion alone, as long as it is sure and the frame is too poor to contradict it.
