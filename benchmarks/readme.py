@@ -1,10 +1,12 @@
-"""The README's tables, taken from results/: `python -m benchmarks readme`."""
+"""The tables of the README and of docs/how-it-decides.md, taken from results/: `python -m benchmarks readme`."""
 
+from collections import defaultdict
 from pathlib import Path
 
-from benchmarks.results import FOLDER, markdown
+from benchmarks.results import FOLDER, markdown, read_rows
 
-README = Path(__file__).parent.parent / "README.md"
+HOME = Path(__file__).parent.parent
+README, HOW_IT_DECIDES = HOME / "README.md", HOME / "docs" / "how-it-decides.md"
 METHODS = ("paper", "verified")
 CELLS = {
     "base": "five trees, 30 % hidden, 2 cm of noise",
@@ -22,18 +24,17 @@ HEADER = ("two visits", "method", "right", "wrong", "P", "R", "P of true pose", 
 
 def main(_options: list[str]) -> None:
     """Replace what is between each pair of marks."""
-    text = README.read_text(encoding="utf-8")
-    for name, block in blocks().items():
+    for page, name, block in blocks():
         start, end = marks(name)
-        before, rest = text.split(start)
-        text = before + block + rest.split(end)[1]
-    README.write_text(text, encoding="utf-8")
+        before, rest = page.read_text(encoding="utf-8").split(start)
+        page.write_text(before + block + rest.split(end)[1], encoding="utf-8")
 
 
-def blocks() -> dict[str, str]:
-    """Return each block of the README with its marks, as the committed results have it."""
-    found = {"accuracy": accuracy(), "scan": (FOLDER / "scan.md").read_text(encoding="utf-8")}
-    return {name: text.join(marks(name)) for name, text in found.items()}
+def blocks() -> list[tuple[Path, str, str]]:
+    """Return each block with its page, its name and its marks, as the committed results have it."""
+    scan = (FOLDER / "scan.md").read_text(encoding="utf-8")
+    found = [(README, "accuracy", accuracy()), (README, "scan", scan), (HOW_IT_DECIDES, "calibration", calibration())]
+    return [(page, name, text.join(marks(name))) for page, name, text in found]
 
 
 def marks(name: str) -> tuple[str, str]:
@@ -52,6 +53,21 @@ def accuracy() -> str:
                 columns = ("right", "wrong", "P", "R", "oracle P", "oracle R", "CPU ms")
                 lines.append((meaning, method, *(row[column] for column in columns)))
     return markdown(HEADER, lines)
+
+
+def calibration() -> str:
+    """Return how often pairs of the verified method are right, by the probability they were given."""
+    sums: defaultdict[tuple[str, str], list[float]] = defaultdict(lambda: [0.0, 0.0, 0.0])
+    for row in read_rows("reliability_verified.csv"):
+        if row["noise"] == "estimated":
+            one = sums[row["from"], row["to"]]
+            for at, column in enumerate(("pairs", "right", "probability_sum")):
+                one[at] += float(row[column])
+    lines = [
+        (f"{least} to {most}", f"{given / pairs:.3f}", f"{right / pairs:.3f}", f"{pairs:,.0f}")
+        for (least, most), (pairs, right, given) in sums.items()
+    ]
+    return markdown(("probability", "mean", "right", "pairs"), lines)
 
 
 def measured() -> dict[tuple[str, str, str], dict[str, str]]:

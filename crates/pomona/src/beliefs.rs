@@ -28,21 +28,22 @@ const SETTLED: f64 = 1e-5;
 
 impl Beliefs {
     pub(crate) fn new(edges: Vec<Edge>, n_query: usize, n_map: usize) -> Self {
+        let (map_of, met) = numbered(edges.iter().map(|edge| edge.map), n_map);
         let mut to_query = vec![1.0; edges.len()];
         let mut to_map = vec![0.0; edges.len()];
-        let mut of_map = vec![1.0; n_map];
+        let mut of_map = vec![1.0; met];
         for _ in 0..ROUNDS {
             let of_query = sums(&edges, &to_query, n_query);
             for ((edge, back), out) in edges.iter().zip(&to_query).zip(&mut to_map) {
                 *out = edge.ratio / (of_query[edge.query as usize] - edge.ratio * back).max(1e-12);
             }
-            of_map = vec![1.0; n_map];
-            for (edge, message) in edges.iter().zip(&to_map) {
-                of_map[edge.map as usize] += message;
+            of_map.fill(1.0);
+            for (map, message) in map_of.iter().zip(&to_map) {
+                of_map[*map as usize] += message;
             }
             let mut change = 0.0f64;
-            for ((edge, message), back) in edges.iter().zip(&to_map).zip(&mut to_query) {
-                let next = 1.0 / (of_map[edge.map as usize] - message).max(1e-12);
+            for ((map, message), back) in map_of.iter().zip(&to_map).zip(&mut to_query) {
+                let next = 1.0 / (of_map[*map as usize] - message).max(1e-12);
                 change = change.max((next - *back).abs());
                 *back = next;
             }
@@ -119,6 +120,22 @@ fn sums(edges: &[Edge], to_query: &[f64], n_query: usize) -> Vec<f64> {
         sums[edge.query as usize] += edge.ratio * back;
     }
     sums
+}
+
+/// Those of `n` rows that occur, numbered as they come, and how many they are: a map has many more rows than have edges.
+fn numbered(rows: impl Iterator<Item = u32>, n: usize) -> (Vec<u32>, usize) {
+    let mut number_of = vec![u32::MAX; n];
+    let mut count = 0;
+    let number = |row: u32| {
+        let number = &mut number_of[row as usize];
+        if *number == u32::MAX {
+            *number = count;
+            count += 1;
+        }
+        *number
+    };
+    let numbers = rows.map(number).collect();
+    (numbers, count as usize)
 }
 
 #[cfg(test)]

@@ -332,6 +332,10 @@ CHANGE_CELLS = (
     replace(_TEN_TREES, name="replanted50", replanted=0.5),
     replace(_TEN_TREES, name="replanted80", replanted=0.8),
     replace(_TEN_TREES, name="replanted80-sparse20", replanted=0.8, row=ROWS["sparse20"]),
+    *(
+        replace(_TEN_TREES, name=f"{name}-replanted70", replanted=0.7, row=PLANTINGS[name])
+        for name in ("wires", "vine", "singles", "trellis")
+    ),
     replace(_TEN_TREES, name="torn", tear_m=1.0),
     _GROWN,
     replace(_GROWN, name="grownmixed", growth=(1.5, 2.0)),

@@ -91,8 +91,6 @@ pub(super) struct Findings<'a> {
     pub(super) accepted: Vec<Finding<'a>>,
     /// Other poses that it grew: what chance and the planting's own pattern reach.
     pub(super) others: Vec<Finding<'a>>,
-    /// Those that would have enough evidence on another planting.
-    pub(super) patterns: Vec<Finding<'a>>,
     pub(super) log: Log,
 }
 
@@ -166,7 +164,7 @@ impl Findings<'_> {
     pub(super) fn none(effort: Effort, threshold: f64) -> Self {
         let (best, settled, settled_threshold) = (f64::NAN, f64::NAN, KEPT.threshold[0] * threshold);
         let log = Log { seeds: 0, effort, refined: 0, grown: 0, best, settled, threshold, settled_threshold };
-        Self { accepted: Vec::new(), others: Vec::new(), patterns: Vec::new(), log }
+        Self { accepted: Vec::new(), others: Vec::new(), log }
     }
 }
 

@@ -1,8 +1,11 @@
 //! What chance puts at each place of a cloud: the density of strangers, near a fruit and at a distance from one.
 
 use super::layers::denser;
+use super::moved::along_the_row;
 use crate::neighbours::others::{Neighbours, each_row};
+use crate::neighbours::tree::{Tree, single};
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// Kernel estimate at each fruit from its neighbours, half at the width of a cluster, half at that of a branch.
 ///
@@ -141,18 +144,44 @@ impl Companions {
     const HALF: f64 = 1.5;
 
     pub(super) fn new(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Self {
+        let apart =
+            |row: usize| neighbours.of(row).iter().map(move |&other| (points[other as usize] - points[row]).norm());
+        Self::counted(spacing, (0..points.len()).flat_map(apart), points.len())
+    }
+
+    /// The nearest alone.
+    pub(super) fn nearest(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Self {
+        let apart = |(row, p): (usize, &Vector3<f64>)| {
+            neighbours.of(row).first().map(|&near| (points[near as usize] - p).norm())
+        };
+        Self::counted(spacing, points.iter().enumerate().filter_map(apart), points.len())
+    }
+
+    /// By their distances, from so many places.
+    fn counted(spacing: f64, distances: impl Iterator<Item = f64>, places: usize) -> Self {
         let bin = BIN * spacing;
         let mut within = vec![0.0; Self::BINS + 1];
-        for (row, p) in points.iter().enumerate() {
-            for &other in neighbours.of(row) {
-                let at = ((points[other as usize] - p).norm() / bin) as usize;
-                if at < Self::BINS {
-                    within[at + 1] += 1.0 / points.len() as f64;
-                }
+        for distance in distances {
+            if let Some(count) = within[1..].get_mut((distance / bin) as usize) {
+                *count += 1.0 / places as f64;
             }
         }
         (0..Self::BINS).for_each(|at| within[at + 1] += within[at]);
         Self { bin, within }
+    }
+
+    /// The denser of both at each distance, whose bins are alike.
+    pub(super) fn or_denser(&self, other: &Self) -> Self {
+        let more = self
+            .within
+            .windows(2)
+            .zip(other.within.windows(2))
+            .map(|(own, others)| (own[1] - own[0]).max(others[1] - others[0]));
+        let within = std::iter::once(0.0).chain(more.scan(0.0, |sum, more| {
+            *sum += more;
+            Some(*sum)
+        }));
+        Self { bin: self.bin, within: within.collect() }
     }
 
     /// As many, but spread in distance as another cloud's are by this `share`, whose lengths are `scale` times as long here.
@@ -168,6 +197,31 @@ impl Companions {
             if distance > reach { *here } else { here + share * (other.up_to(distance / scale) * own / others - here) }
         };
         Self { bin: self.bin, within: self.within.iter().enumerate().map(both).collect() }
+    }
+
+    /// As many, but such as keep no distance: nowhere denser than nearer by.
+    ///
+    /// Those of another tree know nothing of the fruit that hung in its place. Of the densities that fall with the distance this is the
+    /// likeliest (Grenander 1956): a shell that is denser than those within is spread over them.
+    pub(super) fn keeping_no_distance(&self) -> Self {
+        let volume = |bins: &Range<usize>| shell(bins.start as f64, bins.end as f64);
+        let fruits = |bins: &Range<usize>| self.within[bins.end] - self.within[bins.start];
+        let mut blocks: Vec<Range<usize>> = Vec::new();
+        for at in 0..Self::BINS {
+            let mut block = at..at + 1;
+            while let Some(inner) =
+                blocks.pop_if(|inner| fruits(inner) * volume(&block) <= fruits(&block) * volume(inner))
+            {
+                block.start = inner.start;
+            }
+            blocks.push(block);
+        }
+        let evened = |block: Range<usize>| {
+            let density = fruits(&block) / volume(&block);
+            let start = block.start;
+            block.map(move |at| self.within[start] + density * shell(start as f64, (at + 1) as f64))
+        };
+        Self { bin: self.bin, within: std::iter::once(0.0).chain(blocks.into_iter().flat_map(evened)).collect() }
     }
 
     /// Fruits around a fruit of the cloud that shows fewer, over those of the other; 1 where either shows none.
@@ -199,6 +253,43 @@ impl Companions {
         let place = (distance / self.bin).min(Self::BINS as f64 - 0.001);
         let (at, rest) = (place as usize, place.fract());
         self.within[at] * (1.0 - rest) + self.within[at + 1] * rest
+    }
+}
+
+/// What a cloud has around the places of its fruits when it is moved along its row: what another tree would have there.
+#[derive(Debug, Clone)]
+pub(super) struct MovedCompanions {
+    pub(super) all: Companions,
+    pub(super) nearest: Companions,
+}
+
+impl MovedCompanions {
+    /// How far it is moved, in spacings: a row's direction, by its fruits, is off by a degree or so.
+    const FARTHEST: f64 = 4.0;
+
+    /// Places that tell enough.
+    const PLACES: usize = 2000;
+
+    pub(super) fn new(points: &[Vector3<f64>], tree: &Tree, spacing: f64) -> Self {
+        let ways = along_the_row(points, spacing, Self::FARTHEST);
+        let axis = ways.first().map_or(Vector3::zeros(), Vector3::normalize);
+        let ahead = points.iter().map(|p| p.dot(&axis));
+        let (first, last) = ahead.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let moved = points.iter().flat_map(|p| ways.iter().map(move |way| p + way));
+        // An odd step takes as many ways ahead as back.
+        let asked = moved.step_by((points.len() * ways.len() / Self::PLACES) | 1);
+        let (mut places, mut all, mut nearest) = (0, Vec::new(), Vec::new());
+        for place in asked.filter(|place| (first..=last).contains(&place.dot(&axis))) {
+            let before = all.len();
+            let reach = Companions::BINS as f64 * BIN * spacing;
+            tree.within(&single(&place), reach as f32, |_, d2| all.push(f64::from(d2).sqrt()));
+            nearest.extend(all[before..].iter().copied().min_by(f64::total_cmp));
+            places += 1;
+        }
+        // Nowhere farther off more densely than nearer by: places know nothing of these fruits.
+        let [all, nearest] = [all, nearest]
+            .map(|distances| Companions::counted(spacing, distances.into_iter(), places).keeping_no_distance());
+        Self { all, nearest }
     }
 }
 
@@ -277,6 +368,21 @@ mod tests {
         // Another unit changes nothing.
         let own = dense.spread_as(&dense, 1.0, 0.5);
         assert!((own.up_to(0.1) - dense.up_to(0.1)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn companions_that_keep_no_distance_fill_the_gap_around_a_fruit_and_are_as_many() {
+        // Fruits of a lattice, 10 cm apart: none nearer, six at that distance.
+        let fruit = |i: i32| [i % 6, i / 6 % 6, i / 36].map(|at| 0.1 * f64::from(at)).into();
+        let own = Landscape::new(&FruitCloud::from_positions((0..216).map(fruit).collect())).companions;
+        let another = own.keeping_no_distance();
+        let all = Companions::BINS as f64 * own.bin;
+        assert!((another.up_to(all) / own.up_to(all) - 1.0).abs() < 1e-9);
+        let densities: Vec<f64> = [0.02, 0.04, 0.06, 0.08, 0.1].map(|distance| another.density(distance)).into();
+        assert!(own.density(0.05) == 0.0 && densities.is_sorted_by(|near, far| near > far), "{densities:?}");
+        // In a bin beyond 10 cm all neighbours are counted, 5 of a fruit in the mean.
+        let ball = shell(0.0, (0.1 / own.bin).ceil() * own.bin);
+        assert!((own.up_to(0.12) - 5.0).abs() < 1e-9 && (densities[1] * ball / 5.0 - 1.0).abs() < 0.1, "{densities:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::acceptance::{PATTERN, SURE};
+use super::acceptance::PATTERN;
 use super::case::{Finding, Findings, Search};
 use super::doubts::Rated;
 use super::overlap::Overlap;
@@ -8,78 +8,33 @@ use super::settlement::Settled;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
-use nalgebra::Vector3;
 
-/// Times as many deviations as wrong poses reach, by which an answer has more evidence than it has moved and that the planting repeats others
-/// is no doubt: true ones among trees of one clone have 3 to 8 times as many, wrong ones on fans of equal trees up to 1.7.
+/// Times as many deviations as wrong poses reach, by which an answer has more evidence than it has moved and that other poses have much, too,
+/// is no doubt: true ones among trees of one clone have 3 to 8 times as many, on walls of single fruits 1.4 to 2.3, wrong ones on these and on
+/// fans of equal trees up to 1.7.
 const CLEAR_OF_PATTERNS: f64 = 2.0;
-
-/// What speaks against the best finding.
-enum Doubt {
-    /// It is ruled out, by the name of the stage.
-    Ruled(&'static str),
-    /// So far moved, and there alone, it has nearly as much evidence, nats: trees that look the same.
-    Elsewhere(Vector3<f64>, f64),
-}
 
 impl<'a> Search<'a> {
     /// The answer to what was found.
     pub(super) fn answer_of(&self, mut findings: Findings<'a>) -> Match {
-        let needed = findings.log.threshold.max(self.threshold(findings.log.effort.stands.share_left()));
-        let clear = SURE * needed;
-        self.drop_patterns(&mut findings.accepted, clear);
         self.join(&mut findings.accepted);
         // Parts that stand together may leave each other fewer pairs than speak for one.
         if findings.accepted.first().is_some_and(|best| self.believed(best) == 0.0) {
             findings.accepted.clear();
         }
         let mut stages = self.stages(&findings);
-        let mut elsewhere = None;
-        match self.doubt_of(&findings, clear) {
-            Some(Doubt::Ruled(stage)) => {
-                stages.push((stage, 1.0));
-                findings.accepted.clear();
-            }
-            Some(Doubt::Elsewhere(by, nats)) => elsewhere = Some((by, nats)),
-            None => {}
+        if findings.accepted.first().is_some_and(|best| self.fits_better_mirrored(best, &findings.log)) {
+            stages.push(("mirrored", 1.0));
+            findings.accepted.clear();
         }
-        self.answer(findings, stages, elsewhere)
-    }
-
-    /// What speaks against the best finding where it has less evidence than is `clear`.
-    fn doubt_of(&self, Findings { accepted, log, .. }: &Findings, clear: f64) -> Option<Doubt> {
-        let (best, others) = accepted.split_first()?;
-        match self.moved(best, others, clear)[..] {
-            [] => self.fits_better_mirrored(best, log).then_some(Doubt::Ruled("mirrored")),
-            [(by, nats)] => Some(Doubt::Elsewhere(by, nats)),
-            _ => Some(Doubt::Ruled("moved")),
-        }
-    }
-
-    /// Drops findings behind the best that fit moved: what a planting repeats is no part of an answer, and no rival.
-    fn drop_patterns(&self, accepted: &mut Vec<Finding>, clear: f64) {
-        let keeps = |at: usize| at == 0 || self.moved(&accepted[at], accepted, clear).is_empty();
-        let mut kept: Vec<bool> = (0..accepted.len()).map(keeps).collect();
-        kept.reverse();
-        accepted.retain(|_| kept.pop().unwrap_or(true));
-    }
-
-    /// Where a finding with less evidence than is `clear` fits moved, elsewhere than where others lie; see [`Finding::fits_moved`].
-    fn moved(&self, finding: &Finding, others: &[Finding], clear: f64) -> Vec<(Vector3<f64>, f64)> {
-        finding.fits_moved(clear, |moved| others.iter().any(|other| self.lays(&other.overlap, moved)))
+        self.answer(findings, stages)
     }
 
     /// The best of the accepted findings; `NoMatch` where one that is not accepted has nearly as much evidence.
     ///
-    /// The other optima of the same search show what wrong poses reach on this very planting. `elsewhere` is how the best is moved to
-    /// another pose, and what evidence that has, nats.
-    pub(super) fn answer(
-        &self,
-        findings: Findings,
-        mut stages: Vec<(&'static str, f64)>,
-        elsewhere: Option<(Vector3<f64>, f64)>,
-    ) -> Match {
-        let Findings { accepted, others, patterns, log } = findings;
+    /// The other optima of the same search show what wrong poses reach on this very planting.
+    pub(super) fn answer(&self, findings: Findings, mut stages: Vec<(&'static str, f64)>) -> Match {
+        let Findings { accepted, others, log } = findings;
         let pattern = self.reached(PATTERN, log.effort.stands.share_left());
         let mut accepted = accepted.into_iter();
         let best = accepted.next();
@@ -91,21 +46,18 @@ impl<'a> Search<'a> {
         let mut pairs = self.pairs(found);
         let is_new = |other: &Finding| found.further.iter().all(|part| !self.shows(&part.overlap, &other.overlap));
         let is_outdone_by = |other: &Finding| is_new(other) && self.outdoes(best, other.rated(), pattern);
-        // What a planting repeats is no rival of what stands clear out of it.
-        let outdone = others.iter().any(is_outdone_by)
-            || patterns.iter().any(is_outdone_by) && !self.stands_out_of_the_planting(found, CLEAR_OF_PATTERNS);
+        let outdone = others.iter().any(is_outdone_by) && !self.stands_out_of_the_planting(found, CLEAR_OF_PATTERNS);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
-        let rivals: Vec<Registration> = accepted
+        let mut rivals: Vec<Registration> = accepted
             .filter(|other| is_new(other) && self.excludes(best, other.rated(), pattern))
             .map(|finding| self.registration(&finding.overlap))
-            .chain(elsewhere.map(|(by, log_odds)| {
-                let pose = Similarity { translation: overlap.pose.translation + by, ..overlap.pose };
-                self.registration(&Overlap { pose, log_odds, ..overlap.clone() })
-            }))
             .collect();
+        if rivals.is_empty() {
+            rivals.extend(found.unseen_rival(&log).map(|rival| self.registration(&rival)));
+        }
         // What was measured does not tell the poses apart: the pairs are those of one of them.
         let poses = (1 + rivals.len()) as f64;
         for pair in &mut pairs {

@@ -27,6 +27,8 @@ pub(crate) struct Cell {
 #[derive(Debug, Clone)]
 pub(crate) struct Cut {
     pub(super) edge: f64,
+    /// Distance from the origin within which all cells lie, metres.
+    pub(super) reach: f64,
     pub(super) cells: Vec<Cell>,
     /// Cell of each fruit.
     pub(super) cell_of: Vec<u32>,
@@ -72,6 +74,8 @@ impl Cut {
                 reached: false,
             })
             .collect();
-        Self { edge, cells, cell_of, index }
+        // No corner of a cell is two edges from a fruit in it.
+        let reach = points.iter().map(Vector3::norm).fold(0.0, f64::max) + 2.0 * edge;
+        Self { edge, reach, cells, cell_of, index }
     }
 }

@@ -86,7 +86,7 @@ pub(crate) fn pairs_under(
     let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
     search.settle(&mut finding);
-    search.answer(Findings { accepted: vec![finding], ..Findings::none(Effort::default(), 0.0) }, Vec::new(), None)
+    search.answer(Findings { accepted: vec![finding], ..Findings::none(Effort::default(), 0.0) }, Vec::new())
 }
 
 impl Match {
@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
         if findings.accepted.iter().all(|found| found.overlap.log_odds < clear) {
             self.lay_along(&mut findings);
         }
-        if findings.accepted.is_empty() {
+        if findings.accepted.is_empty() && self.may_stand_out(&findings.others) {
             findings.others.extend(self.upside_down_poses());
             if findings.others.len() >= SHOWN {
                 self.accept_outlier(&mut findings, f64::NEG_INFINITY);
@@ -214,14 +214,12 @@ impl<'a> Search<'a> {
                 continue;
             }
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
-            if !self.holds(&mut finding, KEPT.threshold, &mut findings.log) {
-                findings.others.push(finding);
-            } else if finding.overlap.log_odds > SURE * findings.log.threshold
-                || self.stands_out_of_the_planting(&finding, 1.0)
-            {
+            let holds = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
+            let is_sure = finding.overlap.log_odds > SURE * findings.log.threshold;
+            if holds && (is_sure || self.stands_out_of_the_planting(&finding, 1.0)) {
                 findings.accepted.push(finding);
             } else {
-                findings.patterns.push(finding);
+                findings.others.push(finding);
             }
         }
     }

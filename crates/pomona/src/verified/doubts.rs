@@ -20,7 +20,7 @@ use nalgebra::{Point3, Vector3};
 const RIVAL_CANDIDATES: usize = 24;
 
 /// No other pose may have this share of the best evidence.
-const RIVAL: f64 = 0.5;
+pub(super) const RIVAL: f64 = 0.5;
 
 /// Share of its distance by which a row may have bent: a pose that is off by less, far away, is no other pose.
 pub(super) const BENT: f64 = 0.05;
@@ -195,6 +195,17 @@ impl<'a> Search<'a> {
             Some(best.is_none_or(|at| (at.place - there).norm() > 0.5 * self.map.spacing))
         };
         share(best.predictions.iter().zip(places).filter_map(apart))
+    }
+}
+
+impl Finding<'_> {
+    /// A second tree that looks the same and that no seed proposed: where what is not sure has nearly as much evidence once it is moved.
+    pub(super) fn unseen_rival(&self, log: &Log) -> Option<Overlap> {
+        let settled = self.settled.as_ref().filter(|_| self.overlap.log_odds < SURE * log.threshold)?;
+        let most = self.most_moved().filter(|moved| moved.evidence > RIVAL * settled.evidence)?;
+        let mut overlap = settled.overlap.clone();
+        overlap.pose.translation += most.by;
+        Some(Overlap { log_odds: most.evidence, ..overlap })
     }
 }
 

@@ -22,33 +22,32 @@ use crate::beliefs::Beliefs;
 
 /// Evidence of an overlap, nats.
 pub(super) fn evidence(laid: &Patchwork) -> f64 {
-    let (evidence, _) = evidence_within(GATE, laid);
-    evidence
+    evidence_within(GATE, laid)
 }
 
-/// The same of pairs within so many standard deviations alone, and how many of these are expected to be right.
-pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> (f64, f64) {
+/// The same of pairs within so many standard deviations alone.
+pub(super) fn evidence_within(gate: f64, laid: &Patchwork) -> f64 {
     let map = laid.map;
-    let there: Vec<f64> = (0..map.len()).map(|row| laid.looked_at(row)).collect();
+    let there: Vec<f64> = laid.within_reach().map(|row| laid.looked_at(row as usize)).collect();
     let here = laid.due();
-    let met = laid.meetings(gate, |meeting| Some(*meeting));
+    let met = laid.meetings(gate, |meeting| Some((*meeting, laid.looked_at(meeting.map as usize))));
     let due = [here.iter().sum(), there.iter().sum()];
     let mut share = DETECTION;
-    let [mut evidence, mut found] = [0.0; 2];
+    let mut evidence = 0.0;
     for _ in 0..TURNS {
         let [of_query, of_map] = of_either(share, due);
-        let edge = |meeting: &Meeting| {
-            let (seen, there) = (of_query * meeting.support, there[meeting.map as usize]);
+        let edge = |(meeting, there): &(Meeting, f64)| {
+            let seen = of_query * meeting.support;
             let strangers = map.density[meeting.map as usize] * (1.0 - seen) * (1.0 - of_map * there);
             meeting.edge(seen * meeting.density / strangers)
         };
         let beliefs = Beliefs::new(met.iter().filter_map(edge).collect(), laid.query.len(), map.len());
         let alone = |share: f64, supports: &[f64]| supports.iter().map(|u| (1.0 - share * u).ln()).sum::<f64>();
         evidence = beliefs.log_sum + alone(of_query, &here) + alone(of_map, &there) + of_query * due[0];
-        found = beliefs.probabilities.iter().sum();
+        let found: f64 = beliefs.probabilities.iter().sum();
         share = (found / fewer(due)).clamp(SHARES.0, SHARES.1);
     }
-    (evidence, found)
+    evidence
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! One cloud prepared for verification: its grid, its typical spacing, and what chance predicts at each place.
 
-use super::chance::{Companions, crowding, kinship, local_density};
+use super::chance::{Companions, MovedCompanions, crowding, kinship, local_density};
 use super::cut::{Cut, EDGE};
 use super::support::Support;
 use crate::cloud::FruitCloud;
@@ -47,6 +47,9 @@ pub(crate) struct Landscape {
     /// Cells that growth goes by, once it is asked for.
     cut: OnceLock<Cut>,
     pub(super) companions: Companions,
+    /// The nearest of them, and what it has when it is moved, once they are asked for.
+    nearest_companions: OnceLock<Companions>,
+    moved: OnceLock<MovedCompanions>,
     grid: Grid,
     /// By their reach.
     vicinities: [Vicinity; 2],
@@ -105,6 +108,8 @@ impl Landscape {
             tree,
             cut: OnceLock::new(),
             companions,
+            nearest_companions: OnceLock::new(),
+            moved: OnceLock::new(),
             grid,
             vicinities,
             support,
@@ -127,6 +132,16 @@ impl Landscape {
     pub(crate) fn kin(&self, row: usize) -> impl Iterator<Item = (u32, f64)> {
         let first = row * self.neighbours.each;
         self.neighbours(row).iter().copied().zip(self.kinship[first..].iter().copied())
+    }
+
+    /// The nearest fruits around each.
+    pub(super) fn nearest_companions(&self) -> &Companions {
+        self.nearest_companions.get_or_init(|| Companions::nearest(&self.points, &self.neighbours, self.spacing))
+    }
+
+    /// What it has around its fruits when it is moved along its row.
+    pub(super) fn moved(&self) -> &MovedCompanions {
+        self.moved.get_or_init(|| MovedCompanions::new(&self.points, &self.tree, self.spacing))
     }
 
     /// The cells that growth goes by.

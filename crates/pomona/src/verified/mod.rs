@@ -50,6 +50,7 @@ mod pairing;
 mod parts;
 mod patches;
 mod proposal;
+mod replaced;
 mod rest;
 mod scatter;
 mod search;

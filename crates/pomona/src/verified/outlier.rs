@@ -37,6 +37,12 @@ impl<'a> Search<'a> {
             .then(|| others.swap_remove(distinct[0]))
     }
 
+    /// Whether one of these could stand out, whatever else the search may show.
+    pub(super) fn may_stand_out(&self, others: &[Finding]) -> bool {
+        let least = outlying(self.config.false_alarm_rate, REACHED);
+        (0..others.len()).any(|at| evidence(others, at) > least)
+    }
+
     /// Most evidence of those after the best, each by the share that it puts elsewhere: a row turned a little, about its middle
     /// or an end, has the rest from the best.
     fn second(&self, findings: &[Finding], distinct: &[usize]) -> f64 {

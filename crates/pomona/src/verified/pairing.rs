@@ -30,18 +30,26 @@ impl Patchwork<'_> {
     ///
     /// A fruit of the query without a partner is new with the density of new fruits at its place, one of the map was missed. Every
     /// pair thus weighs `p N(d) / (1 - p) / (1 - q) / density of others` against leaving both alone.
-    pub(super) fn edges(&self, shares: &[f64], back: &[f64], size: &(impl Fn(u32, u32) -> f64 + Sync)) -> Vec<Edge> {
+    pub(super) fn edges(
+        &self,
+        meetings: &[Meeting],
+        [shares, back]: [&[f64]; 2],
+        size: &(impl Fn(u32, u32) -> f64 + Sync),
+    ) -> Vec<Edge> {
         let Self { query, map, .. } = *self;
-        let companions = self.companions();
-        self.meetings(GATE, |meeting: &Meeting| {
+        let [same, another] = self.companions();
+        let edge = |meeting: &Meeting| {
             let Meeting { query: row, map: partner, distance, density, support } = *meeting;
             let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
             // As many others as the two visits laid on each other have, where the map shows as much as it does here.
-            let others = companions.density(distance).max(map.floor) * crowding * self.strangers * support;
+            let replaced = self.replaced[row as usize];
+            let around = (1.0 - replaced) * same.density(distance) + replaced * another.density(distance);
+            let others = around.max(map.floor) * crowding * self.strangers * support;
             let missed = 1.0 - back[partner as usize];
             meeting.edge(seen * density / ((1.0 - seen) * missed * others.max(map.floor)) * size(row, partner))
-        })
+        };
+        meetings.par_iter().with_min_len(SHARE_OF_ROWS).filter_map(edge).collect()
     }
 }
 
@@ -65,18 +73,21 @@ impl Meeting {
 }
 
 impl Patchwork<'_> {
-    /// Fruits of the map that chance puts around a fruit: as many as the map shows around its own, spread as both visits show them.
+    /// Fruits of the map that chance puts around a fruit: as many as the map shows around its own, spread as both visits show them; and those
+    /// of another tree in its place.
     ///
     /// Noise blurs what a visit shows around its own fruits by twice its own variance, and what the other shows around them by that of
     /// both, which lies midway. Where one shows fewer, its fruits were thinned or picked and are spread otherwise than those of the map;
     /// and a few fruits tell no spread, so each counts as much as any other.
-    pub(super) fn companions(&self) -> Companions {
+    pub(super) fn companions(&self) -> [Companions; 2] {
         let Self { query, map, pose, .. } = self;
         let [here, there] = [query.len(), map.len()].map(|fruits| fruits.max(1) as f64);
         let each_alike = here / (here + there);
         let midway = 0.5 * map.companions.as_many_as(&query.companions, pose.scale);
         let told = 1.0 / (1.0 + FEW * (1.0 / here + 1.0 / there));
-        map.companions.spread_as(&query.companions, pose.scale, each_alike + told * (midway - each_alike))
+        let same = map.companions.spread_as(&query.companions, pose.scale, each_alike + told * (midway - each_alike));
+        let another = same.keeping_no_distance().or_denser(&map.moved().all);
+        [same, another]
     }
 
     /// What `kept` makes of every meeting within so many standard deviations, by rows of the query.

@@ -17,6 +17,7 @@ use crate::geometry::{Scale, Similarity};
 use crate::moments::{FIXING, Moments};
 use crate::neighbours::cells::cell_of;
 use crate::neighbours::others::each_row;
+use crate::neighbours::tree::single;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -54,6 +55,8 @@ pub(crate) struct Patchwork<'a> {
     pub(super) direction: Direction,
     /// Fruits of the map around those of the query that are others, over those that each visit shows around its own.
     pub(super) strangers: f64,
+    /// Probability that another tree stands at each fruit of the query by now.
+    pub(super) replaced: Vec<f64>,
     /// Variance that neighbours' residuals about the patches share, square metres.
     pub(super) shared: f64,
     pub(super) targets: Vec<Target>,
@@ -79,6 +82,7 @@ impl<'a> Patchwork<'a> {
             sigma,
             direction: Direction::default(),
             strangers: 1.0,
+            replaced: vec![0.0; query.len()],
             shared: 0.0,
             targets: vec![None; query.len()],
             left_over: vec![None; query.len()],
@@ -233,6 +237,14 @@ impl<'a> Patchwork<'a> {
     pub(super) fn due(&self) -> Vec<f64> {
         let shown = |(row, at): (usize, &Option<Landing>)| at.map_or(0.0, |at| self.shown(row, &at.place));
         self.predictions.iter().enumerate().map(shown).collect()
+    }
+
+    /// Fruits of the map that may lie in cells of the query under the common pose: no others were looked at.
+    pub(super) fn within_reach(&self) -> impl Iterator<Item = u32> + use<> {
+        let mut rows = Vec::new();
+        let reach = self.pose.scale * self.cut.reach;
+        self.map.tree.within(&single(&self.pose.translation), reach as f32, |row, _| rows.push(row));
+        rows.into_iter()
     }
 
     /// How surely the query would have shown a fruit of the map; 0 outside the reached cells.

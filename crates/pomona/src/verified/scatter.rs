@@ -5,7 +5,8 @@
 //! which hang as each visit shows them around its own fruits. The second is known, so the first is what is left:
 //!
 //! `H(d) = u (p f(d; sigma) + b g(d))`, f the distribution of the lengths of noise (Maxwell's where it is a sphere), g the
-//! companions of a fruit, u the fruits that the other visit could have shown. Nobody has to say who is who. Estimates from
+//! companions of a fruit, u the fruits that the other visit could have shown. Where a tree was replaced nothing was seen again, and what
+//! hangs there keeps no distance from what hung there; as far as that is known it does not count. Nobody has to say who is who. Estimates from
 //! pairs do, and take the nearest for the true one where fruits crowd, so that the noise comes out small.
 
 use super::chance::{BIN, shell};
@@ -92,27 +93,30 @@ impl Counts {
         let Patchwork { query, map, predictions, .. } = laid;
         let bin = BIN * map.spacing;
         let part = |first: usize| {
-            let (mut across, mut due) = ([0.0; BINS], [0.0; 2]);
+            let (mut across, mut due) = ([0.0; BINS], [0.0; 3]);
             for (row, at) in predictions.iter().enumerate().skip(first).take(SHARE_OF_ROWS) {
                 let Some(at) = at else { continue };
                 let support = laid.shown(row, &at.place);
-                due = [due[0] + support, due[1] + support * support];
+                let stands = 1.0 - laid.replaced[row];
+                let more = [1.0, support, stands].map(|times| stands * support * times);
+                due.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
                 map.tree.within(&single(&at.place), (BINS as f64 * bin) as f32, |_, d2| {
                     if let Some(count) = across.get_mut((f64::from(d2).sqrt() / bin) as usize) {
-                        *count += 1.0;
+                        *count += stands;
                     }
                 });
             }
             (across, due)
         };
-        let parts: Vec<([f64; BINS], [f64; 2])> =
+        let parts: Vec<([f64; BINS], [f64; 3])> =
             (0..query.len()).into_par_iter().step_by(SHARE_OF_ROWS).map(part).collect();
         let across = std::array::from_fn(|i| parts.iter().map(|part| part.0[i]).sum());
-        let [due, squares] = [0, 1].map(|power: usize| parts.iter().map(|part| part.1[power]).sum::<f64>());
-        let around = laid.companions();
+        let [due, squares, stand] = [0, 1, 2].map(|power: usize| parts.iter().map(|part| part.1[power]).sum::<f64>());
+        let [same, another] = laid.companions();
         let companions = std::array::from_fn(|i| {
             let (inner, outer) = (i as f64 * bin, (i + 1) as f64 * bin);
-            due * around.between(inner, outer).max(map.floor * shell(inner, outer))
+            let around = stand * same.between(inner, outer) + (due - stand) * another.between(inner, outer);
+            around.max(due * map.floor * shell(inner, outer))
         });
         let usual = if due > 0.0 { squares / due } else { 1.0 };
         Self { bin, across, companions, due, usual, variances: laid.direction.variances() }

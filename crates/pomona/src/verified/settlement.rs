@@ -17,14 +17,17 @@ use super::direction::Direction;
 use super::evidence::evidence;
 use super::footing::Footing;
 use super::growth::{Growth, HOLD};
-use super::hypothesis::{DETECTION, TURNS};
+use super::hypothesis::{DETECTION, SHARES, TURNS};
+use super::moved::MovedPose;
 use super::overlap::Overlap;
+use super::pairing::{GATE, Meeting};
 use super::patches::{ALL, NEXT, Patchwork};
 use super::scatter::{GIVEN, GUESSED, KnownNoise, Scatter, scatter};
 use super::shares::{of_either, of_places};
 use super::size::Cue;
 use crate::beliefs::Beliefs;
 use nalgebra::Vector3;
+use std::sync::OnceLock;
 
 /// A prediction loses at most this share of its fit when its own partner is left out.
 const MAX_LEVERAGE: f64 = 0.8;
@@ -46,11 +49,15 @@ pub(crate) struct Settled {
     pub(crate) evidence: f64,
     /// Which way the noise points.
     pub(super) direction: Direction,
+    /// What it has where it is moved, once that is asked for.
+    pub(super) moved: OnceLock<Vec<MovedPose>>,
 }
 
 struct Settlement<'a> {
     patches: Patchwork<'a>,
     expected: KnownNoise,
+    /// Fruits of the map near the predictions.
+    meetings: Vec<Meeting>,
     /// Probability that a fruit of the query is there where the map could have shown it, as the pairs around it show it.
     shares: Vec<f64>,
     /// How surely the query would have shown each fruit of the map, and the probability that it did.
@@ -90,7 +97,8 @@ pub(super) fn settle_together(parts: &[(&Growth, Direction)], noise_m: Option<f6
     let settled = |((part, beliefs), (growth, _)): ((Settlement, Beliefs), &(&Growth, Direction))| {
         let evidence = evidence(&part.patches);
         let Patchwork { pose, sigma, predictions, direction, .. } = part.patches;
-        Settled { overlap: Overlap { pose, sigma, predictions, ..growth.overlap() }, beliefs, evidence, direction }
+        let overlap = Overlap { pose, sigma, predictions, ..growth.overlap() };
+        Settled { overlap, beliefs, evidence, direction, moved: OnceLock::new() }
     };
     settling.into_iter().zip(beliefs).zip(parts).map(settled).collect()
 }
@@ -101,7 +109,8 @@ fn paired(parts: &mut [Settlement], cue: Option<&Cue>) -> Vec<Beliefs> {
     let edges = |part: &mut Settlement| {
         part.predict();
         part.measure();
-        part.patches.edges(&part.shares, &part.back, &size)
+        part.meetings = part.patches.meetings(GATE, |meeting| Some(*meeting));
+        part.patches.edges(&part.meetings, [&part.shares, &part.back], &size)
     };
     let lists: Vec<_> = parts.iter_mut().map(edges).collect();
     let Patchwork { query, map, .. } = parts[0].patches;
@@ -115,12 +124,15 @@ impl<'a> Settlement<'a> {
             None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
             None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
         };
-        let patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
+        let mut patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
+        // Trees that were replaced would be taken for noise from the first turn on.
+        let grown: Vec<f64> = patches.targets.iter().map(|target| target.map_or(0.0, |(_, weight)| weight)).collect();
+        patches.replaced = of_places(patches.query, &grown, &patches.due()).replaced;
         let shares = vec![DETECTION; patches.query.len()];
         let there: Vec<f64> = (0..patches.map.len()).map(|row| patches.looked_at(row)).collect();
         let [_, of_map] = of_either(DETECTION, [patches.due().iter().sum(), there.iter().sum()]);
         let back = there.iter().map(|there| of_map * there).collect();
-        Self { patches, expected, shares, there, back, holds: [HOLD; 2] }
+        Self { patches, expected, meetings: Vec::new(), shares, there, back, holds: [HOLD; 2] }
     }
 
     /// What the pairs say of shares, noise and patches.
@@ -177,8 +189,14 @@ impl<'a> Settlement<'a> {
             found[0][edge.query as usize] += probability;
             found[1][edge.map as usize] += probability;
         }
-        self.shares = of_places(query, &found[0], &self.patches.due());
-        self.back = of_places(map, &found[1], &self.there);
+        let stands: Vec<f64> = self.patches.other_trees(&self.meetings).iter().map(|other| 1.0 - other).collect();
+        let standing = |all: &[f64]| all.iter().zip(&stands).map(|(one, stands)| one * stands).collect::<Vec<f64>>();
+        let places = of_places(query, &standing(&found[0]), &standing(&self.patches.due()));
+        let least = |share: &f64| share.max(SHARES.0);
+        self.shares = standing(&places.shares).iter().map(least).collect();
+        let replaced = places.replaced.iter().zip(&stands).map(|(replaced, stands)| 1.0 - stands * (1.0 - replaced));
+        self.patches.replaced = replaced.collect();
+        self.back = of_places(map, &found[1], &self.there).shares;
         self.back.iter_mut().zip(&self.there).for_each(|(share, there)| *share *= there);
     }
 

@@ -23,12 +23,23 @@ pub(super) fn fewer([here, there]: [f64; 2]) -> f64 {
     here.min(there).max(1.0)
 }
 
+/// What the pairs around each fruit of a cloud show.
+pub(super) struct Places {
+    /// Probability that the fruit is seen again where the other visit looked.
+    pub(super) shares: Vec<f64>,
+    /// Probability that another tree stands there by the other visit.
+    pub(super) replaced: Vec<f64>,
+}
+
 /// Probabilities that fruits of a cloud are seen again where the other visit looked: each as the fruits around it are `found` of those
 /// that were `due`, its own left out. A tree may have been replaced, and its neighbour not.
 ///
 /// Shares of places scatter about the `common` one. How much, neighbours say: what chance has in one says nothing of the next. With a
 /// variance `v` of that, the share of a place has the prior of `common (1 - common) / v - 1` fruits.
-pub(super) fn of_places(cloud: &Landscape, found: &[f64], due: &[f64]) -> Vec<f64> {
+///
+/// Where trees stand or were replaced, and those that stand have one share, that is `common + v / common`: such a share of a place is what
+/// has the mean and the variance.
+pub(super) fn of_places(cloud: &Landscape, found: &[f64], due: &[f64]) -> Places {
     let common = common(found, due);
     let shown: Vec<usize> = (0..cloud.len()).filter(|&row| due[row] > 0.0).collect();
     let excess = |row: usize| found[row] - common * due[row];
@@ -45,14 +56,17 @@ pub(super) fn of_places(cloud: &Landscape, found: &[f64], due: &[f64]) -> Vec<f6
     };
     let around: Vec<[f64; 4]> = shown.par_iter().with_min_len(SHARE_OF_ROWS).map(around).collect();
     let [products, fruits] = around.iter().fold([0.0; 2], |[a, b], [c, d, ..]| [a + c, b + d]);
-    let mut shares = vec![common; cloud.len()];
+    let mut places = Places { shares: vec![common; cloud.len()], replaced: vec![0.0; cloud.len()] };
     if products > 0.0 {
-        let prior = (common * (1.0 - common) * fruits / products - 1.0).max(0.0);
+        let variance = products / fruits;
+        let prior = (common * (1.0 - common) / variance - 1.0).max(0.0);
+        let standing = common + variance / common;
         for (row, [.., near, of]) in shown.into_iter().zip(around) {
-            shares[row] = ((prior * common + near + common) / (prior + of + 1.0)).clamp(SHARES.0, SHARES.1);
+            let share = ((prior * common + near + common) / (prior + of + 1.0)).clamp(SHARES.0, SHARES.1);
+            (places.shares[row], places.replaced[row]) = (share, (1.0 - share / standing).max(0.0));
         }
     }
-    shares
+    places
 }
 
 /// Share of all fruits that are due that are found.
@@ -77,27 +91,29 @@ mod tests {
     use super::*;
     use crate::verified::fixture::visits;
 
-    /// Shares of the fruits before the middle of the row and behind, where so many of three are found before and behind.
-    fn shares_of_halves(found: [usize; 2]) -> [f64; 2] {
+    /// Means of both before the middle of the row and behind, where so many of three are found before and behind.
+    fn of_halves(found: [usize; 2]) -> [[f64; 2]; 2] {
         let query = Landscape::new(&visits(0.02).0);
         let is_found = |row: usize| row % 3 < found[usize::from(query.points[row].x > 0.0)];
         let found: Vec<f64> = (0..query.len()).map(|row| f64::from(u8::from(is_found(row)))).collect();
-        let shares = of_places(&query, &found, &vec![1.0; query.len()]);
-        let mean = |behind: bool| {
+        let Places { shares, replaced } = of_places(&query, &found, &vec![1.0; query.len()]);
+        let mean = |of: &[f64], behind: bool| {
             let those = (0..query.len())
                 .filter(|&row| query.points[row].x.abs() > 1.2 && (query.points[row].x > 0.0) == behind);
-            let (sum, count) = those.fold((0.0, 0.0), |sum, row| (sum.0 + shares[row], sum.1 + 1.0));
+            let (sum, count) = those.fold((0.0, 0.0), |sum, row| (sum.0 + of[row], sum.1 + 1.0));
             sum / count
         };
-        [mean(false), mean(true)]
+        [&shares, &replaced].map(|of| [mean(of, false), mean(of, true)])
     }
 
     #[test]
     fn a_half_that_was_replaced_has_a_share_of_its_own_and_halves_alike_have_one() {
-        let [before, behind] = shares_of_halves([2, 0]);
+        let [[before, behind], [stands, replaced]] = of_halves([2, 0]);
         assert!((before - 0.67).abs() < 0.1 && behind < 0.1, "{before} {behind}");
-        let [before, behind] = shares_of_halves([1, 1]);
+        assert!(stands < 0.1 && replaced > 0.85, "{stands} {replaced}");
+        let [[before, behind], replaced] = of_halves([1, 1]);
         assert!((before - 0.33).abs() < 0.03 && (behind - 0.33).abs() < 0.03, "{before} {behind}");
+        assert!(replaced.iter().all(|replaced| *replaced < 0.05), "{replaced:?}");
     }
 
     #[test]
