@@ -1,6 +1,6 @@
 //! One query against one map: what is asked, what was found, when it is enough.
 
-use super::acceptance::{KEPT, SURE, VerifiedConfig, WORTH_IT, poses, reached};
+use super::acceptance::{CLEAR_OF_PATTERNS, KEPT, SURE, VerifiedConfig, WORTH_IT, poses, reached};
 use super::doubts::Rated;
 use super::growth::Growth;
 use super::hypothesis::{DETECTION, Hypothesis, Model};
@@ -243,6 +243,7 @@ impl<'a> Search<'a> {
     /// where `ln N` is 10; of 27 wrong ones on rows of 40 and 90 m on wires none has more than 10, where it is 11 to 14.
     pub(super) fn stands_out_of_the_planting(&self, finding: &Finding, times: f64) -> bool {
         let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
+        let times = if finding.is_a_line() { CLEAR_OF_PATTERNS } else { times };
         finding.deviations_from_moved().is_none_or(|deviations| deviations > times * offered.ln())
     }
 

@@ -268,7 +268,7 @@ impl MovedCompanions {
     const FARTHEST: f64 = 4.0;
 
     /// Places that tell enough.
-    const PLACES: usize = 2000;
+    const PLACES: usize = 1000;
 
     pub(super) fn new(points: &[Vector3<f64>], tree: &Tree, spacing: f64) -> Self {
         let ways = along_the_row(points, spacing, Self::FARTHEST);
@@ -278,17 +278,18 @@ impl MovedCompanions {
         let moved = points.iter().flat_map(|p| ways.iter().map(move |way| p + way));
         // An odd step takes as many ways ahead as back.
         let asked = moved.step_by((points.len() * ways.len() / Self::PLACES) | 1);
-        let (mut places, mut all, mut nearest) = (0, Vec::new(), Vec::new());
-        for place in asked.filter(|place| (first..=last).contains(&place.dot(&axis))) {
-            let before = all.len();
-            let reach = Companions::BINS as f64 * BIN * spacing;
-            tree.within(&single(&place), reach as f32, |_, d2| all.push(f64::from(d2).sqrt()));
-            nearest.extend(all[before..].iter().copied().min_by(f64::total_cmp));
-            places += 1;
-        }
+        let places: Vec<_> = asked.filter(|place| (first..=last).contains(&place.dot(&axis))).collect();
+        let reach = Companions::BINS as f64 * BIN * spacing;
+        let around = each_row(places.len(), |row| {
+            let mut distances = Vec::new();
+            tree.within(&single(&places[row]), reach as f32, |_, d2| distances.push(f64::from(d2).sqrt()));
+            distances
+        });
+        let all = Companions::counted(spacing, around.iter().flatten().copied(), places.len());
+        let nearest = around.iter().filter_map(|distances| distances.iter().copied().min_by(f64::total_cmp));
+        let nearest = Companions::counted(spacing, nearest, places.len());
         // Nowhere farther off more densely than nearer by: places know nothing of these fruits.
-        let [all, nearest] = [all, nearest]
-            .map(|distances| Companions::counted(spacing, distances.into_iter(), places).keeping_no_distance());
+        let [all, nearest] = [all, nearest].map(|found| found.keeping_no_distance());
         Self { all, nearest }
     }
 }

@@ -1,6 +1,6 @@
 //! The answer to a query: the best finding, its pairs, its rivals.
 
-use super::acceptance::PATTERN;
+use super::acceptance::{CLEAR_OF_PATTERNS, PATTERN};
 use super::case::{Finding, Findings, Search};
 use super::doubts::Rated;
 use super::overlap::Overlap;
@@ -8,11 +8,6 @@ use super::settlement::Settled;
 use crate::answer::{Match, Pair, Registration, Verdict};
 use crate::beliefs::{Beliefs, Edge};
 use crate::geometry::Similarity;
-
-/// Times as many deviations as wrong poses reach, by which an answer has more evidence than it has moved and that other poses have much, too,
-/// is no doubt: true ones among trees of one clone have 3 to 8 times as many, on walls of single fruits 1.4 to 2.3, wrong ones on these and on
-/// fans of equal trees up to 1.7.
-const CLEAR_OF_PATTERNS: f64 = 2.0;
 
 impl<'a> Search<'a> {
     /// The answer to what was found.

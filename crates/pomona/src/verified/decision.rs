@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
 
     /// Whether a finding is a whole pose: it stands as a known vertical asks, and its turns are fixed.
     pub(super) fn is_pose(&self, finding: &Finding) -> bool {
-        self.model.admits(&finding.overlap.pose) && self.turns_are_fixed(finding)
+        self.model.admits(&finding.overlap.pose) && finding.turns_are_fixed()
     }
 
     /// Grows the best hypotheses that no accepted finding explains yet, and adds them to these.

@@ -4,7 +4,7 @@ use super::acceptance::SURE;
 use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
 use super::growth::grow;
-use super::hypothesis::{GATE, Model, refined};
+use super::hypothesis::{Model, refined};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::patches::Landing;
@@ -12,7 +12,6 @@ use super::proposal::Effort;
 use super::search::REACH;
 use crate::cloud::FruitCloud;
 use crate::geometry::Similarity;
-use crate::moments::Moments;
 use crate::neighbours::tree::{Tree, single};
 use nalgebra::{Point3, Vector3};
 
@@ -66,23 +65,6 @@ impl<'a> Search<'a> {
             })
             .count();
         2 * same > near.len()
-    }
-
-    /// Whether the fruits of the overlap leave the line by more than noise does: on a line the turn about it, and its direction, stay open.
-    pub(super) fn turns_are_fixed(&self, finding: &Finding) -> bool {
-        let mut moments = Moments::default();
-        for (p, prediction) in self.query.points.iter().zip(&finding.overlap.predictions) {
-            if let Some(at) = prediction {
-                moments.add(p, &at.place, 1.0);
-            }
-        }
-        if moments.weight <= 0.0 {
-            return false;
-        }
-        let mut spread = moments.spread().symmetric_eigenvalues();
-        spread.as_mut_slice().sort_by(f64::total_cmp);
-        let noise = finding.overlap.sigma / finding.overlap.pose.scale;
-        spread[1] > (GATE * noise).powi(2)
     }
 
     /// Whether the mirror image of the query is found with more evidence than the query.

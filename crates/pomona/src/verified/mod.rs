@@ -42,6 +42,7 @@ mod hypothesis;
 mod laid;
 mod landscape;
 mod layers;
+mod line;
 mod moved;
 mod offsets;
 mod outlier;

@@ -17,8 +17,9 @@ pub(crate) const STARS: usize = 4;
 /// Nearest neighbours among which the three companions of a fruit are chosen: 120 seeds per fruit.
 pub(crate) const COMPANIONS: usize = 10;
 
-/// Seeds flatter than this (distance of C from the line AB over |AB|) fix the turn about AB too badly.
-const MIN_FLATNESS: f64 = 0.15;
+/// Seeds flatter than this (distance of C from the line AB over |AB|) fix the turn about AB too badly. Not more: along a cordon most are flat,
+/// and the fruits around hang as near the line, so that they are hardly moved by a turn that is off.
+const MIN_FLATNESS: f64 = 0.05;
 
 /// Seeds shorter than this, in standard deviations of the noise, fix no pose.
 pub(crate) const SHORTEST: f64 = 6.0;
