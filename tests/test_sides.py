@@ -56,6 +56,23 @@ def test_visits_of_one_side_are_told_by_what_they_see_alike(sides: str) -> None:
     assert told.towards[0, :, 1].tolist() == [1.0 if side == "A" else -1.0 for side in sides]
 
 
+def test_one_visit_of_six_is_told_though_all_see_what_hangs_free() -> None:
+    """All visits agree with each other, those of one side more."""
+    n_told = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        depth = rng.uniform(0.0, 1.0, N_FRUITS)
+        hidden = 2.0 * np.stack([depth, 1.0 - depth], axis=1) + rng.normal(size=(N_FRUITS, 2))
+        seen = rng.logistic(scale=0.8, size=(N_FRUITS, 6)) < 1.6 - hidden[:, [0, 0, 0, 0, 0, 1]]
+        looks = looks_of(seen[seen.any(axis=1)], rng)
+        told = sided(looks, 14.0 * np.arange(6))
+        if told is not looks:
+            n_told += 1
+            assert told.towards[0, :, 1].tolist() == [1.0, 1.0, 1.0, 1.0, 1.0, -1.0]
+            assert counted(told) == pytest.approx(seen.any(axis=1).sum(), rel=0.06)
+    assert n_told >= 8
+
+
 def test_without_sides_the_same_visits_count_far_too_few() -> None:
     """Were it not so, nobody would need sides."""
     looks = from_sides("AAAB", np.random.default_rng(0))
