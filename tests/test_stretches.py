@@ -150,3 +150,12 @@ def test_a_visit_went_by_between_its_first_and_last_fruits_and_where_its_cameras
     visit = FoundAround(row, places, np.ones(5), np.ones(5, bool), True)
     assert went_by(visit).tolist() == [False, False, True, False, False]
     assert went_by(replace(visit, is_asked=False)).all()
+
+
+def test_a_visit_to_half_of_a_short_row_did_not_go_by_the_other_half() -> None:
+    """The half is as high as it is long: which way the row goes the other visits say."""
+    row = np.random.default_rng(4).uniform([0.0, 0.0, 0.0], [5.0, 1.0, 2.2], (200, 3))
+    visit = FoundAround(row[row[:, 0] < 2.5], row, np.ones(200), np.ones(200, bool), True)
+    told = went_by(visit)
+    assert not told[row[:, 0] > 2.7].any()
+    assert told[(row[:, 0] > 0.4) & (row[:, 0] < 2.1)].all()

@@ -279,7 +279,7 @@ class HistoryOdds:
         local = np.tile(leaving, (len(ends), 1))
         for visit in np.flatnonzero(leaving):
             shares = shares_of_places(went[:, visit], stayed[:, visit], float(leaving[visit]), self.about)
-            local[:, visit] = shares[self.is_open]
+            local[:, visit] = np.where(self.in_view[:, visit], shares[self.is_open], leaving[visit])
         return local
 
     def room(self, told: NDArray[np.float64], share_false: float) -> float:

@@ -139,7 +139,11 @@ def went_by(visit: FoundAround) -> NDArray[np.bool_]:
 
     Beyond its last fruits along a row it may have looked, or ended.
     """
-    along = _along_row(visit.fruits) if visit.is_asked else None
+    if not visit.is_asked or len(visit.fruits) < AT_EACH_END:
+        return np.ones(len(visit.places), bool)
+    # All fruits of the map say which way the row goes: half of a short one is as high as long.
+    along = _along_row(visit.places)
+    along = _along_row(visit.fruits) if along is None else along
     if along is None:
         return np.ones(len(visit.places), bool)
     own_m, places_m = np.sort(visit.fruits @ along), visit.places @ along
