@@ -123,7 +123,7 @@ def looks_of(
         by_cameras = looked_at_by_cameras(in_map, asked)
         found.append(FoundAround(fruits[number].positions, places[:, number], reach_m, is_near, by_cameras is None))
         # Beyond its last fruits along the row what a visit missed says nothing: it may have ended.
-        in_view[:, number] |= is_near & went_by(found[-1]) if by_cameras is None else by_cameras
+        in_view[:, number] |= is_near & went_by(found[-1], 1) if by_cameras is None else by_cameras
         towards[:, number] = towards_camera(in_map, asked, frames[number, :3, :3] / scale)
         views[labels[own], number] = _shares_of_views(visit.n_views, fruits[number])
     is_counted = np.array([visit.n_views is not None for visit in visits], bool)

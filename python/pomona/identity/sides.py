@@ -50,9 +50,9 @@ def _sides_by_agreement(looks: Looks) -> list[NDArray[np.float64]]:
     np.fill_diagonal(agreement, agreement[each_other].mean() if each_other.any() else 0.0)
     centred = agreement - agreement.mean(axis=0)
     centred -= centred.mean(axis=1)[:, None]
-    axes = [np.linalg.eigh(each)[1][:, -1] for each in (agreement, centred)]
-    sides = [np.where(axis * axis[0] < 0.0, -1.0, 1.0) for axis in axes]
-    return sides[:1] if np.array_equal(*sides) else sides
+    axes = (np.linalg.eigh(each)[1][:, -1] for each in (agreement, centred))
+    first, second = (np.where(axis * axis[0] < 0.0, -1.0, 1.0) for axis in axes)
+    return [first] if np.array_equal(first, second) else [first, second]
 
 
 def _from(looks: Looks, side: NDArray[np.float64], untold: NDArray[np.bool_]) -> Looks:

@@ -134,8 +134,8 @@ def emptied_stretches(
     return told
 
 
-def went_by(visit: FoundAround) -> NDArray[np.bool_]:
-    """Tell which places, (K,), a visit went by for sure: cameras say so, or it has fruits before them and behind.
+def went_by(visit: FoundAround, at_each_end: int = AT_EACH_END) -> NDArray[np.bool_]:
+    """Tell which places, (K,), a visit went by for sure: cameras say so, or it has so many fruits before and behind.
 
     Beyond its last fruits along a row it may have looked, or ended.
     """
@@ -147,7 +147,7 @@ def went_by(visit: FoundAround) -> NDArray[np.bool_]:
     if along is None:
         return np.ones(len(visit.places), bool)
     own_m, places_m = np.sort(visit.fruits @ along), visit.places @ along
-    return np.asarray((places_m > own_m[AT_EACH_END - 1]) & (places_m < own_m[-AT_EACH_END]))
+    return np.asarray((places_m > own_m[at_each_end - 1]) & (places_m < own_m[-at_each_end]))
 
 
 def _along_row(fruits: NDArray[np.float64]) -> NDArray[np.float64] | None:
