@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.identity.histories import Histories, HistoryOdds
 
-__all__ = ["SHARE_FALSE", "UNEVEN", "Lives", "explained", "lives_of", "states_of"]
+__all__ = ["SHARE_FALSE", "Lives", "explained", "lives_of", "states_of"]
 
 SHARE_FALSE = 0.05
 """Of a visit's points that are no fruits: what is believed before the season says its own."""
