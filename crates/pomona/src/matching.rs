@@ -145,6 +145,15 @@ impl MapIndex {
         self.map.given_rows(&of_conditioned, f64::INFINITY)
     }
 
+    /// Typical distance of a fruit of the map to its sixth-nearest, metres, as the verified method has it; 0 where it takes no part.
+    pub(crate) fn spacing(&self) -> f64 {
+        match &self.prepared {
+            PreparedMap::Verified(map) => map.spacing(),
+            PreparedMap::Compact(index) => index.facts().spacing,
+            PreparedMap::Paper(_) | PreparedMap::TooFew => 0.0,
+        }
+    }
+
     /// Finds `query` in the map.
     ///
     /// # Errors

@@ -11,7 +11,7 @@
 //! shrinks from turn to turn, so that the first turns see past the nearest fruit.
 
 use super::belief::Belief;
-use super::known::KnownFruits;
+use super::known::{Candidate, KnownFruits};
 use super::sightings::Sighting;
 use super::slip::Slip;
 use crate::bundle::steps::{moved, skew};
@@ -76,6 +76,8 @@ pub(super) struct Say {
     pub pull: Vector3<f64>,
     /// Sum of the weighted squared Mahalanobis distances.
     pub squared: f64,
+    /// Covariance of that place.
+    own: Matrix3<f64>,
     /// The sum of q.
     ratio: f64,
 }
@@ -126,8 +128,9 @@ impl Aligned {
 pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, slip: &Slip) -> Aligned {
     let (mut pose, mut slip) = (slip.ahead(told).pose, *slip);
     let (mut doubt, mut share) = (slip.doubt(&told.covariance), FIRST_SHARE);
+    let laid = laid(sightings, map, &pose, &slip);
     for turn in 0..TURNS {
-        let says: Vec<Say> = sightings.iter().map(|seen| say(seen, map, &pose, &slip, &doubt, share, None)).collect();
+        let says: Vec<Say> = laid.iter().map(|seen| say(seen, map, &pose, &slip, &doubt, share, None)).collect();
         let (information, pull) = normal(&says, &slip);
         let step = solved(&information, &pull);
         pose = moved(&pose, &step.fixed_rows::<6>(0).into_owned());
@@ -138,18 +141,15 @@ pub(super) fn align(sightings: &[Sighting], map: &KnownFruits, told: &Belief, sl
             break;
         }
     }
-    ended(sightings, map, pose, &slip, share)
+    ended(&laid, map, pose, &slip, share)
 }
 
 /// What the sightings say of a pose once it stays.
-fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, share: f64) -> Aligned {
+fn ended(laid: &[Laid], map: &KnownFruits, pose: Pose, slip: &Slip, share: f64) -> Aligned {
     let mut links = Vec::new();
     let sure = Joint::zeros();
-    let says: Vec<Say> = sightings
-        .iter()
-        .enumerate()
-        .map(|(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links))))
-        .collect();
+    let said = |(row, seen)| say(seen, map, &pose, slip, &sure, share, Some((row, &mut links)));
+    let says = whole(laid.iter().enumerate().map(said).collect(), laid, map);
     let (information, _) = normal(&says, slip);
     let (share, log_odds) = best_share(&says);
     Aligned { pose, slip: *slip, information, says, links, log_odds, share }
@@ -159,13 +159,36 @@ fn ended(sightings: &[Sighting], map: &KnownFruits, pose: Pose, slip: &Slip, sha
 pub(super) fn evidence_at(expected: &Belief, frame: &[Sighting], map: &KnownFruits) -> (f64, Vec<Link>) {
     let (slip, doubt) = (Slip::none(), Slip::none().doubt(&expected.covariance));
     let mut links = Vec::new();
-    let says = |(row, seen)| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, Some((row, &mut links)));
-    let nats = best_share(&frame.iter().enumerate().map(says).collect::<Vec<_>>()).1;
-    (nats, links)
+    let laid = laid(frame, map, &expected.pose, &slip);
+    let said = |(row, seen)| say(seen, map, &expected.pose, &slip, &doubt, FIRST_SHARE, Some((row, &mut links)));
+    let says = whole(laid.iter().enumerate().map(said).collect(), &laid, map);
+    (best_share(&says).1, links)
+}
+
+/// What sightings say, with all fruits that each may show: a pose goes by those that are near, for what lies farther off than a depth errs
+/// is seldom what it is said to be, but nothing speaks against it that is not known so well.
+pub(super) fn whole(mut says: Vec<Say>, laid: &[Laid], map: &KnownFruits) -> Vec<Say> {
+    says.iter_mut().zip(laid).for_each(|(say, laid)| say.ratio = map.likelihood(&say.place, &say.own) / laid.times);
+    says
+}
+
+/// A sighting, and how many times as dense as those of the map strangers are that it may show ([`super::strangers`]).
+pub(super) struct Laid<'a> {
+    seen: &'a Sighting,
+    times: f64,
+}
+
+/// Sightings laid into the map; strangers are as dense wherever the pose settles from there.
+pub(super) fn laid<'a>(sightings: &'a [Sighting], map: &KnownFruits, pose: &Pose, slip: &Slip) -> Vec<Laid<'a>> {
+    let one = |seen: &'a Sighting| {
+        let place = pose.to_session(&slip.corrected(seen));
+        Laid { seen, times: map.times(&place, &pose.covariance_to_session(&seen.covariance)) }
+    };
+    sightings.iter().map(one).collect()
 }
 
 pub(super) fn say(
-    seen: &Sighting,
+    Laid { seen, times }: &Laid,
     map: &KnownFruits,
     pose: &Pose,
     slip: &Slip,
@@ -181,7 +204,7 @@ pub(super) fn say(
     by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&from_now)));
     let slopes = slip.slopes(seen, &by_pose);
     let own = pose.covariance_to_session(&seen.covariance) + slopes * doubt * slopes.transpose();
-    let near: Vec<Candidate> = map.near(&place).filter_map(|row| candidate(map, row, &place, &own)).collect();
+    let near: Vec<Candidate> = map.near(&place).filter_map(|row| map.candidate(row, &place, &own, *times)).collect();
     let ratio: f64 = near.iter().map(|one| one.ratio).sum();
     let whole = 1.0 - share + share * ratio;
     let mut says = Say {
@@ -195,6 +218,7 @@ pub(super) fn say(
         best_weight: 0.0,
         pull: Vector3::zeros(),
         squared: 0.0,
+        own,
         ratio,
     };
     for one in &near {
@@ -212,28 +236,6 @@ pub(super) fn say(
         links.extend(near.iter().map(link));
     }
     says
-}
-
-/// A fruit of the map that a sighting may show, and how well it explains it.
-struct Candidate {
-    row: usize,
-    /// From where the sighting lies to the fruit.
-    error: Vector3<f64>,
-    inverse: Matrix3<f64>,
-    /// Density N of the error over that of strangers.
-    ratio: f64,
-    /// Squared Mahalanobis distance.
-    squared: f64,
-}
-
-fn candidate(map: &KnownFruits, row: usize, place: &Vector3<f64>, own: &Matrix3<f64>) -> Option<Candidate> {
-    let covariance = own + map.covariances[row];
-    let inverse = covariance.try_inverse()?;
-    let error = map.places[row] - place;
-    let squared = error.dot(&(inverse * error));
-    let peak = (2.0 * std::f64::consts::PI).powi(3) * covariance.determinant();
-    let ratio = (-0.5 * squared).exp() / (peak.sqrt() * map.densities[row]);
-    Some(Candidate { row, error, inverse, ratio, squared })
 }
 
 fn normal(says: &[Say], slip: &Slip) -> (Joint, SVector<f64, UNKNOWNS>) {

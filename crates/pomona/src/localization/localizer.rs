@@ -30,6 +30,9 @@ const MIN_PAIRED: f64 = 4.0;
 /// Fruits of the map below which sightings fix no pose: any may be any where all hang within the noise.
 const MIN_APART: usize = 3;
 
+/// Fruits of a frame whose place is well known that are looked for without the others, at the least.
+const FEWEST_SURE: usize = 12;
+
 /// Standard deviations of a pose that the matcher found: metres, radians.
 const MATCHED: (f64, f64) = (0.02, 0.02);
 
@@ -267,25 +270,47 @@ impl Localizer {
     }
 
     fn search(&self, sightings: &[Sighting], seen: &FruitCloud, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
+        let sure: Vec<Sighting> = sightings.iter().filter(|one| one.is_sure()).copied().collect();
+        if (FEWEST_SURE..sightings.len()).contains(&sure.len()) {
+            let found = self.searched(&sure, &cloud_of(&sure), up)?;
+            if let Some(pose) = found.pose {
+                let start = Belief { pose, covariance: found.covariance, motion: None };
+                // Where the others say less than nothing they have led it astray.
+                let of_all = self.settled(sightings, &start, up).filter(|all| all.log_odds > found.log_odds);
+                return Ok(of_all.unwrap_or(found));
+            }
+        }
+        self.searched(sightings, seen, up)
+    }
+
+    /// The pose that lays the fruits of `seen`, those of the sightings, on the map's.
+    fn searched(
+        &self,
+        sightings: &[Sighting],
+        seen: &FruitCloud,
+        up: Option<[Vector3<f64>; 2]>,
+    ) -> Result<Localization> {
         let found = self.index.search(seen, None, up)?;
         let Some(registration) = found.registration.filter(|_| found.verdict == Verdict::Found) else {
             return Ok(Localization::without_pose(found.verdict));
         };
-        let start = Pose {
+        let pose = Pose {
             rotation: registration.map_from_query.rotation,
             translation: registration.map_from_query.translation,
         };
         let (place, turn) = MATCHED;
-        let doubt = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
-        let start = Belief { pose: start, covariance: doubt, motion: None };
-        let aligned = align(sightings, &self.map, &start, &Slip::none());
-        let believed = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0);
-        let Some(joint) = believed else {
-            return Ok(Localization::without_pose(Verdict::NoMatch));
-        };
+        let covariance = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn).map(|x| x * x));
+        let settled = self.settled(sightings, &Belief { pose, covariance, motion: None }, up);
+        Ok(settled.unwrap_or_else(|| Localization::without_pose(Verdict::NoMatch)))
+    }
+
+    /// The pose near the one that a search has found, if all sightings agree with it.
+    fn settled(&self, sightings: &[Sighting], start: &Belief, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
+        let aligned = align(sightings, &self.map, start, &Slip::none());
+        let joint = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0)?;
         let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
         let belief = Belief { pose: aligned.pose, covariance, motion: None };
-        Ok(Self::answer(&aligned, sightings, &belief, false))
+        Some(Self::answer(&aligned, sightings, &belief, false))
     }
 
     /// Covariance of a pose and its slip, if there is enough for it; `chosen_nats` is what the choice among many gains

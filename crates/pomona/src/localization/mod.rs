@@ -25,6 +25,7 @@ mod residuals;
 mod shared;
 mod sightings;
 mod slip;
+mod strangers;
 mod told_motions;
 mod window;
 

@@ -7,7 +7,7 @@
 //!
 //! under the step that has most, H being the information of pose and frame together.
 
-use super::alignment::{SHRINKING, Say, say};
+use super::alignment::{Laid, SHRINKING, Say, laid, say, whole};
 use super::belief::Belief;
 use super::known::KnownFruits;
 use super::sightings::Sighting;
@@ -24,14 +24,15 @@ pub(super) fn own_nats(told: &Belief, frame: &[Sighting], map: &KnownFruits, sha
         return 0.0;
     }
     let Some(known) = told.covariance.try_inverse() else { return f64::NEG_INFINITY };
+    let laid = laid(frame, map, &told.pose, &Slip::none());
     let (mut step, mut doubt) = (Vector6::zeros(), told.covariance);
     for _ in 0..TURNS {
-        let says = says(told, &step, frame, map, &doubt, share);
+        let says = says(told, &step, &laid, map, &doubt, share);
         let (information, pull) = normal(&says, &known, &step);
         step += information.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(&pull));
         doubt *= SHRINKING;
     }
-    let says = says(told, &step, frame, map, &Matrix6::zeros(), share);
+    let says = whole(says(told, &step, &laid, map, &Matrix6::zeros(), share), &laid, map);
     let (information, _) = normal(&says, &known, &step);
     let fitted = step.dot(&(known * step)) + (information * told.covariance).determinant().ln();
     says.iter().map(|say| say.evidence(share)).sum::<f64>() - 0.5 * fitted
@@ -40,7 +41,7 @@ pub(super) fn own_nats(told: &Belief, frame: &[Sighting], map: &KnownFruits, sha
 fn says(
     told: &Belief,
     step: &Vector6<f64>,
-    frame: &[Sighting],
+    frame: &[Laid],
     map: &KnownFruits,
     doubt: &Matrix6<f64>,
     share: f64,

@@ -7,6 +7,9 @@ use nalgebra::{Matrix3, Point3, Vector3};
 /// Standard deviation of a sighting whose covariance nobody gave, metres per axis: that of orchards.
 const USUAL_SIGMA_M: f64 = 0.02;
 
+/// Standard deviation beyond which a place is hardly known, metres: the matcher takes fruits for points.
+const SURE_M: f64 = 0.1;
+
 /// One fruit seen once, in the frame of the camera as it is now.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sighting {
@@ -32,6 +35,11 @@ impl Sighting {
             voice: 1.0,
         };
         (0..seen.len()).map(one).collect()
+    }
+
+    /// Whether its place is known well enough for a constellation.
+    pub fn is_sure(&self) -> bool {
+        self.covariance.trace() < SURE_M * SURE_M
     }
 
     /// The same from where the camera is now; `spread_m` is how surely the way is known.

@@ -47,6 +47,10 @@ impl VerifiedMap {
         of_cloud
     }
 
+    pub(crate) fn spacing(&self) -> f64 {
+        self.landscape.spacing
+    }
+
     /// Where no seeds are looked up, as poses are proposed.
     pub(crate) fn without_seeds(map: &FruitCloud) -> Self {
         Self { landscape: Landscape::new(map), seeds: SeedIndex::empty(), scale: Scale::Metric, fruits: map.len() }

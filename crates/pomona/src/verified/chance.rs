@@ -34,7 +34,7 @@ const KERNELS: [f64; 2] = [0.4, 0.8];
 const LEAST_THICKNESS: f64 = 0.1;
 
 /// Different fruits among the neighbours of a fruit's neighbours, in clouds that have as many.
-const SEEN: f64 = 60.0;
+pub(crate) const SEEN: f64 = 60.0;
 
 /// A Gaussian.
 struct Kernel {
@@ -54,6 +54,18 @@ impl Kernel {
     }
 }
 
+/// Covariances of the kernels at a fruit with so many around it, as they lie from it.
+pub(crate) fn kernels_among(around: &[Vector3<f64>], spacing: f64) -> [Matrix3<f64>; 2] {
+    let count = around.len().max(1) as f64;
+    let mean = around.iter().sum::<Vector3<f64>>() / count;
+    let scatter = around.iter().map(|one| (one - mean) * (one - mean).transpose()).sum::<Matrix3<f64>>() / count;
+    let sheet = Sheet::seen(&scatter, count.min(SEEN), spacing);
+    KERNELS.map(|width| {
+        let Kernel { precision, .. } = Kernel::new(width * spacing, &sheet.flatness);
+        precision.try_inverse().unwrap_or_else(|| Matrix3::identity() * (width * spacing).powi(2))
+    })
+}
+
 /// What a cloud looks like around a fruit.
 pub(super) struct Sheet {
     /// Inverse covariance of the fruits around, less that of their longest extent: zero where they hang alike in all directions.
@@ -63,6 +75,15 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
+    /// Of the covariance of so many fruits.
+    ///
+    /// A dozen fruits are flat by chance, so one that hangs alike in all directions, a spacing away, is added to those seen: the
+    /// weakest inverse-Wishart prior that has a mean. And noise gives some thickness to a wall that has none.
+    fn seen(covariance: &Matrix3<f64>, seen: f64, spacing: f64) -> Self {
+        let round = Matrix3::identity() * spacing.powi(2);
+        Self::of((covariance * seen + round) / (seen + 1.0) + round * LEAST_THICKNESS.powi(2))
+    }
+
     fn of(covariance: Matrix3<f64>) -> Self {
         let found = covariance.symmetric_eigen();
         let longest = found.eigenvalues.max();
@@ -75,9 +96,6 @@ impl Sheet {
 }
 
 /// The sheet around each fruit, from its neighbours and theirs.
-///
-/// A dozen fruits are flat by chance, so one that hangs alike in all directions, a spacing away, is added to those seen: the
-/// weakest inverse-Wishart prior that has a mean. And noise gives some thickness to a wall that has none.
 fn sheets(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Vec<Sheet> {
     let around = |row: usize| {
         let near = neighbours.of(row);
@@ -92,13 +110,11 @@ fn sheets(points: &[Vector3<f64>], neighbours: &Neighbours, spacing: f64) -> Vec
     let of_each = each_row(points.len(), around);
     // Two dozen fruits show a shape where there is none; those of their neighbours together do not.
     let seen = SEEN.min(points.len() as f64);
-    let round = Matrix3::identity() * spacing.powi(2);
-    let noise = round * LEAST_THICKNESS.powi(2);
     let shape = |row: usize| {
         let near = neighbours.of(row);
         let covariance =
             near.iter().map(|&other| of_each[other as usize]).sum::<Matrix3<f64>>() / near.len().max(1) as f64;
-        Sheet::of((covariance * seen + round) / (seen + 1.0) + noise)
+        Sheet::seen(&covariance, seen, spacing)
     };
     each_row(points.len(), shape)
 }

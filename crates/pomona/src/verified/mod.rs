@@ -68,6 +68,7 @@ mod votes;
 
 pub use acceptance::VerifiedConfig;
 pub(crate) use case::{SEED_SIGMA, VerifiedMap};
+pub(crate) use chance::{SEEN, kernels_among};
 pub(crate) use contender::first_of_each;
 pub(crate) use decision::{MAX_FRUITS, pairs_under, search};
 pub(crate) use expected::search_expected;
