@@ -1,4 +1,4 @@
-"""Fruits whose depth is hardly known, as those of the rows behind, say little of a pose, and nothing against the true one."""
+"""Fruits whose depth is hardly known, as those of rows behind, say little of a pose, none against the true one."""
 
 import numpy as np
 from benchmarks.row_drive import Array, pose_at

@@ -154,7 +154,7 @@ pub(super) struct Companions {
 
 impl Companions {
     /// Up to 1.5 spacings.
-    const BINS: usize = 36;
+    pub(super) const BINS: usize = 36;
 
     /// Half the width of what a density is the mean of, in bins: a shell of 3 cm in an orchard.
     const HALF: f64 = 1.5;

@@ -1,5 +1,6 @@
 //! One cloud prepared for verification: its grid, its typical spacing, and what chance predicts at each place.
 
+use super::bearing::Bearings;
 use super::chance::{Companions, MovedCompanions, crowding, kinship, local_density};
 use super::cut::{Cut, EDGE};
 use super::support::Support;
@@ -47,8 +48,9 @@ pub(crate) struct Landscape {
     /// Cells that growth goes by, once it is asked for.
     cut: OnceLock<Cut>,
     pub(super) companions: Companions,
-    /// The nearest of them, and what it has when it is moved, once they are asked for.
+    /// The nearest of them, which way they lie, and what it has when it is moved, once they are asked for.
     nearest_companions: OnceLock<Companions>,
+    bearings: OnceLock<Bearings>,
     moved: OnceLock<MovedCompanions>,
     grid: Grid,
     /// By their reach.
@@ -109,6 +111,7 @@ impl Landscape {
             cut: OnceLock::new(),
             companions,
             nearest_companions: OnceLock::new(),
+            bearings: OnceLock::new(),
             moved: OnceLock::new(),
             grid,
             vicinities,
@@ -137,6 +140,11 @@ impl Landscape {
     /// The nearest fruits around each.
     pub(super) fn nearest_companions(&self) -> &Companions {
         self.nearest_companions.get_or_init(|| Companions::nearest(&self.points, &self.neighbours, self.spacing))
+    }
+
+    /// Which way fruits around a fruit lie.
+    pub(super) fn bearings(&self) -> &Bearings {
+        self.bearings.get_or_init(|| Bearings::new(&self.points, &self.neighbours, self.spacing))
     }
 
     /// What it has around its fruits when it is moved along its row.

@@ -19,6 +19,7 @@
 
 mod acceptance;
 mod axes;
+mod bearing;
 mod bridges;
 mod case;
 mod chance;

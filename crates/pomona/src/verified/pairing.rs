@@ -37,15 +37,15 @@ impl Patchwork<'_> {
         size: &(impl Fn(u32, u32) -> f64 + Sync),
     ) -> Vec<Edge> {
         let Self { query, map, .. } = *self;
-        let [same, another] = self.companions();
+        let ([same, another], bearings) = (self.companions(), map.bearings());
         let edge = |meeting: &Meeting| {
-            let Meeting { query: row, map: partner, distance, density, support } = *meeting;
+            let Meeting { query: row, map: partner, offset, distance, density, support } = *meeting;
             let seen = shares[row as usize] * support;
             let crowding = 0.5 * (query.crowding[row as usize] + map.crowding[partner as usize]);
             // As many others as the two visits laid on each other have, where the map shows as much as it does here.
             let replaced = self.replaced[row as usize];
             let around = (1.0 - replaced) * same.density(distance) + replaced * another.density(distance);
-            let others = around.max(map.floor) * crowding * self.strangers * support;
+            let others = (around * bearings.towards(&offset)).max(map.floor) * crowding * self.strangers * support;
             let missed = 1.0 - back[partner as usize];
             meeting.edge(seen * density / ((1.0 - seen) * missed * others.max(map.floor)) * size(row, partner))
         };
@@ -58,6 +58,8 @@ impl Patchwork<'_> {
 pub(super) struct Meeting {
     pub(super) query: u32,
     pub(super) map: u32,
+    /// From where the fruit is expected to the partner, and how far that is.
+    offset: Vector3<f64>,
     pub(super) distance: f64,
     /// Of the partner's place, were both one fruit, per cubic metre.
     pub(super) density: f64,
@@ -124,6 +126,7 @@ impl Patchwork<'_> {
             (mahalanobis2 <= gate * gate).then_some(Meeting {
                 query: row as u32,
                 map: partner,
+                offset,
                 distance,
                 density,
                 support,
