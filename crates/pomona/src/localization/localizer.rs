@@ -10,10 +10,11 @@ use super::own::own_nats;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
 use super::slip::{Slip, lost_by_fit};
-use super::told_motions::{Settled, ToldMotions};
+use super::told_motions::{Settled, ToldMotions, spread_of_searches};
 use super::window::Window;
 use crate::answer::Verdict;
 use crate::assignment::assign;
+use crate::bundle::steps::moved;
 use crate::cloud::FruitCloud;
 use crate::config::Config;
 use crate::error::Result;
@@ -32,6 +33,9 @@ const MIN_APART: usize = 3;
 
 /// Fruits of a frame whose place is well known that are looked for without the others, at the least.
 const FEWEST_SURE: usize = 12;
+
+/// Standard deviations beside a pose that was found, along what is known worst of it, at which it is tried again: beyond what lies on it.
+const BESIDE: f64 = 4.0;
 
 /// Standard deviations of a pose that the matcher found: metres, radians.
 const MATCHED: (f64, f64) = (0.02, 0.02);
@@ -306,11 +310,22 @@ impl Localizer {
 
     /// The pose near the one that a search has found, if all sightings agree with it.
     fn settled(&self, sightings: &[Sighting], start: &Belief, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
-        let aligned = align(sightings, &self.map, start, &Slip::none());
-        let joint = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0)?;
-        let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
-        let belief = Belief { pose: aligned.pose, covariance, motion: None };
-        Some(Self::answer(&aligned, sightings, &belief, false))
+        let from = |start: &Belief| {
+            let aligned = align(sightings, &self.map, start, &Slip::none());
+            let joint = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0)?;
+            let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
+            Some((aligned, Belief { covariance, ..*start }))
+        };
+        let first = from(start)?;
+        // A thin row that is turned about its own line lays half of its fruits on others of the map: it may have settled there.
+        let found = first.1.covariance.symmetric_eigen();
+        let loosest = found.eigenvectors.column(found.eigenvalues.imax()) * found.eigenvalues.max().sqrt();
+        let beside = |times: f64| Belief { pose: moved(&first.0.pose, &(loosest * times)), ..*start };
+        let all: Vec<_> = [-BESIDE, BESIDE].map(beside).iter().filter_map(from).chain([first]).collect();
+        let (best, near) = all.iter().max_by(|one, other| one.0.log_odds.total_cmp(&other.0.log_odds))?;
+        let spread = spread_of_searches(&best.pose, all.iter().map(|(other, _)| (other.pose, other.log_odds)));
+        let belief = Belief { pose: best.pose, covariance: near.covariance + spread, ..*near };
+        Some(Self::answer(best, sightings, &belief, false))
     }
 
     /// Covariance of a pose and its slip, if there is enough for it; `chosen_nats` is what the choice among many gains

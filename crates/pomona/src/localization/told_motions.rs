@@ -152,9 +152,7 @@ impl ToldMotions {
             let aligned = from(&slip);
             let found = std::iter::once((aligned.pose, evidence(&aligned)));
             let others = slip.others().map(|other| from(&other)).map(|one| (one.pose, evidence(&one)));
-            let same = |one: &Weighed, other: &Weighed| logarithm(&one.0.seen_from(&other.0)).norm() < ONE_POSE;
-            let poses = first_of_each(found.chain(others), usize::MAX, same);
-            let spread = spread(&aligned.pose, &poses);
+            let spread = spread_of_searches(&aligned.pose, found.chain(others));
             (aligned, spread)
         } else {
             (align(&sightings, map, told, &Slip::none()), Matrix6::zeros())
@@ -214,6 +212,12 @@ fn spread(chosen: &Pose, poses: &[Weighed]) -> Matrix6<f64> {
         weights += weight;
     }
     sum / weights
+}
+
+/// The same of poses of which several searches may have found one.
+pub(super) fn spread_of_searches(chosen: &Pose, found: impl Iterator<Item = Weighed>) -> Matrix6<f64> {
+    let same = |one: &Weighed, other: &Weighed| logarithm(&one.0.seen_from(&other.0)).norm() < ONE_POSE;
+    spread(chosen, &first_of_each(found, usize::MAX, same))
 }
 
 /// Two searches that end no farther apart, metres and radians together, have found one pose.
