@@ -75,7 +75,8 @@ impl KnownFruits {
 
     /// Rows of all fruits that a sighting may show.
     fn within_reach(&self, place: &Vector3<f64>, covariance: &Matrix3<f64>) -> Vec<usize> {
-        let reach = REACH * covariance.symmetric_eigenvalues().max().sqrt();
+        // No axis has more variance than the norm.
+        let reach = REACH * covariance.norm().sqrt();
         if reach <= REACH_M {
             return self.near(place).collect();
         }

@@ -7,6 +7,7 @@ use super::config::LocalizationConfig;
 use super::doubt::Doubt;
 use super::known::KnownFruits;
 use super::own::own_nats;
+use super::residuals::EIGEN_TURNS;
 use super::shared::{Sag, covariance};
 use super::sightings::{Sighting, cloud_of};
 use super::slip::{Slip, lost_by_fit};
@@ -22,7 +23,7 @@ use crate::geometry::Scale;
 use crate::matching::{MapIndex, Method, require_directions};
 use crate::pose::Pose;
 use crate::verified::compact::Bytes;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
 use std::collections::BTreeSet;
 
 /// Fruits in the map below which a pose has no redundancy: three fix it.
@@ -318,7 +319,7 @@ impl Localizer {
         };
         let first = from(start)?;
         // A thin row that is turned about its own line lays half of its fruits on others of the map: it may have settled there.
-        let found = first.1.covariance.symmetric_eigen();
+        let found = SymmetricEigen::try_new(first.1.covariance, f64::EPSILON, EIGEN_TURNS)?;
         let loosest = found.eigenvectors.column(found.eigenvalues.imax()) * found.eigenvalues.max().sqrt();
         let beside = |times: f64| Belief { pose: moved(&first.0.pose, &(loosest * times)), ..*start };
         let all: Vec<_> = [-BESIDE, BESIDE].map(beside).iter().filter_map(from).chain([first]).collect();

@@ -34,7 +34,7 @@ const LEFT_OUT: f64 = 0.2;
 const LEAST_WEIGHT: f64 = 0.05;
 
 /// Turns in which eigenvalues are found, or the matrix is none of numbers.
-const EIGEN_TURNS: usize = 1000;
+pub(super) const EIGEN_TURNS: usize = 1000;
 
 /// Eigenvalues, over the largest, that are none.
 const NO_EIGENVALUE: f64 = 1e-6;

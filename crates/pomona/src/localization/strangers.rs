@@ -69,7 +69,8 @@ impl Strangers {
 
     /// Sum of Gaussians of these covariances about a fruit over the other fruits, the wide one last.
     fn sum(&self, places: &[Vector3<f64>], row: usize, covariances: &[Matrix3<f64>; 2]) -> f64 {
-        let reach = RIM * covariances[1].symmetric_eigenvalues().max().sqrt();
+        // No axis has more variance than the norm.
+        let reach = RIM * covariances[1].norm().sqrt();
         let inverses = covariances.map(|covariance| covariance.try_inverse().unwrap_or_else(Matrix3::zeros));
         let peaks = inverses.map(|inverse| inverse.determinant().sqrt());
         let mut sum = 0.0;
