@@ -1,8 +1,9 @@
 //! The pose that lays sightings on the map's fruits, nobody said to be who.
 //!
 //! A sighting p shows the fruit m of the map with a density N(m - T p; S), S the covariances of both and of the pose as it
-//! is known so far, or a stranger, of which there are rho in a cubic metre about m. With q = N / rho and a share s of sightings
-//! in the map, the weights of expectation and maximisation are
+//! is known so far, or a stranger, of which there are rho in a cubic metre about m, smeared as the sighting is
+//! ([`super::strangers`]). With q = N / rho and a share s of sightings in the map, the weights of expectation and
+//! maximisation are
 //!
 //! w = s q / (1 - s + s sum q), and the evidence is the sum of v ln(1 - s + s sum q), v one over how often the sighting's
 //! fruit was seen. On wires rho is that of the wire: a wrong pose that lays wires on wires has two numbers of three for nothing.
@@ -172,7 +173,7 @@ pub(super) fn whole(mut says: Vec<Say>, laid: &[Laid], map: &KnownFruits) -> Vec
     says
 }
 
-/// A sighting, and how many times as dense as those of the map strangers are that it may show ([`super::strangers`]).
+/// A sighting, and how many times as dense for it the strangers about the fruit are that it shows the likeliest ([`super::strangers`]).
 pub(super) struct Laid<'a> {
     seen: &'a Sighting,
     times: f64,

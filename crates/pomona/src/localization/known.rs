@@ -1,7 +1,7 @@
 //! The map's fruits, asked by place.
 
 use super::sightings::covariance_of;
-use super::strangers::{FAR_M, Strangers};
+use super::strangers::{Strangers, WIDEST_M};
 use crate::cloud::FruitCloud;
 use crate::matching::MapIndex;
 use crate::neighbours::vicinity::Vicinity;
@@ -81,7 +81,7 @@ impl KnownFruits {
             return self.near(place).collect();
         }
         let mut rows = Vec::new();
-        self.strangers.within(place, reach.min(FAR_M), |row| rows.push(row));
+        self.strangers.within(place, reach.min(WIDEST_M), |row| rows.push(row));
         rows.sort_unstable();
         rows
     }

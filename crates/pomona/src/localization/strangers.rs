@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 const RIM: f64 = 3.0;
 
 /// Fruits farther away than this say nothing of a place, metres: half of the way to the next row.
-pub(super) const FAR_M: f64 = 1.5;
+pub(super) const WIDEST_M: f64 = 1.5;
 
 /// The fruits of a map as strangers to each other.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(super) struct Strangers {
     /// Typical distance to the sixth-nearest fruit, metres.
     spacing: f64,
     /// Looked up where a sighting asks.
-    about: Vec<OnceLock<About>>,
+    about: Vec<OnceLock<Box<About>>>,
 }
 
 /// A fruit of the map.
@@ -53,7 +53,7 @@ impl Strangers {
     pub fn times(&self, places: &[Vector3<f64>], row: usize, covariance: &Matrix3<f64>) -> f64 {
         let about = self.about[row].get_or_init(|| {
             let kernels = kernels_among(&self.around(places, row), self.spacing);
-            About { kernels, sum: self.sum(places, row, &kernels) }
+            Box::new(About { kernels, sum: self.sum(places, row, &kernels) })
         });
         let smeared = self.sum(places, row, &about.kernels.map(|kernel| kernel + covariance));
         if about.sum > 0.0 && smeared > 0.0 { smeared / about.sum } else { 1.0 }
@@ -74,7 +74,7 @@ impl Strangers {
         let inverses = covariances.map(|covariance| covariance.try_inverse().unwrap_or_else(Matrix3::zeros));
         let peaks = inverses.map(|inverse| inverse.determinant().sqrt());
         let mut sum = 0.0;
-        self.within(&places[row], reach.min(FAR_M), |other| {
+        self.within(&places[row], reach.min(WIDEST_M), |other| {
             let apart = places[other] - places[row];
             for (inverse, peak) in inverses.iter().zip(peaks).filter(|_| other != row) {
                 sum += peak * (-0.5 * apart.dot(&(inverse * apart))).exp();
