@@ -38,7 +38,7 @@ pub struct Pair {
 pub struct Registration {
     /// Takes points of the query into the map.
     pub map_from_query: Similarity,
-    /// Evidence against chance, nats. Paper: log-odds of the pairs' residuals, summed over pairs.
+    /// Evidence against chance, nats: of this part as it grew. Paper: log-odds of the pairs' residuals, summed over pairs.
     pub log_odds: f64,
 }
 

@@ -16,7 +16,7 @@ pub struct VerifiedConfig {
     /// Seeds per fruit of the query, the longest of them all, that are tried before the answer is "no match"; twice as
     /// many where the vertical is known. The short rounds before come on top.
     pub seeds_per_fruit: u64,
-    /// Least probability of a reported pair.
+    /// Least probability of a reported pair, under the pose that is reported; of an ambiguous answer it is divided by the number of poses.
     pub min_probability: f64,
 }
 }

@@ -125,6 +125,11 @@ impl Finding<'_> {
         Rated { overlap: &self.overlap, nats: self.overlap.log_odds.max(self.evidence()) }
     }
 
+    /// What it explains as it stands by now.
+    pub(super) fn as_it_stands(&self) -> &Overlap {
+        self.settled.as_ref().map_or(&self.overlap, |settled| &settled.overlap)
+    }
+
     /// Share of the fruits of the query that are found, of those that the map can show in their depths all along the row.
     pub(super) fn share_of_row(&self) -> f64 {
         let found: f64 = self.settled.iter().flat_map(|settled| &settled.beliefs.probabilities).sum();
@@ -240,15 +245,15 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a settled finding has so many `times` as many deviations more evidence than it has moved as wrong poses reach on this very
-    /// planting.
+    /// planting; none where the map shows too few places to move it to.
     ///
     /// If what they have falls off exponentially from what a pose has that is moved along the row, the largest of N is expected `ln N`
     /// standard deviations above the mean. Of 389 true answers of the test cells that are not sure the least are 12 to 17, on wires,
     /// where `ln N` is 10; of 27 wrong ones on rows of 40 and 90 m on wires none has more than 10, where it is 11 to 14.
-    pub(super) fn stands_out_of_the_planting(&self, finding: &Finding, times: f64) -> bool {
+    pub(super) fn stands_out_of_the_planting(&self, finding: &Finding, times: f64) -> Option<bool> {
         let offered = poses(self.query.len(), self.prepared.fruits, self.model.scale);
         let times = if finding.is_a_line() { CLEAR_OF_PATTERNS } else { times };
-        finding.deviations_from_moved().is_none_or(|deviations| deviations > times * offered.ln())
+        finding.deviations_from_moved().map(|deviations| deviations > times * offered.ln())
     }
 
     /// Mean probability of the pairs of a settled finding that are worth reporting; 0 where they are fewer than a seed and one

@@ -41,15 +41,20 @@ impl<'a> Search<'a> {
         let mut pairs = self.pairs(found);
         let is_new = |other: &Finding| found.further.iter().all(|part| !self.shows(&part.overlap, &other.overlap));
         let is_outdone_by = |other: &Finding| is_new(other) && self.outdoes(best, other.rated(), pattern);
-        let outdone = others.iter().any(is_outdone_by) && !self.stands_out_of_the_planting(found, CLEAR_OF_PATTERNS);
+        let outdone =
+            others.iter().any(is_outdone_by) && self.stands_out_of_the_planting(found, CLEAR_OF_PATTERNS) != Some(true);
+        let (rivals, accepted): (Vec<_>, Vec<_>) =
+            accepted.partition(|other| is_new(other) && self.excludes(best, other.rated(), pattern));
+        // What is neither a rival nor a further part shows what one stem has in common with others.
+        let alone = Rated { nats: found.overlap.log_odds.max(settled.evidence), ..best };
+        let is_as_good =
+            |other: &Finding| !self.may_be_torn_off(other, found) && is_new(other) && self.equals(alone, other.rated());
+        let outdone = outdone || accepted.iter().any(is_as_good);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);
         }
-        let mut rivals: Vec<Registration> = accepted
-            .filter(|other| is_new(other) && self.excludes(best, other.rated(), pattern))
-            .map(|finding| self.registration(&finding.overlap))
-            .collect();
+        let mut rivals: Vec<Registration> = rivals.iter().map(|finding| self.registration(&finding.overlap)).collect();
         if rivals.is_empty() {
             rivals.extend(found.unseen_rival(&log).map(|rival| self.registration(&rival)));
         }

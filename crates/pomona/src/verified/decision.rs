@@ -216,7 +216,7 @@ impl<'a> Search<'a> {
             findings.log.best = findings.log.best.max(finding.overlap.log_odds);
             let holds = self.holds(&mut finding, KEPT.threshold, &mut findings.log);
             let is_sure = finding.overlap.log_odds > SURE * findings.log.threshold;
-            if holds && (is_sure || self.stands_out_of_the_planting(&finding, 1.0)) {
+            if holds && (is_sure || self.stands_out_of_the_planting(&finding, 1.0) != Some(false)) {
                 findings.accepted.push(finding);
             } else {
                 findings.others.push(finding);

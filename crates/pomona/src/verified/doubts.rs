@@ -1,6 +1,6 @@
 //! What may rule a pose out, or move it: rivals, lines, mirrors, local optima.
 
-use super::acceptance::SURE;
+use super::acceptance::{SURE, outlying};
 use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
 use super::growth::grow;
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
         let reach = spacings * self.query.spacing;
         let mut near = Vec::new();
         self.query.tree.nearest(&single(place), 8, &mut near);
-        let overlap = finding.settled.as_ref().map_or(&finding.overlap, |settled| &settled.overlap);
+        let overlap = finding.as_it_stands();
         let same = near
             .iter()
             .filter(|(row, _)| {
@@ -123,6 +123,12 @@ impl<'a> Search<'a> {
     /// Whether an optimum that was not accepted shows that wrong poses reach nearly as much on this planting, wherever it lies.
     pub(super) fn outdoes(&self, best: Rated, other: Rated, pattern: f64) -> bool {
         self.rivals(best, other, self.unexplained(best.overlap, &other.overlap.predictions), pattern)
+    }
+
+    /// Whether an optimum that puts other fruits elsewhere has so much evidence that by chance the best may have more.
+    pub(super) fn equals(&self, best: Rated, other: Rated) -> bool {
+        !self.lays(best.overlap, &other.overlap.predictions)
+            && best.nats < outlying(self.config.false_alarm_rate, other.nats)
     }
 
     /// Whether both cannot be true: a row that is torn apart has a pose before and one behind, and neither doubts the other.

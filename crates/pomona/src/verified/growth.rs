@@ -49,7 +49,7 @@ pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothes
         growth.meet(rigid.copied().unwrap_or(1.0));
         growth.refit(rigid.is_some());
         settled = if growth.spread() { 0 } else { settled + 1 };
-        if settled == TURNS && round > RIGID.len() + 2 {
+        if settled >= TURNS && round > RIGID.len() + 2 {
             break;
         }
     }

@@ -71,7 +71,7 @@ impl Finding<'_> {
 /// What a pose has where it is moved, with pairs at these places of the map.
 fn everywhere(laid: &Patchwork, pairs: &[Vector3<f64>]) -> Vec<MovedPose> {
     let mut ways = ways(laid, pairs);
-    ways.extend(along_the_row(&laid.map.points, laid.map.spacing, FARTHEST));
+    ways.extend(along_the_row(&of_the_row(laid), laid.map.spacing, FARTHEST));
     let expected = due(laid);
     let of = |there: &mut Patchwork, by: &Vector3<f64>| {
         there.pose.translation = laid.pose.translation + by;
@@ -89,6 +89,14 @@ fn ways(laid: &Patchwork, pairs: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let [least, farthest] = [BEYOND_A_CLUSTER, FARTHEST].map(|spacings| spacings * map.spacing);
     let asked = pairs.iter().copied().step_by(pairs.len().div_ceil(PAIRS_ASKED).max(1));
     most_common(asked, map, farthest, WIDTH * laid.sigma).filter(|by| by.norm() > least).take(TRIED).collect()
+}
+
+/// The fruits that say which way the row goes: those of the query as they are laid, where half of them is as long as the way that they are moved,
+/// for a block may be wider than its rows are long; else the map's.
+fn of_the_row(laid: &Patchwork) -> Vec<Vector3<f64>> {
+    let landings: Vec<_> = laid.predictions.iter().flatten().map(|at| at.place).collect();
+    let is_long = |row: Principal| 2.0 * row.extents[0] > FARTHEST * laid.map.spacing;
+    if Principal::of(landings.iter()).is_some_and(is_long) { landings } else { laid.map.points.clone() }
 }
 
 /// Ways along the longest extent of a cloud, farther than a cluster is wide and as far as so many spacings.

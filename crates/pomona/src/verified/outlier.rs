@@ -33,7 +33,7 @@ impl<'a> Search<'a> {
         log.best = log.best.max(best);
         log.threshold = stands_out.max(least);
         let best = &mut others[distinct[0]];
-        (self.holds(best, kept, log) && self.stands_out_of_the_planting(best, 1.0))
+        (self.holds(best, kept, log) && self.stands_out_of_the_planting(best, 1.0) != Some(false))
             .then(|| others.swap_remove(distinct[0]))
     }
 

@@ -3,14 +3,21 @@
 //! Each pose is found on its own, has enough evidence, and pairs other fruits. So they are no rivals but parts of one answer: the
 //! pairs are those of all parts, the pose is that of the part with most evidence.
 
+use super::acceptance::SURE;
+use super::axes::along;
 use super::case::{Finding, Search};
 use super::decision::MIN_FRUITS;
+use super::overlap::Overlap;
 use super::settlement::{Settled, settle_together};
+use nalgebra::Vector3;
 use std::collections::HashMap;
 
 /// Share of its pairs that the answer may exclude of a part. Of 145 parts of torn rows one has more, .27, and three in four .04 at the
 /// most; wrong poses on wires have .31 to .43, a second tree that looks the same .6 and more.
 const EXCLUDED: f64 = 0.25;
+
+/// Turn between two parts of a row, radians, at the most: 45 degrees.
+const TORN_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Findings that together are one answer.
 struct Joined {
@@ -60,7 +67,8 @@ impl Search<'_> {
                 joined.parts.push(at);
                 joined.pairs = expected(finding.settled.iter());
             } else if contradicted(finding, joined.parts.iter().map(|&part| &findings[part])) >= EXCLUDED
-                || !self.stands_out_of_the_planting(finding, 1.0)
+                || !joined.parts.iter().all(|&part| self.may_be_torn_off(finding, &findings[part]))
+                || self.stands_out_of_the_planting(finding, 1.0) == Some(false)
             {
                 joined.others.push(at);
             } else {
@@ -74,6 +82,28 @@ impl Search<'_> {
             }
         }
         joined
+    }
+
+    /// Whether a finding may be a part that was torn off another, as far as it is not sure by itself: a row that is torn keeps its direction
+    /// and its order.
+    ///
+    /// Stems that stand apart and are nearly copies of each other, as of bananas, are found one by one, each turned as it likes, in any
+    /// order.
+    pub(super) fn may_be_torn_off(&self, finding: &Finding, other: &Finding) -> bool {
+        let [own, others] = [finding, other].map(Finding::as_it_stands);
+        let turn = others.pose.rotation.rotation_to(&own.pose.rotation).angle();
+        finding.rated().nats > SURE * self.least() || (turn < TORN_RAD && !self.passes(own, others))
+    }
+
+    /// Whether one passes as many fruits of another along the row as it has itself, on its way from where that one puts it.
+    fn passes(&self, one: &Overlap, other: &Overlap) -> bool {
+        let Some(along) = along(self.query) else { return false };
+        let along = other.pose.rotation * along;
+        let mut way = [&other.pose, &one.pose].map(|pose| along.dot(&pose.image(&one.middle)));
+        way.sort_by(f64::total_cmp);
+        let is_passed = |place: &Vector3<f64>| (way[0]..way[1]).contains(&along.dot(place));
+        let passed = other.predictions.iter().flatten().filter(|at| is_passed(&at.place)).count();
+        passed >= one.predictions.iter().flatten().count()
     }
 
     /// Parts settled together: a fruit has one partner at most, and which part it belongs to is told by how many around it find
