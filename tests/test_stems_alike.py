@@ -1,4 +1,4 @@
-"""Stems that stand apart and whose fruits hang in one spiral, each turned as it likes: any of them lies on any other."""
+"""Stems that stand apart and whose fruits hang in one spiral, each turned as it likes: any lies on any other."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def match(seed: int, *, same: bool) -> tuple[pomona.Match, NDArray[np.bool_]]:
 
 @pytest.mark.parametrize("first", [0, 6])
 def test_a_stem_that_lies_on_another_is_no_answer(first: int) -> None:
-    """What stems have in common came as parts of a torn row, in any order, each turned otherwise: in eleven rows of twelve."""
+    """What stems have in common came as parts of a torn row, in any order, each turned otherwise."""
     assert not any(match(seed, same=False)[0] for seed in range(first, first + 6))
 
 

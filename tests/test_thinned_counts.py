@@ -1,4 +1,4 @@
-"""Rows that were thinned between two visits: how many fruits hang, right after it."""
+"""Rows that were thinned before the last visit, or that it hardly saw: how many fruits hang, right after it."""
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from pomona.identity.looks import Looks
 N_FRUITS, DAYS_APART, SHARE_FALSE, DROP = 250, 10.0, 0.04, 0.01
 
 
-def counted_and_true(seed: int, sides: str, thinned: float) -> tuple[float, int]:
-    """Fruits by what the visits saw, and those that hang; a share was thinned before the last visit.
+def counted_and_true(seed: int, sides: str, thinned: float, dim: float = 1.0) -> tuple[float, int]:
+    """Fruits by what the visits saw, and those that hang; a share was thinned before the last visit, or it was dim.
+
+    Where it is, each of twenty frames sees a fruit by so much more rarely, and a visit those that five frames show.
 
     Leaves hide a fruit from either side by its depth and by chance, on each date mostly as on the others.
     """
@@ -30,6 +32,10 @@ def counted_and_true(seed: int, sides: str, thinned: float) -> tuple[float, int]
         chance = 1.0 / (1.0 + np.exp(-1.2 - 2.5 * towards - hides[side] - 0.7 * rng.normal(size=N_FRUITS)))
         seen[:, visit] = hangs & (rng.random(N_FRUITS) < chance)
         views[:, visit] = np.clip(chance + 0.1 * rng.normal(size=N_FRUITS), 0.05, 1.0)
+        if dim < 1.0:
+            share = chance / (chance + np.e * (1.0 - chance)) * (dim if visit == len(sides) - 1 else 1.0)
+            frames = rng.binomial(20, share)
+            seen[:, visit], views[:, visit] = hangs & (frames >= 5), frames / 20.0
     n_false = [rng.poisson(SHARE_FALSE * count) for count in seen.sum(axis=0)]
     false = np.repeat(np.arange(len(sides)), n_false)[:, None] == np.arange(len(sides))
     seen, places = (
@@ -56,8 +62,8 @@ def looks_of(places: np.ndarray, seen: np.ndarray, views: np.ndarray, sides: str
     return Looks(seen, everywhere, ranks, towards, counts, np.zeros(seen.shape), everywhere, fruits_about(places))
 
 
-def errors(sides: str, thinned: float) -> np.ndarray:
-    both = [counted_and_true(seed, sides, thinned) for seed in range(12)]
+def errors(sides: str, thinned: float, dim: float = 1.0) -> np.ndarray:
+    both = [counted_and_true(seed, sides, thinned, dim) for seed in range(12)]
     return np.array([counted / true - 1.0 for counted, true in both])
 
 
@@ -72,3 +78,10 @@ def test_where_nothing_is_thinned_as_many_are_counted() -> None:
     off = errors("ABA", 0.0)
     assert abs(off.mean()) < 0.05
     assert np.abs(off).max() < 0.1
+
+
+def test_a_last_visit_in_the_dark_is_not_one_after_picking() -> None:
+    """It sees of those that hang free as many as before: where fruits are picked as many of each go."""
+    off = errors("AAAAAA", 0.0, dim=0.5)
+    assert abs(off.mean()) < 0.15
+    assert np.median(off) > -0.13

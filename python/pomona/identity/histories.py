@@ -45,8 +45,15 @@ alike, and one may be far off: half width of a Cauchy distribution."""
 FALSE_SPREAD = 0.3
 """The same of the logarithm of a visit's false points: light, dust and detectors make them, visit by visit."""
 
+LIGHT_SPREAD = 0.05
+"""Of the logit of a visit's chances to see any fruit, about those of a usual visit, as for leaves. One visit in thirty
+is off by 1 and more: it was dark, the drive was fast, the lens was dirty."""
+
 FARTHEST_OFF = 30.0
 """Of a visit from the others, half widths."""
+
+DARKEST = 100.0
+"""The same of its light."""
 
 SHARE_GONE = 0.02
 """Of the fruits that go between two visits a week apart or more, before the season says its own."""
@@ -123,7 +130,8 @@ class HistoryOdds:
     $v$ the share $h_v$ goes. So a history has the probability $P$, and some visit sees a fruit there with $S$. Beside
     each that hangs a visit has $\rho_v = e^{g_v} c_0 f / (1 - f)$ false points, which no other visit sees: $f$ is their
     share of what a first look sees, and $g_v$ is 0 where visits are alike. What looks before had missed a visit sees
-    with $\mathrm{logit}\, c_j + l_v$. Of what was seen at a place by visit $w$, of those that looked there,
+    with $\mathrm{logit}\, c_j + l_v$, and whatever it sees by $d_v$ of the logit more surely. Of what was seen at a
+    place by visit $w$, of those that looked there,
 
     $$L = \prod \frac{q\, P + u\, \rho_w\, [\mathrm{it\ alone\ saw\ it}]}{S + \sum_v \rho_v}$$
 
@@ -156,7 +164,11 @@ class HistoryOdds:
         logits = np.log(CHANCES_OF_SEEING / (1.0 - CHANCES_OF_SEEING))
         self.told = logits - logits[0]
         self.in_part = np.arange(len(logits)) >= len(logits) - len(_BY_VIEWS)
-        self.of_visits = slice(3 + len(self.told), 3 + len(self.told) + 2 * self.n_visits)
+        first = 3 + len(self.told)
+        self.of_leaves, self.of_false, self.of_light = (
+            slice(first + part * self.n_visits, first + (part + 1) * self.n_visits) for part in range(3)
+        )
+        self.of_visits = slice(self.of_leaves.start, self.of_light.stop)
         counted = one.first_views != UNCOUNTED
         share = np.count_nonzero(counted) / max(len(counted), 1)
         self.once_seen = np.zeros(len(logits))
@@ -164,27 +176,30 @@ class HistoryOdds:
         self.once_seen[MISSES + 1 + np.searchsorted(SHARES_OF_VIEWS, USUAL_VIEWS, side="right")] += 1.0 - share
         self.was_missed = self.in_part | ((np.arange(len(logits)) > 0) & (np.arange(len(logits)) <= MISSES))
 
-    def start(self, last_gone: float | None = None) -> NDArray[np.float64]:
+    def start(self, last_gone: float | None = None, last_light: float = 0.0) -> NDArray[np.float64]:
         """Return what is believed beforehand: level, slope, the classes' own, views, logits of what goes.
 
-        With the share that goes before the last visit, where another than the usual is to be tried.
+        With the share that goes before the last visit, or the logit by which that sees more, where another than the
+        usual is to be tried.
         """
+        own = np.zeros(self.n_own)
+        own[self.of_light.stop - 1] = last_light / LIGHT_SPREAD
         believed = np.where(self.goes, self.share_gone, SHARE_GONE)
         if last_gone is not None:
             believed[-1:] = last_gone
-        return np.concatenate([np.zeros(self.n_own), np.log(believed / (1.0 - believed))])
+        return np.concatenate([own, np.log(believed / (1.0 - believed))])
 
     def bounds(self, *, alike: bool) -> list[tuple[float, float]]:
-        """Return how far from that each of it may be; visits that are `alike` do not differ."""
+        """Return how far from that each of it may be; visits that are `alike` differ in their light alone."""
         own = [(-FARTHEST, FARTHEST)] * self.n_own
         most = 0.0 if alike else FARTHEST_OFF
-        own[self.of_visits] = [(-most, most)] * (2 * self.n_visits)
+        own[self.of_visits] = [(-most, most)] * (2 * self.n_visits) + [(-DARKEST, DARKEST)] * self.n_visits
         return own + [FARTHEST_LEAVING] * (self.n_visits - 1)
 
     @property
     def n_own(self) -> int:
         """How many settings there are before those of what goes."""
-        return int(3 + len(self.told) + 2 * self.n_visits + N_SETTINGS)
+        return int(self.of_visits.stop + N_SETTINGS)
 
     def __call__(self, told: NDArray[np.float64], share_false: float) -> tuple[float, NDArray[np.float64]]:
         """Return minus the log posterior and its gradient."""
@@ -217,6 +232,7 @@ class HistoryOdds:
                 OWN_SPREAD * of_classes,
                 LEAVES_SPREAD * of_logit @ self.was_missed,
                 FALSE_SPREAD * of_rates,
+                LIGHT_SPREAD * of_logit.sum(axis=1),
             ]
         )
         again, of_again = self._again(told)
@@ -317,7 +333,9 @@ class HistoryOdds:
 
     def _chances(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the chance of each visit to see a fruit of each class, (V, C)."""
-        of_visits = LEAVES_SPREAD * told[3 + len(self.told) :][: self.n_visits, None] * self.was_missed
+        of_visits = (
+            LEAVES_SPREAD * told[self.of_leaves, None] * self.was_missed + LIGHT_SPREAD * told[self.of_light, None]
+        )
         return np.asarray(MOST_SEEING / (1.0 + np.exp(-self._logits(told) - of_visits)))
 
     def _again(self, told: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
@@ -349,7 +367,7 @@ class HistoryOdds:
 
     def _rates(self, told: NDArray[np.float64], share_false: float) -> NDArray[np.float64]:
         """Return how many false points each visit has beside each fruit that hangs, (V,)."""
-        of_visits = FALSE_SPREAD * told[3 + len(self.told) + self.n_visits :][: self.n_visits]
+        of_visits = FALSE_SPREAD * told[self.of_false]
         return np.asarray(share_false / (1.0 - share_false) * self._first_chance(told) * np.exp(of_visits))
 
     def leaving(self, told: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,10 @@ fruits that hide are no exact model, so a few nats are no proof."""
 HALF_GONE = 0.5
 """Share that goes before the last visit where the search begins a second time: of two visits nobody can tell whether
 half went, or hides from one of them, and both explain all well."""
+
+DARK = -1.2
+"""Logit by which the last visit sees less where it begins a third time: of each class as much, and where fruits went
+as many of each. Five visits before it tell the one from the other, two hardly."""
 
 OTHER = 0.1
 """By how much shares that go differ, at least, where a second search ended elsewhere."""
@@ -130,12 +135,19 @@ def _best_ways(odds: HistoryOdds) -> tuple[list[Fits], float]:
 
 
 def _ways(odds: HistoryOdds, *, alike: bool) -> list[Fits]:
-    """Return what fits best as a rule, and what does where half went before the last visit, if that is another way."""
-    share = SHARES_FALSE[USUAL_FALSE]
-    tops = [_climbed(odds, share, start, alike=alike) for start in (odds.start(), odds.start(HALF_GONE))]
-    leaving = [odds.leaving(told) for _, told in tops]
-    is_other = np.abs(leaving[1] - leaving[0]).max() > OTHER
-    return [_fits(odds, top, alike=alike) for top in tops[: 1 + is_other]]
+    """Return what fits best as a rule, and what does where half went before the last visit, or where that saw less.
+
+    As far as these are other ways: by the shares that go. Whether it was dark is asked where many seem to have gone.
+    """
+    climbed = partial(_climbed, odds, SHARES_FALSE[USUAL_FALSE], alike=alike)
+    tops = [climbed(odds.start()), climbed(odds.start(HALF_GONE))]
+    if max(odds.leaving(told)[-1] for _, told in tops) > OTHER:
+        tops.append(climbed(odds.start(last_light=DARK)))
+    ways: list[tuple[float, NDArray[np.float64]]] = []
+    for top in tops:
+        if all(np.abs(odds.leaving(top[1]) - odds.leaving(told)).max() > OTHER for _, told in ways):
+            ways.append(top)
+    return [_fits(odds, top, alike=alike) for top in ways]
 
 
 def _fits(odds: HistoryOdds, usual: tuple[float, NDArray[np.float64]], *, alike: bool) -> Fits:
