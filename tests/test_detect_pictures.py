@@ -234,4 +234,17 @@ def test_no_input_is_destroyed(pomona, tmp_path):
     assert code == 2
     assert "expected another place to write" in err
     assert (folder / NAMES[0]).read_bytes() == before
-    assert pomona("detect", folder, folder / NAMES[0], "-o", tmp_path / "b.csv")[0] == 2  # two of one name
+    other = tmp_path / "other"
+    shutil.copytree(PICTURES, other)
+    assert pomona("detect", folder, other / NAMES[0], "-o", tmp_path / "b.csv")[0] == 2  # two of one name
+
+
+def test_what_is_no_picture_in_a_folder_ends_nothing_and_one_given_twice_is_one(pomona, tmp_path):
+    folder = tmp_path / "pictures"
+    shutil.copytree(PICTURES, folder)
+    (folder / "more.png").mkdir()
+    (folder / "gone.png").symlink_to(tmp_path / "nowhere.png")
+    code, out, err = pomona("detect", folder, folder / NAMES[0], "-o", tmp_path / "boxes.csv")
+    assert code == 0
+    assert "gone.png: skipped" in out
+    assert f"skipped 1 of {len(NAMES) + 1} pictures" in err

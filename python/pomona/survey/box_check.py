@@ -13,7 +13,7 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Calibration
 from pomona.survey.part import Boxes, Part
 
-__all__ = ["check_boxes", "check_long_boxes"]
+__all__ = ["check_boxes", "check_long_boxes", "check_small_boxes"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,15 @@ def check_boxes(path: Path, parts: Sequence[Boxes]) -> None:
     if n_boxes >= SEVERAL and n_halves > MANY * n_boxes:
         found = f"{n_halves} of {n_boxes} boxes make one square with the box beside them, as halves of a fruit do"
         warnings.warn(f"{path}: {found}: join the boxes of one fruit", PomonaWarning, stacklevel=3)
+
+
+def check_small_boxes(path: Path, parts: Sequence[Boxes], least_px: float) -> None:
+    """Warn where boxes are so small that a detector misses many fruits; what it finds are the larger ones."""
+    sides_px = np.concatenate([np.sqrt(np.prod(each.boxes_px[:, 2:] - each.boxes_px[:, :2], axis=1)) for each in parts])
+    if len(sides_px) >= SEVERAL and (median_px := float(np.median(sides_px))) < least_px:
+        found = f"boxes are {median_px:.0f} px wide in the median, expected {least_px:g} or more"
+        advice = "of smaller fruits the detector misses a fifth and more, the smaller ones: film nearer"
+        warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
 
 
 def check_long_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]) -> None:

@@ -22,7 +22,7 @@ from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
-from pomona.survey.box_check import check_boxes, check_long_boxes
+from pomona.survey.box_check import check_boxes, check_long_boxes, check_small_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.depth_check import check_depth_pictures
@@ -34,6 +34,7 @@ from pomona.survey.pose_source import Place, PoseSource, pose_source_of
 from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing, looked_ahead
+from pomona.survey.standing import Standing
 from pomona.survey.tally import BoxFate, Tally, tell_little
 from pomona.survey.told_layers import tell_farther_layer
 from pomona.survey.tracking import Tracker
@@ -171,7 +172,8 @@ def scan(
         check_poses(recording)
     _check_centre(recording)
     seeing = Seeing(recording, detector, depth=depth)
-    look_at = keep.remembering(seeing) if keep is not None else seeing
+    look_at: Callable[[Frame], Look] = keep.remembering(seeing) if keep is not None else seeing
+    look_at = Standing(look_at, seeing.needs)
     camera: PoseSource
     n_before = 0
     if slam:
@@ -196,6 +198,8 @@ def scan(
     survey = findings.survey(camera)
     boxes = [part.boxes for part in survey.parts]
     check_boxes(recording.path, boxes)
+    if (least_px := getattr(detector, "least_px", None)) is not None:
+        check_small_boxes(recording.path, boxes, least_px)
     check_box_times(recording, boxes)
     if depth == "auto":
         check_depth_pictures(recording, boxes)

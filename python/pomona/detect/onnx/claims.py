@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -15,10 +16,10 @@ from pomona.reading import number_in, parsed_json, shown
 __all__ = ["OWN_KEY", "Claim", "claim_of"]
 
 OWN_KEY = "pomona_detector"
-"""Our own key: JSON with `version` 1, `family`, and where they differ from the family's `names`, `preparation`
-and `min_score`."""
+"""Our own key: JSON with `version` 1, `family`, and where they differ from the family's `names`, `preparation`,
+`min_score` and `usual_px`."""
 
-OWN_FIELDS = "version, family, names, preparation, min_score"
+OWN_FIELDS = "version, family, names, preparation, min_score, usual_px"
 
 RFDETR_KEY = "rfdetr_inference"
 MISUNDERSTOOD = (
@@ -50,6 +51,8 @@ class Claim:
         Width and height it was made for.
     min_score : float or None
         The least score that makes counts right.
+    usual_px : float or None
+        Side of the fruits that it has learnt from, as it saw them.
     """
 
     source: str
@@ -59,6 +62,7 @@ class Claim:
     outputs: dict[str, str] = field(default_factory=dict)
     size_px: tuple[int, int] | None = None
     min_score: float | None = None
+    usual_px: float | None = None
 
 
 def claim_of(path: Path, metadata: Mapping[str, str]) -> Claim:
@@ -86,7 +90,7 @@ def claim_of(path: Path, metadata: Mapping[str, str]) -> Claim:
 
 def _own(where: str, metadata: Mapping[str, str]) -> Claim:
     content = parsed_json(where, metadata[OWN_KEY], "what we write")
-    unknown = content.keys() - {"version", "family", "names", "preparation", "min_score"}
+    unknown = content.keys() - {"version", "family", "names", "preparation", "min_score", "usual_px"}
     unknown |= content.get("preparation", {}).keys() - {known.name for known in fields(Preparation)}
     if unknown:
         raise PomonaError(f"{where}: found {', '.join(sorted(unknown))}, expected {OWN_FIELDS}")
@@ -99,6 +103,7 @@ def _own(where: str, metadata: Mapping[str, str]) -> Claim:
         names=None if names is None else dict(enumerate(map(str, names))),
         preparation=_checked_preparation(where, content.get("preparation", {})),
         min_score=_checked_score(where, content),
+        usual_px=_checked_size(where, content),
     )
 
 
@@ -109,6 +114,15 @@ def _checked_score(where: str, content: Mapping[str, Any]) -> float | None:
     if not 0 <= score <= 1:
         raise PomonaError(f"{where}: min_score: found {score:g}, expected 0 to 1")
     return score
+
+
+def _checked_size(where: str, content: Mapping[str, Any]) -> float | None:
+    if "usual_px" not in content:
+        return None
+    size_px = number_in(where, "usual_px", content["usual_px"])
+    if not 1 <= size_px < math.inf:
+        raise PomonaError(f"{where}: usual_px: found {size_px:g}, expected 1 or more")
+    return size_px
 
 
 def _checked_preparation(where: str, given: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,8 @@ from pomona.detect.onnx.network import Network
 from pomona.detect.onnx.preparation import prepare
 from pomona.detect.onnx.signature import Signature, identify
 from pomona.detect.onnx.tiles import Tile, Tiling, lay_tiles, merge_tiles, read_tiling
-from pomona.detect.onnx.two_looks import ENLARGED, LARGEST_PX, LEAST, agreed
+from pomona.detect.onnx.two_looks import ENLARGED, LARGEST_PX, LEAST, Boxes, agreed
+from pomona.detect.onnx.usual_size import SHRUNK_LOOKS, SMALL_PX, shrunk_by
 from pomona.errors import PomonaError
 from pomona.recording import Frame
 
@@ -116,6 +117,11 @@ class OnnxDetector:
         return self.network.path
 
     @property
+    def least_px(self) -> float | None:
+        """Side of the boxes of a recording, in the median, below which it misses many; None where nobody knows."""
+        return None if self.signature.multiple_px is None else SMALL_PX
+
+    @property
     def inputs(self) -> list[Path]:
         """The file."""
         return [self.path]
@@ -202,10 +208,23 @@ class OnnxDetector:
     def _two_looks(self, picture: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         asked = self.selection
         least = replace(asked, min_score=LEAST)
-        first, second = (self._look(picture, least, enlarged) for enlarged in (1.0, ENLARGED))
-        largest_px = LARGEST_PX / self.signature.ratio((picture.shape[1], picture.shape[0]))
+        first, enlarged = self._in_usual_size(picture, least)
+        second = self._look(picture, least, ENLARGED * enlarged)
+        largest_px = LARGEST_PX / (enlarged * self.signature.ratio((picture.shape[1], picture.shape[0])))
         with np.errstate(all="ignore"):
             return agreed(first, second, self.iou, largest_px, asked.min_score)
+
+    def _in_usual_size(self, picture: NDArray[np.uint8], selection: Selection) -> tuple[Boxes, float]:
+        """Look at a picture shrunk until its fruits are as large as those that are learnt from; and how it is seen."""
+        ratio = self.signature.ratio((picture.shape[1], picture.shape[0]))
+        found, enlarged = self._look(picture, selection), 1.0
+        for _ in range(SHRUNK_LOOKS):
+            by = shrunk_by(found, ratio * enlarged, self.signature.usual_px)
+            if by == 1.0:
+                break
+            enlarged *= by
+            found = self._look(picture, selection, enlarged)
+        return found, enlarged
 
     def _look(
         self, picture: NDArray[np.uint8], selection: Selection, enlarged: float = 1.0

@@ -62,6 +62,8 @@ class Signature:
         Where the input is as large as the picture: sides are multiples of this.
     min_score : float or None
         Least confidence that the file asks for.
+    usual_px : float or None
+        Side of the fruits that it has learnt from, where the file says so.
     """
 
     family: str
@@ -72,6 +74,7 @@ class Signature:
     size_px: tuple[int, int]
     multiple_px: int | None = None
     min_score: float | None = None
+    usual_px: float | None = None
 
     def input_px(self, picture_px: tuple[int, int], enlarged: float = 1.0) -> tuple[int, int]:
         """Width and height of the input for a picture of such a size, `enlarged` where any size goes."""
@@ -146,6 +149,7 @@ def identify(network: Network, family: str | None = None, size_px: tuple[int, in
                 size_px=(LARGEST_SIDE_PX, LARGEST_SIDE_PX) if free else size_px,
                 multiple_px=candidate.multiple_px if free else None,
                 min_score=claim.min_score,
+                usual_px=claim.usual_px,
             )
     raise PomonaError(_unknown(network, layout, None if key is None else (key, FAMILIES[key])))
 

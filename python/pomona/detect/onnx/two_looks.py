@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pomona.detect.accuracy import areas, overlaps
 from pomona.detect.onnx.candidates import Candidates, suppress
 
-__all__ = ["ENLARGED", "LARGEST_PX", "LEAST", "agreed"]
+__all__ = ["ENLARGED", "LARGEST_PX", "LEAST", "Boxes", "agreed"]
 
 ENLARGED = 1.5
 """How much larger the second look sees the picture. On validation pictures 1.25 is better for fruits of 40 px and worse

@@ -9,8 +9,12 @@ from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
 from pomona.atomic import whole_file
-from pomona.detect.training.cache import cached
+from pomona.detect.accuracy import areas
+from pomona.detect.onnx.usual_size import USUAL_PX
+from pomona.detect.training.cache import Sample, cached
 from pomona.detect.training.finishing import finished, judged_on
 from pomona.detect.training.graph import network_in, write_network
 from pomona.detect.training.labels import Labelled
@@ -87,7 +91,8 @@ def fine_tune(
     plan = replace(PLAN, batches=batches, seed=seed)
     checkpoint = work / f"{_name_of(labelled, begin, plan)}.pt"
     begun = network_in(begin)
-    network = train([Source(cached(learnt, work), 1.0)], plan, checkpoint, begun, progress, stop=stop).eval()
+    samples = cached(learnt, work)
+    network = train([Source(samples, 1.0)], plan, checkpoint, begun, progress, stop=stop).eval()
     network, min_score, scaled = finished(network, kept)
     if stop():
         raise KeyboardInterrupt
@@ -99,13 +104,19 @@ def fine_tune(
         "calibration": asdict(scaled),
     }
     with whole_file(output) as partial:
-        write_network(partial, network, min_score, about)
+        write_network(partial, network, min_score, about, usual_px=_usual_px(samples))
         before, after = _precisions(begin, kept), _precisions(partial, kept)
     if after < before:
         message = f"{output}: finds less than what it began with, AP50 {after:.3f} against {before:.3f} before"
         warnings.warn(f"{message}: more pictures may help", PomonaWarning, stacklevel=2)
     fruits = sum(len(each.boxes_px) for each in labelled)
     return Trained(len(labelled), fruits, before, after, min_score, scaled)
+
+
+def _usual_px(learnt: Sequence[Sample]) -> float:
+    """Return the median side of the fruits; of smaller ones that of the shipped network's, which knows those too."""
+    boxes_px = np.concatenate([each.labelled.boxes_px for each in learnt])
+    return max(USUAL_PX, float(np.median(np.sqrt(areas(boxes_px)))) if len(boxes_px) else 0.0)
 
 
 def _precisions(model: Path, kept: Sequence[Labelled]) -> float:

@@ -40,7 +40,13 @@ QUANTIZED = "_quantized"
 
 
 def write_network(
-    path: Path, network: FruitNetwork, min_score: float, about: Mapping[str, Any], *, halved: bool = False
+    path: Path,
+    network: FruitNetwork,
+    min_score: float,
+    about: Mapping[str, Any],
+    *,
+    halved: bool = False,
+    usual_px: float | None = None,
 ) -> None:
     """Write a network without normalisations.
 
@@ -56,6 +62,8 @@ def write_network(
         What it was trained on, JSON values.
     halved : bool
         Whether the file holds its numbers in 16 bits; it calculates in 32 bits all the same.
+    usual_px : float, optional
+        Side of the fruits that it has learnt from, where it is another than the shipped network's.
     """
     graph = _Graph({name: weights.detach().numpy() for name, weights in network.state_dict().items()}, halved)
     graph.network()
@@ -69,6 +77,7 @@ def write_network(
     )
     model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
     own = {"version": 1, "family": "pomona", "names": ["fruit"], "min_score": round(min_score, 4)}
+    own |= {} if usual_px is None else {"usual_px": round(usual_px, 1)}
     model.metadata_props.add(key=OWN_KEY, value=json.dumps(own))
     model.metadata_props.add(key=MODEL_MARK.decode(), value=json.dumps(about))
     onnx.checker.check_model(model)

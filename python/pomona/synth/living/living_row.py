@@ -43,6 +43,9 @@ _TREES_MORE_BEHIND = 2
 """At each end: the row behind shows beside the row in front."""
 
 _PIECES_IN_ONE_BEHIND = 3
+_WINTER_DAYS, _SEASON_DAYS = 165, 200
+"""Before bloom nothing hangs, and after the last harvest nothing grows: together they are a year."""
+
 _SPURS_BEHIND = 0.6
 
 
@@ -88,8 +91,18 @@ class LivingRow:
         return self.crop.lives.states(self.days_after_bloom(day))
 
     def days_after_bloom(self, day: date) -> float:
-        """Days from bloom to a day."""
-        return float((day - self.design.bloom).days)
+        """Days from bloom to a day.
+
+        Raises
+        ------
+        PomonaError
+            The day is of another year: nothing of the model holds there.
+        """
+        days = (day - self.design.bloom).days
+        if not -_WINTER_DAYS <= days <= _SEASON_DAYS:
+            expected = f"one from {_WINTER_DAYS} days before bloom on {self.design.bloom} to {_SEASON_DAYS} after it"
+            raise PomonaError(f"date: found {day}, expected {expected}")
+        return float(days)
 
     def _on(self, day: date, wind: Wind | None, *, labelled: bool) -> RowGeometry:
         days = self.days_after_bloom(day)
