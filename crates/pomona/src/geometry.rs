@@ -122,6 +122,17 @@ impl Similarity {
         Ok(Self { rotation: Rotation3::from_matrix_unchecked(rotation), translation, scale })
     }
 
+    /// Checks that it is one, for its numbers may be anyone's.
+    ///
+    /// # Errors
+    /// A number that is not finite, a scale that is not above 0, a rotation that is none.
+    pub fn validate(&self) -> Result<()> {
+        if !(self.scale > 0.0 && self.translation.iter().all(|x| x.is_finite())) {
+            return Err(Error::Similarity { reason: "expected finite numbers and a scale above 0" });
+        }
+        Self::from_matrix(&self.to_matrix()).map(|_| ())
+    }
+
     /// Homogeneous 4x4 matrix with the scale folded in.
     pub fn to_matrix(&self) -> Matrix4<f64> {
         let mut matrix = (self.rotation.matrix() * self.scale).to_homogeneous();

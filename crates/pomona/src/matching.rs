@@ -218,13 +218,14 @@ impl MapIndex {
 impl MapIndex {
     /// Pairs of `query` and the map under `pose`, which is known: the final stage of the verified method alone.
     ///
-    /// The verdict is `Found`, or `TooFew` where there is next to nothing to pair; the registration is the given pose
-    /// refined on the pairs.
+    /// The verdict is `Found`, `NoMatch` where the pose pairs nothing, or `TooFew` where there is next to nothing to pair;
+    /// the registration is the given pose refined on the pairs.
     ///
     /// # Errors
-    /// A cloud or a value that is wrong; an index of another method.
+    /// A cloud, a pose or a value that is wrong; an index of another method.
     pub fn pairs_under(&self, query: &FruitCloud, pose: &Similarity, noise_m: Option<f64>) -> Result<Match> {
         query.validate()?;
+        pose.validate()?;
         let request = Request { method: self.method, scale: self.scale, noise_m, up: None, per_frame: false };
         request.validate()?;
         let query = Conditioned::new(query, self.scale).turned();
@@ -309,7 +310,7 @@ impl ReadyCloud {
 /// says it, at half the cost. `NoMatch` where that leaves any doubt, as it does where little is shared: then search.
 ///
 /// # Errors
-/// A value or a setting that is wrong.
+/// A pose, a value or a setting that is wrong.
 pub fn match_expected(
     query: &ReadyCloud,
     map: &ReadyCloud,
@@ -318,6 +319,7 @@ pub fn match_expected(
     config: &Config,
 ) -> Result<Match> {
     config.validate()?;
+    map_from_query.validate()?;
     let [(query, query_ready), (map, map_ready)] = [query, map].map(|ready| (&ready.given, &ready.prepared));
     let request = Request { noise_m: map.noise(noise_m)?, ..Request::default() };
     request.validate()?;
@@ -351,5 +353,24 @@ mod tests {
         assert!(named(ask(&Request { noise_m: Some(-1.0), ..Request::default() })));
         let up = Request { up: Some([Vector3::zeros(); 2]), ..Request::default() };
         assert_eq!(ask(&up).unwrap_err().to_string(), "up: expected a finite vector that is not zero");
+    }
+
+    #[test]
+    fn a_pose_that_is_none_is_refused_and_one_that_is_far_off_pairs_nothing() {
+        let place =
+            |row: usize| Point3::new((row % 12) as f64 * 0.31, (row / 12) as f64 * 0.27, (row * row % 7) as f64 * 0.1);
+        let cloud = FruitCloud::from_positions((0..60).map(place).collect());
+        let index =
+            MapIndex::new(&cloud, Method::Verified, Scale::Metric, Config::default()).expect("a map of 60 fruits");
+        let under = |pose: &Similarity| index.pairs_under(&cloud, pose, None);
+        let here = Similarity::identity();
+        assert_eq!(under(&here).expect("a pose").verdict, Verdict::Found);
+        for scale in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+            assert!(matches!(under(&Similarity { scale, ..here }), Err(Error::Similarity { .. })), "{scale}");
+        }
+        let far = |x: f64| Similarity { translation: Vector3::new(x, 0.0, 0.0), ..here };
+        assert!(matches!(under(&far(f64::NAN)), Err(Error::Similarity { .. })));
+        let found = under(&far(100.0)).expect("a pose");
+        assert_eq!((found.verdict, found.pairs.len()), (Verdict::NoMatch, 0));
     }
 }

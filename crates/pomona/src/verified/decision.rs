@@ -86,7 +86,9 @@ pub(crate) fn pairs_under(
     let seed = Hypothesis { pose, log_odds: f64::NAN, place: Vector3::zeros(), sigma };
     let mut finding = Finding::new(hold(&query, search.map, &seed, &Model { sigma, ..search.model }), seed);
     search.settle(&mut finding);
-    search.answer(Findings { accepted: vec![finding], ..Findings::none(Effort::default(), 0.0) }, Vec::new())
+    let found =
+        search.answer(Findings { accepted: vec![finding], ..Findings::none(Effort::default(), 0.0) }, Vec::new());
+    if found.pairs.is_empty() { Match::without_answer(Verdict::NoMatch, found.stages) } else { found }
 }
 
 impl Match {
