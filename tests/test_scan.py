@@ -176,6 +176,22 @@ def test_a_wrong_depth_unit_is_said(run_here, tmp_path, unit_m, diameter):
     assert re.search(said, done.stderr)
 
 
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"fy": 0.7 * FIELDS["fx"]}, "fy: found"),
+        ({"cx": 0.5}, "cx: found 0.5, expected about the middle"),
+        ({}, None),
+    ],
+)
+def test_a_camera_that_is_no_rectified_one_is_told(run_here, tmp_path, changed, said):
+    folder = make_recording(tmp_path / "2024-08-09")
+    (folder / "calibration.json").write_text(json.dumps({**FIELDS, **changed}))
+    err = run_here("scan", folder, "-o", tmp_path / "fruits.csv").stderr
+    assert ("expected about" in err) == (said is not None)
+    assert said is None or said in err
+
+
 def test_frames_without_poses_and_colour_are_refused(run_here, tmp_path):
     folder = make_recording(tmp_path / "row", (0.0, 0.1), poses=False)
     output = tmp_path / "session.gpkg"

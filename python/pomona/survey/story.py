@@ -49,6 +49,9 @@ MEDIAN_M = (0.01, 0.25)
 """Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm, in one of five times as much 30 cm. Single
 fruits may be smaller, or larger."""
 
+UNSQUARE = 0.1
+"""Part by which fx and fy may differ: pixels are square, and rectified pictures are as wide as high."""
+
 OFF_CENTRE = 0.25
 """Part of a side of the pictures by which the principal point may lie off their middle."""
 
@@ -170,7 +173,7 @@ def scan(
         recording = straightened(recording)
     if not (odometry or slam):
         check_poses(recording)
-    _check_centre(recording)
+    _check_camera(recording)
     seeing = Seeing(recording, detector, depth=depth)
     look_at: Callable[[Frame], Look] = keep.remembering(seeing) if keep is not None else seeing
     look_at = Standing(look_at, seeing.needs)
@@ -292,9 +295,15 @@ def _check_pace(recording: Recording, survey: Survey) -> None:
             return
 
 
-def _check_centre(recording: Recording) -> None:
-    """Warn where the principal point is far from the middle of the pictures: all places are turned aside by it."""
+def _check_camera(recording: Recording) -> None:
+    """Warn where pixels are not square, or the principal point is far from the middle of the pictures.
+
+    Sizes are wrong by the one, and all places are turned aside by the other.
+    """
     calibration = recording.calibration
+    if not 1 - UNSQUARE < calibration.fx / calibration.fy < 1 + UNSQUARE:
+        found = f"found {calibration.fy:g} beside fx {calibration.fx:g}, expected about as much"
+        warnings.warn(f"{recording.path}: fy: {found}", PomonaWarning, stacklevel=3)
     sides = {"cx": (calibration.cx, calibration.width), "cy": (calibration.cy, calibration.height)}
     for name, (found_px, size_px) in sides.items():
         if abs(found_px / size_px - 0.5) > OFF_CENTRE:
