@@ -104,7 +104,10 @@ def test_pictures_without_colour_are_told_where_the_shipped_model_looks(row):
     grey = np.tile(np.arange(640, dtype=np.uint8)[None, :, None], (480, 1, 3))
     grey[..., 0] ^= 7  # as H.264 leaves it
     assert cv2.imwrite(str(row / "left" / "0000.png"), grey)
-    with pytest.warns(PomonaWarning, match="the pictures have no colour, and the detector that is inside finds few"):
+    with pytest.warns(
+        PomonaWarning,
+        match="the pictures have no colour, and the detector that is inside finds few fruits so: give --model",
+    ):
         open_detector(None, None, open_recording(row))
     # A model of one's own may have learnt from such pictures: no warning, which would be an error here.
     open_detector(None, model_named(SHIPPED), open_recording(row))

@@ -239,6 +239,21 @@ def test_no_input_is_destroyed(pomona, tmp_path):
     assert pomona("detect", folder, other / NAMES[0], "-o", tmp_path / "b.csv")[0] == 2  # two of one name
 
 
+@pytest.mark.parametrize(("change", "told"), [("grey", "no colour"), ("turned", "red and blue exchanged"), ("", None)])
+def test_colours_that_are_amiss_are_told(pomona, tmp_path, change, told):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    for name in NAMES:
+        picture = cv2.imread(str(PICTURES / name))
+        grey = np.repeat(picture.mean(axis=2, keepdims=True).astype(np.uint8), 3, axis=2)
+        given = {"grey": grey, "turned": picture[:, :, ::-1]}.get(change, picture)
+        assert cv2.imwrite(str(folder / name), given)
+    code, _, err = pomona("detect", folder, "-o", tmp_path / "boxes.csv")
+    assert code == 0
+    assert (f"2 pictures have {told}, and the detector that is inside finds few fruits there" in err) == bool(told)
+    assert ("the detector that is inside" in err) == bool(told)
+
+
 def test_what_is_no_picture_in_a_folder_ends_nothing_and_one_given_twice_is_one(pomona, tmp_path):
     folder = tmp_path / "pictures"
     shutil.copytree(PICTURES, folder)

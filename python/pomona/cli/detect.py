@@ -46,7 +46,7 @@ def detect(
     from pomona.detect.onnx import OnnxDetector
     from pomona.detect.picture_boxes import table_of
     from pomona.detect.picture_file import pictures_in
-    from pomona.detect.shipped import model_named
+    from pomona.detect.shipped import is_shipped, model_named
     from pomona.file_names import require_suffix
     from pomona.outputs import refuse_inputs
 
@@ -56,7 +56,7 @@ def detect(
     refuse_inputs(outputs, [*named.values(), model_named(model)])
     detector = OnnxDetector.open(model_named(model), min_score=min_score, tiles=tiles, augment=augment)
     with counting("detecting", len(named)) as progress:
-        found, skipped = detect_in(named, detector, plot, progress)
+        found, skipped = detect_in(named, detector, plot, progress, is_inside=is_shipped(model))
     with whole_file(output) as partial:
         partial.write_text(table_of(found.items()), encoding="utf-8")
     if json:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from pomona.amounts import amount
+from pomona.detect.colour_check import colour_amiss, tell_amiss
 from pomona.detect.detections import Detections
 from pomona.detect.drawn_boxes import draw_boxes, drawn_name
 from pomona.detect.onnx import OnnxDetector
@@ -22,6 +23,8 @@ def detect_in(
     detector: OnnxDetector,
     drawn: Path | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
+    *,
+    is_inside: bool = False,
 ) -> tuple[dict[str, Detections], dict[str, str]]:
     """Find the fruits of each picture by its name; one that cannot be read is skipped, and a warning says so.
 
@@ -34,6 +37,9 @@ def detect_in(
         Folder to draw the boxes into, made where it is not there.
     progress : callable
         Told how many of how many are done.
+    is_inside : bool
+        Whether the detector is the one that is inside, which knows fruits by their colours: where these are amiss a
+        warning says so.
 
     Returns
     -------
@@ -49,6 +55,7 @@ def detect_in(
     """
     found: dict[str, Detections] = {}
     skipped: dict[str, str] = {}
+    colours: list[str] = []
     for name, path in pictures.items():
         try:
             picture = read_picture(path)
@@ -58,10 +65,13 @@ def detect_in(
                 raise
             continue
         found[name] = detector.detect(picture)
+        if is_inside and (amiss := colour_amiss(picture)) is not None:
+            colours.append(amiss)
         if drawn is not None:
             drawn.mkdir(exist_ok=True)
             draw_boxes(drawn / drawn_name(name), picture, found[name])
         progress(len(found) + len(skipped), len(pictures))
+    tell_amiss(colours)
     if skipped:
         message = f"skipped {len(skipped)} of {amount(len(pictures), 'picture')}, first {next(iter(skipped.values()))}"
         warnings.warn(message, PomonaWarning, stacklevel=2)
