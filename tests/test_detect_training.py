@@ -65,6 +65,15 @@ def test_a_model_of_another_name_is_refused_before_any_work(pomona, own, tmp_pat
     begin = tmp_path / "none.onnx"
     code, _, err = pomona("train", own, "--boxes", tmp_path / "boxes.csv", "-o", tmp_path / "my.onnx", "--begin", begin)
     assert (code, err) == (2, f"pomona: {begin}: not found, expected a model\n")
+
+
+def test_what_a_training_cannot_begin_with_is_said_before_the_extra_is_asked_for(pomona, own, tmp_path):
+    table, made = tmp_path / "boxes.csv", tmp_path / "my.onnx"
+    code, _, err = pomona("train", own, "--boxes", table, "-o", made, "--begin", table)
+    assert (code, "torch" in err) == (2, False)
+    assert str(table) in err
+    code, _, err = pomona("train", own, "--boxes", table, "-o", made, "--work", table)
+    assert (code, err) == (2, f"pomona: {table}: found a file, expected a folder for the state of the training\n")
     assert not list(tmp_path.glob("*.training"))
 
 

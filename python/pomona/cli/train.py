@@ -10,6 +10,7 @@ import typer
 from pomona.amounts import amount
 from pomona.cli.terminal import say, say_json, tell
 from pomona.cli.verbs import Writes
+from pomona.errors import PomonaError
 from pomona.likes import MODEL
 
 
@@ -47,10 +48,13 @@ def train(
     require_file(model_named(begin), "a model")
     refuse_inputs([output], [*pictures_in(pictures).values(), boxes, model_named(begin)])
     labelled = labelled_pictures(pictures, boxes)
+    _require_ours(model_named(begin))
+    folder = work or output.parent / f"{output.name}.training"
+    if folder.exists() and not folder.is_dir():
+        raise PomonaError(f"{folder}: found a file, expected a folder for the state of the training")
     require_train()
     from pomona.detect.training.fine_tuning import fine_tune
 
-    folder = work or output.parent / f"{output.name}.training"
     kept = 0
 
     def tell_done(done: int, _loss: float) -> None:
@@ -84,3 +88,12 @@ def train(
         f"  AP50 on the fifth kept apart: {made.before:.3f} before, {made.after:.3f} now",
         f"  counts are right from a score of {made.min_score:.2f} on, which it takes by itself",
     )
+
+
+def _require_ours(model: Path) -> None:
+    """Refuse a model of another family before anything else is asked for."""
+    from pomona.detect.onnx import OnnxDetector
+
+    family = OnnxDetector.open(model).signature.family
+    if family != "pomona":
+        raise PomonaError(f"{model}: found a model of {family}, expected the shipped one or one trained from it")
