@@ -46,8 +46,9 @@ FALSE_SPREAD = 0.3
 """The same of the logarithm of a visit's false points: light, dust and detectors make them, visit by visit."""
 
 LIGHT_SPREAD = 0.05
-"""Of the logit of a visit's chances to see any fruit, about those of a usual visit, as for leaves. One visit in thirty
-is off by 1 and more: it was dark, the drive was fast, the lens was dirty."""
+"""Of the logit of the last visit's chances to see any fruit, about those of a usual visit, as for leaves. One visit in
+sixty sees by 1 and more less: it was dark, the drive was fast, the lens was dirty. Of the visits before it later ones
+tell; were they free, too, small errors of the classes would be taken for light, and fruits for gone."""
 
 FARTHEST_OFF = 30.0
 """Of a visit from the others, half widths."""
@@ -130,8 +131,8 @@ class HistoryOdds:
     $v$ the share $h_v$ goes. So a history has the probability $P$, and some visit sees a fruit there with $S$. Beside
     each that hangs a visit has $\rho_v = e^{g_v} c_0 f / (1 - f)$ false points, which no other visit sees: $f$ is their
     share of what a first look sees, and $g_v$ is 0 where visits are alike. What looks before had missed a visit sees
-    with $\mathrm{logit}\, c_j + l_v$, and whatever it sees by $d_v$ of the logit more surely. Of what was seen at a
-    place by visit $w$, of those that looked there,
+    with $\mathrm{logit}\, c_j + l_v$, and the last visit sees all by $d$ of the logit more surely, 0 unless it is asked
+    whether it was dark. Of what was seen at a place by visit $w$, of those that looked there,
 
     $$L = \prod \frac{q\, P + u\, \rho_w\, [\mathrm{it\ alone\ saw\ it}]}{S + \sum_v \rho_v}$$
 
@@ -164,11 +165,10 @@ class HistoryOdds:
         logits = np.log(CHANCES_OF_SEEING / (1.0 - CHANCES_OF_SEEING))
         self.told = logits - logits[0]
         self.in_part = np.arange(len(logits)) >= len(logits) - len(_BY_VIEWS)
-        first = 3 + len(self.told)
-        self.of_leaves, self.of_false, self.of_light = (
-            slice(first + part * self.n_visits, first + (part + 1) * self.n_visits) for part in range(3)
-        )
-        self.of_visits = slice(self.of_leaves.start, self.of_light.stop)
+        first, self.of_light = 3 + len(self.told), 3 + len(self.told) + 2 * self.n_visits
+        self.of_leaves = slice(first, first + self.n_visits)
+        self.of_false = slice(first + self.n_visits, self.of_light)
+        self.of_visits = slice(first, self.of_light + 1)
         counted = one.first_views != UNCOUNTED
         share = np.count_nonzero(counted) / max(len(counted), 1)
         self.once_seen = np.zeros(len(logits))
@@ -183,17 +183,17 @@ class HistoryOdds:
         usual is to be tried.
         """
         own = np.zeros(self.n_own)
-        own[self.of_light.stop - 1] = last_light / LIGHT_SPREAD
+        own[self.of_light] = last_light / LIGHT_SPREAD
         believed = np.where(self.goes, self.share_gone, SHARE_GONE)
         if last_gone is not None:
             believed[-1:] = last_gone
         return np.concatenate([own, np.log(believed / (1.0 - believed))])
 
-    def bounds(self, *, alike: bool) -> list[tuple[float, float]]:
-        """Return how far from that each of it may be; visits that are `alike` differ in their light alone."""
+    def bounds(self, *, alike: bool, dark: bool = False) -> list[tuple[float, float]]:
+        """Return how far from that each of it may be; visits that are `alike` do not differ, the last may be `dark`."""
         own = [(-FARTHEST, FARTHEST)] * self.n_own
         most = 0.0 if alike else FARTHEST_OFF
-        own[self.of_visits] = [(-most, most)] * (2 * self.n_visits) + [(-DARKEST, DARKEST)] * self.n_visits
+        own[self.of_visits] = [*[(-most, most)] * (2 * self.n_visits), (-DARKEST if dark else 0.0, 0.0)]
         return own + [FARTHEST_LEAVING] * (self.n_visits - 1)
 
     @property
@@ -232,7 +232,7 @@ class HistoryOdds:
                 OWN_SPREAD * of_classes,
                 LEAVES_SPREAD * of_logit @ self.was_missed,
                 FALSE_SPREAD * of_rates,
-                LIGHT_SPREAD * of_logit.sum(axis=1),
+                [LIGHT_SPREAD * of_logit[-1].sum()],
             ]
         )
         again, of_again = self._again(told)
@@ -333,9 +333,8 @@ class HistoryOdds:
 
     def _chances(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the chance of each visit to see a fruit of each class, (V, C)."""
-        of_visits = (
-            LEAVES_SPREAD * told[self.of_leaves, None] * self.was_missed + LIGHT_SPREAD * told[self.of_light, None]
-        )
+        of_visits = LEAVES_SPREAD * told[self.of_leaves, None] * self.was_missed
+        of_visits[-1] += LIGHT_SPREAD * told[self.of_light]
         return np.asarray(MOST_SEEING / (1.0 + np.exp(-self._logits(told) - of_visits)))
 
     def _again(self, told: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

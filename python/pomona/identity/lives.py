@@ -58,8 +58,14 @@ LEVEL = 0.01
 """Probabilities that differ by less are of fruits that are gone as surely."""
 
 
-Fits = dict[int, tuple[float, NDArray[np.float64]]]
-"""Log posterior of each share that counts, by its number, and what fits it best."""
+Top = tuple[float, NDArray[np.float64]]
+"""Log posterior of a share of false points, and what fits it best."""
+
+Bounds = list[tuple[float, float]]
+"""Of each setting."""
+
+Fits = dict[int, Top]
+"""Of each share that counts, by its number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +120,7 @@ def explained(histories: Histories, *, at_a_glance: bool = False) -> float:
     if not at_a_glance:
         return _best_ways(odds)[1]
     with _one_thread():
-        return _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start(), alike=True)[0]
+        return _climbed(odds, SHARES_FALSE[USUAL_FALSE], odds.start(), odds.bounds(alike=True))[0]
 
 
 def _one_thread() -> AbstractContextManager[object]:
@@ -139,25 +145,26 @@ def _ways(odds: HistoryOdds, *, alike: bool) -> list[Fits]:
 
     As far as these are other ways: by the shares that go. Whether it was dark is asked where many seem to have gone.
     """
-    climbed = partial(_climbed, odds, SHARES_FALSE[USUAL_FALSE], alike=alike)
-    tops = [climbed(odds.start()), climbed(odds.start(HALF_GONE))]
-    if max(odds.leaving(told)[-1] for _, told in tops) > OTHER:
-        tops.append(climbed(odds.start(last_light=DARK)))
-    ways: list[tuple[float, NDArray[np.float64]]] = []
-    for top in tops:
-        if all(np.abs(odds.leaving(top[1]) - odds.leaving(told)).max() > OTHER for _, told in ways):
-            ways.append(top)
-    return [_fits(odds, top, alike=alike) for top in ways]
+    climbed = partial(_climbed, odds, SHARES_FALSE[USUAL_FALSE])
+    usual, dark = odds.bounds(alike=alike), odds.bounds(alike=alike, dark=True)
+    tops = [(climbed(start, usual), usual) for start in (odds.start(), odds.start(HALF_GONE))]
+    if max(odds.leaving(told)[-1] for (_, told), _ in tops) > OTHER:
+        tops.append((climbed(odds.start(last_light=DARK), dark), dark))
+    ways: list[tuple[Top, Bounds]] = []
+    for top, bounds in tops:
+        if all(np.abs(odds.leaving(top[1]) - odds.leaving(told)).max() > OTHER for (_, told), _ in ways):
+            ways.append((top, bounds))
+    return [_fits(odds, *way) for way in ways]
 
 
-def _fits(odds: HistoryOdds, usual: tuple[float, NDArray[np.float64]], *, alike: bool) -> Fits:
+def _fits(odds: HistoryOdds, usual: Top, bounds: Bounds) -> Fits:
     """Follow the top at the usual share to those of all shares that count."""
     fits = {USUAL_FALSE: usual}
     best = usual[0]
     for numbers in (range(USUAL_FALSE - 1, -1, -1), range(USUAL_FALSE + 1, len(SHARES_FALSE))):
         told = usual[1]
         for number in numbers:
-            fits[number] = _climbed(odds, SHARES_FALSE[number], told, alike=alike)
+            fits[number] = _climbed(odds, SHARES_FALSE[number], told, bounds)
             best, told = max(best, fits[number][0]), fits[number][1]
             if fits[number][0] < best - HARDLY:
                 break
@@ -168,13 +175,10 @@ def _best(fits: Fits) -> float:
     return max(log_posterior for log_posterior, _ in fits.values())
 
 
-def _climbed(
-    odds: HistoryOdds, share: float, told: NDArray[np.float64], *, alike: bool
-) -> tuple[float, NDArray[np.float64]]:
+def _climbed(odds: HistoryOdds, share: float, told: NDArray[np.float64], bounds: Bounds) -> Top:
     """Return the log posterior of a share, by the top at this share from `told` on, and where that is."""
     from scipy.optimize import minimize
 
-    bounds = odds.bounds(alike=alike)
     # A step remembered for each setting: settings hang together, and with ten steps it takes twice as many looks.
     top = minimize(
         odds, told, (share,), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8, "maxcor": len(told)}

@@ -64,9 +64,9 @@ def seen_parts(
     """Return the part in which a session was found, and others in which lies what it saw beyond; none where in none.
 
     How parts lie to each other nobody knows, so a session that saw two has two poses in the map: it is torn apart
-    there, or neither pose stands out. Then each part is asked by itself.
+    there, or neither pose stands out of the other. Then each part is asked by itself.
     """
-    if found.match.status.value == "Ambiguous":
+    if found.match.status.value == "Ambiguous" or _is_outdone(found):
         return _asked_apart(connection, cloud, settings)
     if found.match.n_parts > 1 and (apart := _asked_apart(connection, cloud, settings)):
         return apart
@@ -80,6 +80,11 @@ def seen_parts(
             break
         found = recognised(connection, cloud.select(rows), settings, others)
     return parts
+
+
+def _is_outdone(found: Recognised) -> bool:
+    """Whether there would be a pose but for another that is as good."""
+    return found.match.status.value == "NoMatch" and dict(found.match.stages).get("rivals") == 1.0
 
 
 def _asked_apart(connection: sqlite3.Connection, cloud: FruitCloud, settings: Settings) -> list[SeenPart]:

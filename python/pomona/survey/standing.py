@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pomona.detect import Detections
 from pomona.recording import Frame
+from pomona.recording.checks.readable import is_blank
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.depth import Lifted
 from pomona.survey.prefetch import Kind
@@ -48,9 +49,13 @@ class Standing:
     def __call__(self, frame: Frame) -> Look:
         """Look at the next frame; `Look.unusable` where a picture is that of a frame before."""
         try:
-            seen = [_thinned(read()) for read in self._readers(frame)]
+            pictures = [read() for read in self._readers(frame)]
         except UnreadablePictureError:
             return self._look_at(frame)
+        # Plain pictures are all alike, and whoever looks says so.
+        if not pictures or any(is_blank(picture) for picture in pictures):
+            return self._look_at(frame)
+        seen = [_thinned(picture) for picture in pictures]
         reason = self._nothing_new(seen)
         self._last.appendleft((frame.number, seen))
         if reason is None:

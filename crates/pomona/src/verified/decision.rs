@@ -38,7 +38,7 @@ const GROWN: usize = 6;
 
 /// Rows found with less than this many times the evidence needed are laid along rows too, for of few fruits in common seeds show a
 /// part.
-const CLEAR: f64 = 2.0;
+pub(super) const CLEAR: f64 = 2.0;
 
 /// Poses that a search by seeds has to have grown before one can stand out: fewer do not say what chance reaches.
 const SHOWN: usize = 4;

@@ -3,10 +3,9 @@
 //! Each pose is found on its own, has enough evidence, and pairs other fruits. So they are no rivals but parts of one answer: the
 //! pairs are those of all parts, the pose is that of the part with most evidence.
 
-use super::acceptance::SURE;
 use super::axes::along;
 use super::case::{Finding, Search};
-use super::decision::MIN_FRUITS;
+use super::decision::{CLEAR, MIN_FRUITS};
 use super::overlap::Overlap;
 use super::settlement::{Settled, settle_together};
 use nalgebra::Vector3;
@@ -84,15 +83,15 @@ impl Search<'_> {
         joined
     }
 
-    /// Whether a finding may be a part that was torn off another, as far as it is not sure by itself: a row that is torn keeps its direction
-    /// and its order.
+    /// Whether a finding may be a part that was torn off another, unless it has far more evidence than a stem has: a row that is torn keeps its
+    /// direction and its order.
     ///
     /// Stems that stand apart and are nearly copies of each other, as of bananas, are found one by one, each turned as it likes, in any
     /// order.
     pub(super) fn may_be_torn_off(&self, finding: &Finding, other: &Finding) -> bool {
         let [own, others] = [finding, other].map(Finding::as_it_stands);
         let turn = others.pose.rotation.rotation_to(&own.pose.rotation).angle();
-        finding.rated().nats > SURE * self.least() || (turn < TORN_RAD && !self.passes(own, others))
+        finding.rated().nats > CLEAR * self.least() || (turn < TORN_RAD && !self.passes(own, others))
     }
 
     /// Whether one passes as many fruits of another along the row as it has itself, on its way from where that one puts it.

@@ -43,8 +43,8 @@ _TREES_MORE_BEHIND = 2
 """At each end: the row behind shows beside the row in front."""
 
 _PIECES_IN_ONE_BEHIND = 3
-_WINTER_DAYS, _SEASON_DAYS = 165, 200
-"""Before bloom nothing hangs, and after the last harvest nothing grows: together they are a year."""
+_DAYS_BEFORE, _DAYS_AFTER = 115, 250
+"""Days about bloom on which a row can stand: the year, where it blooms in April."""
 
 _SPURS_BEHIND = 0.6
 
@@ -99,8 +99,8 @@ class LivingRow:
             The day is of another year: nothing of the model holds there.
         """
         days = (day - self.design.bloom).days
-        if not -_WINTER_DAYS <= days <= _SEASON_DAYS:
-            expected = f"one from {_WINTER_DAYS} days before bloom on {self.design.bloom} to {_SEASON_DAYS} after it"
+        if not -_DAYS_BEFORE <= days <= _DAYS_AFTER:
+            expected = f"one from {_DAYS_BEFORE} days before bloom on {self.design.bloom} to {_DAYS_AFTER} after it"
             raise PomonaError(f"date: found {day}, expected {expected}")
         return float(days)
 
