@@ -33,8 +33,10 @@ pub(crate) struct Growth<'a> {
     pub(super) partners: Vec<Option<u32>>,
     /// Evidence of every cell that is reached, nats.
     log_odds: Vec<f64>,
-    /// The pose is known to hold everywhere and the noise is given.
+    /// The pose is known to hold everywhere, and the noise is not what its pairs show.
     pub(super) whole: bool,
+    /// Noise under which all fruits together say most, metres of the map, where they were asked.
+    pub(super) sharpest: Option<f64>,
 }
 
 /// Grows a hypothesis as far as the evidence goes.
@@ -89,7 +91,7 @@ impl<'a> Growth<'a> {
             nearest.reached = true;
         }
         let log_odds = vec![0.0; patches.cells.len()];
-        Self { patches, partners: vec![None; query.len()], log_odds, whole: false }
+        Self { patches, partners: vec![None; query.len()], log_odds, whole: false, sharpest: None }
     }
 
     /// Predicts the fruits of the reached cells, and finds their nearest partners; of several claims on one fruit the likeliest

@@ -59,7 +59,7 @@ impl<'a> Search<'a> {
         let sigma = soft::sharpest(self.query, self.map, few, &[found.overlap.pose]);
         let seed = Hypothesis { pose: found.overlap.pose, sigma, ..found.seed };
         let mut growth = lay(self.query, self.map, &seed, &Model { sigma, ..*few });
-        growth.whole = true;
+        (growth.whole, growth.sharpest) = (true, Some(sigma));
         let mut again = Finding::new(growth, seed);
         again.overlap.log_odds = again.overlap.log_odds.max(found.overlap.log_odds);
         self.settle(&mut again);

@@ -119,9 +119,8 @@ fn paired(parts: &mut [Settlement], cue: Option<&Cue>) -> Vec<Beliefs> {
 
 impl<'a> Settlement<'a> {
     fn new(growth: &Growth<'a>, noise_m: Option<f64>, direction: &Direction) -> Self {
-        let expected = match noise_m {
+        let expected = match noise_m.or(growth.sharpest) {
             Some(sigma) => KnownNoise { sigma, width: GIVEN },
-            None if growth.whole => KnownNoise { sigma: growth.patches.sigma, width: GIVEN },
             None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
         };
         let mut patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
