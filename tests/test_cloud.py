@@ -123,3 +123,21 @@ def test_transformed_turns_scales_and_moves(full_cloud: FruitCloud, scale: float
     np.testing.assert_allclose(moved.diameters_m[0], scale * 0.07)
     back = moved.transformed(np.linalg.inv(map_from_query))
     np.testing.assert_allclose(back.positions, cloud.positions, atol=1e-9)
+
+
+def test_what_was_checked_stays_so_whatever_becomes_of_the_arrays() -> None:
+    """A robot reads every frame into the same memory."""
+    given, sizes_m = np.arange(12.0).reshape(4, 3), np.full(4, 0.07)
+    cloud = FruitCloud(given, diameters_m=sizes_m)
+    part = FruitCloud(given[1:3])
+    given[:], sizes_m[:] = np.nan, -1.0
+    assert cloud.positions.tolist() == np.arange(12.0).reshape(4, 3).tolist()
+    assert part.positions.tolist() == [[3, 4, 5], [6, 7, 8]]
+    assert cloud.diameters_m is not None
+    assert cloud.diameters_m.tolist() == [0.07] * 4
+    with pytest.raises(ValueError, match="read-only"):
+        cloud.positions[0] = 0.0
+
+
+def test_an_empty_list_is_a_cloud_without_fruits() -> None:
+    assert FruitCloud([]).positions.shape == (0, 3)  # type: ignore[arg-type]

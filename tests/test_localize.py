@@ -1,6 +1,8 @@
 """Where the camera is in a map: poses, covariances that are honest, tracking, and what cannot be found."""
 
+import copy
 import gc
+import pickle
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -485,3 +487,17 @@ def test_a_setting_that_is_no_number_and_an_index_that_is_no_path_are_told() -> 
         Localizer(fruits, config={"localization": {"own_m": float("nan")}})
     with pytest.raises(PomonaError, match="index: found int, expected the path of a file"):
         Localizer(fruits, index=3)
+
+
+def test_what_is_not_found_is_not_known_exactly(fresh):
+    lost = fresh.update(EMPTY)
+    assert lost.map_from_camera is None
+    assert np.isnan(lost.sigma_m)
+    assert np.isnan(lost.covariance).all()
+
+
+def test_a_localizer_is_not_copied(fresh):
+    """A shallow copy would share where the camera was."""
+    for taken in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="make another of the same map"):
+            taken(fresh)

@@ -349,3 +349,15 @@ def test_more_fruits_than_the_paper_can_hold_are_refused() -> None:
     lattice[:, :2] += 1e-4 * lattice[:, 1::-1]
     with pytest.raises(pomona.PomonaError, match="2000000 fruits of the map give up to 420000000 constellations"):
         pomona.match(row(), lattice, method="paper")
+
+
+def test_a_pose_that_was_written_with_four_decimals_goes_back_in() -> None:
+    query = row()
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = TURN, SHIFT
+    found = pomona.Index(query @ TURN.T + SHIFT).pairs_under(query, np.round(pose, 4))
+    assert found.pairs.tolist() == [[fruit, fruit] for fruit in range(len(query))]
+    sheared = pose.copy()
+    sheared[0, 1] += 0.02
+    with pytest.raises(pomona.PomonaError, match="sheared"):
+        pomona.Index(query).pairs_under(query, sheared)

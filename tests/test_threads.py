@@ -73,3 +73,10 @@ def test_far_too_many_give_the_same_answer(here: Path) -> None:
     commands = [[POMONA, "match", "query.csv", "map.csv", "-o", "-", "--threads", n] for n in ("1", "99999999")]
     one, many = (subprocess.run(command, capture_output=True, cwd=here, check=True).stdout for command in commands)
     assert one == many
+
+
+def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
+    assert capped_threads(np.int64(1)) == 1
+    assert len(package.match(CLOUD, CLOUD, threads=np.int32(1)).pairs) == len(CLOUD)
+    with pytest.raises(PomonaError, match="expected a whole number from 1"):
+        capped_threads(np.bool_(True))  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 
-__all__ = ["checked_array", "definite_matrices", "rigid_matrices", "rigid_motions"]
+__all__ = ["checked_array", "definite_matrices", "kept_array", "rigid_matrices", "rigid_motions"]
 
 RIGID = 1e-3
 """How far a rotation may be from one: its numbers may come from text, or from sums of many motions."""
@@ -31,6 +31,8 @@ def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, .
         array = np.ascontiguousarray(values, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
         raise PomonaError(f"{name}: expected an array of {np.dtype(dtype).name}") from None
+    if array.shape == (0,) and shape[0] is None and None not in shape[1:]:
+        array = array.reshape(0, *shape[1:])  # an empty list says nothing of how long its rows are
     fits = array.ndim == len(shape) and all(
         want is None or found == want for found, want in zip(array.shape, shape, strict=True)
     )
@@ -40,6 +42,15 @@ def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, .
         raise PomonaError(f"{name}: found shape ({found}), expected ({wanted})")
     if array.dtype.kind == "i" and (given := np.asarray(values)).dtype.kind == "f" and (given != array).any():
         raise PomonaError(f"{name}: found {given[given != array][0]:g}, expected whole numbers")
+    return array
+
+
+def kept_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """Return `checked_array` as one that nobody writes into: what was checked stays so."""
+    array = checked_array(name, values, dtype, shape)
+    if array.flags.writeable:
+        array = array.copy() if np.may_share_memory(array, np.asarray(values)) else array
+        array.flags.writeable = False
     return array
 
 

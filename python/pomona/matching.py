@@ -53,10 +53,12 @@ def match(
     method
         "verified", or "paper" for the published method.
     noise_m
-        Standard deviation per axis of the difference of the two visits; None: estimated.
+        Standard deviation per axis of the difference of the two visits, metres, known to a tenth or so: what the
+        verified method begins with, and `Match.noise_m` is what it ends with; the published method takes it as it is.
+        None: estimated.
     up
-        The vertical in the query's and in the map's frame, where it is known to some 5 degrees; a pose that leans by
-        more than 10 is refused.
+        The vertical in the query's and in the map's frame, or one for both, where it is known to some 5 degrees; a pose
+        that leans by more than 10 is refused (verified only: the published method knows no vertical).
     per_frame
         Give each frame of the query a transform of its own and merge their pairs (paper only). The query must know
         which frame saw which fruit.

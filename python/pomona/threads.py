@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from numbers import Integral
 from typing import Any
 
 from pomona.errors import PomonaError
@@ -23,8 +24,9 @@ def require_threads(asked: Any, place: str = "threads") -> int:
     PomonaError
         When it is no whole number from 1.
     """
-    if isinstance(asked, int) and not isinstance(asked, bool) and asked >= 1:
-        return asked
+    # Those of NumPy are whole numbers, too.
+    if isinstance(asked, Integral) and not isinstance(asked, bool) and asked >= 1:
+        return int(asked)
     raise PomonaError(f"{place}: found {asked!r}, expected a whole number from 1")
 
 

@@ -1,6 +1,7 @@
 //! How much of boxes looks like fruit.
 
 use crate::lifting::boxes;
+use crate::threads::detached;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pomona::look;
 use pomona::stereo::Picture;
@@ -26,7 +27,7 @@ pub fn look_of<'py>(
         return Err(PyValueError::new_err(format!("picture: found {channels} channels, expected 3")));
     }
     let values = picture.as_slice()?;
-    let found = py.detach(|| look::look_of(Picture::new(values, width), &boxes));
+    let found = detached(py, || look::look_of(Picture::new(values, width), &boxes))?;
     let given = |values| PyArray1::from_vec(py, values);
     let colours = PyArray1::from_iter(py, found.colours.into_iter().flatten()).reshape([boxes.len(), channels])?;
     Ok((colours, given(found.fruitness), given(found.fruit_px), given(found.elsewhere)))

@@ -2,6 +2,7 @@
 
 use crate::cloud::{points, rows};
 use crate::pose::{pose_arrays, poses};
+use crate::threads::detached;
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
@@ -118,13 +119,12 @@ pub fn adjust<'py>(
     let (fixed, observations) = (fixed.as_array().to_vec(), places.to_observations()?);
     // Sightings are places; there are no pictures to project into.
     let problem = Problem { camera: Camera::UNIT, fixed, observations, relative_poses };
-    let (found, of_poses) = py
-        .detach(|| {
-            let found = adjust_bundle(&problem, initial, &Settings::after_drift())?;
-            let of_poses = if pose_covariances { found.pose_covariances() } else { None };
-            Ok::<_, pomona::Error>((found, of_poses))
-        })
-        .map_err(wrong)?;
+    let adjust = || {
+        let found = adjust_bundle(&problem, initial, &Settings::after_drift())?;
+        let of_poses = if pose_covariances { found.pose_covariances() } else { None };
+        Ok::<_, pomona::Error>((found, of_poses))
+    };
+    let (found, of_poses) = detached(py, adjust)?.map_err(wrong)?;
     Ok((
         pose_arrays(py, &found.state.poses)?,
         array(py, found.state.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect(), [found.state.points.len(), 3])?,

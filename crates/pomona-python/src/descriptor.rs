@@ -1,6 +1,7 @@
 //! Constellations and their codes.
 
 use crate::cloud::points;
+use crate::threads::detached;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pomona::nalgebra::Point3;
 use pomona::paper::constellation::constellations;
@@ -37,7 +38,7 @@ fn arrays<'py, const K: usize, const D: usize>(
     positions: &[Point3<f64>],
     n: usize,
 ) -> PyResult<Arrays<'py>> {
-    let described: Described<K, D> = py.detach(|| describe_all(positions, &constellations::<K>(positions, n)));
+    let described: Described<K, D> = detached(py, || describe_all(positions, &constellations::<K>(positions, n)))?;
     let members = PyArray1::from_iter(py, described.members.iter().flatten().map(|&row| i64::from(row)));
     let codes = PyArray1::from_iter(py, described.codes.iter().flatten().copied());
     let rows = described.codes.len();

@@ -1,6 +1,7 @@
 //! Who is who over all visits, and where in a map a visit lies.
 
 use crate::cloud::{points, rows};
+use crate::threads::detached;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pomona::FruitCloud;
 use pomona::identity::{self, Evidence};
@@ -42,7 +43,7 @@ pub fn contracted<'py>(
         matched: &matched,
         against: &against,
     };
-    let labels = py.detach(|| identity::contracted(&evidence)).map_err(wrong)?;
+    let labels = detached(py, || identity::contracted(&evidence))?.map_err(wrong)?;
     Ok(labels.into_iter().map(|label| label as i64).collect::<Vec<_>>().into_pyarray(py))
 }
 
@@ -57,7 +58,7 @@ pub fn whereabouts<'py>(
     visit: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Option<Found>> {
     let [map, visit] = [points(&map)?, points(&visit)?].map(FruitCloud::from_positions);
-    let found = py.detach(|| identity::whereabouts(&map, &visit)).map_err(wrong)?;
+    let found = detached(py, || identity::whereabouts(&map, &visit))?.map_err(wrong)?;
     Ok(found.map(|found| {
         let matrix = found.map_from_visit.to_matrix();
         (std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)])), found.n_met)

@@ -22,6 +22,7 @@ use pyo3::prelude::*;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    threads::begin();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<matching::PyMatch>()?;
     module.add_class::<matching::PyMapIndex>()?;

@@ -3,6 +3,7 @@
 use crate::camera::Calibration;
 use crate::cloud::{matrices, points, rows};
 use crate::pose::poses;
+use crate::threads::detached;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
@@ -42,7 +43,7 @@ pub fn lift<'py>(
     }
     let sources: Vec<Source> = sources.as_array().outer_iter().map(|one| source(one[0], one[1], one[2])).collect();
     let depth = depth_m.as_slice()?;
-    let lifted = py.detach(|| lifting::lift(DepthPicture::new(depth, camera.width), &boxes, &sources, &camera));
+    let lifted = detached(py, || lifting::lift(DepthPicture::new(depth, camera.width), &boxes, &sources, &camera))?;
     let outcomes = PyArray1::from_iter(py, lifted.iter().map(outcome));
     let found: Vec<&LiftedFruit> = lifted.iter().flatten().collect();
     let centres = PyArray1::from_iter(py, found.iter().flat_map(|one| one.centre.coords.iter().copied()));
@@ -130,7 +131,7 @@ pub fn fuse_fruits<'py>(
         diameter_sigmas_m: &diameter_sigmas_m,
         hidden: &hidden,
     };
-    let found = py.detach(|| lifting::fruits::fuse_fruits(&sightings, &poses));
+    let found = detached(py, || lifting::fruits::fuse_fruits(&sightings, &poses))?;
     let found = found.map_err(|error| PyValueError::new_err(error.to_string()))?;
     let n = found.centres.len();
     let centres = PyArray1::from_iter(py, found.centres.iter().flat_map(|one| one.coords.iter().copied()));

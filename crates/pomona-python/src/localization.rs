@@ -5,7 +5,7 @@ use crate::cloud::Arrays;
 use crate::config::parsed;
 use crate::matching::{mapped, status};
 use crate::pose::{pose, pose_array};
-use crate::threads::PyThreads;
+use crate::threads::{PyThreads, Threads, detached_on};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pomona::nalgebra::{Matrix6, Vector3};
 use pomona::verified::compact::Bytes;
@@ -67,7 +67,7 @@ fn vertical(up: Up) -> Option<[Vector3<f64>; 2]> {
 #[pyclass(name = "Localizer", module = "pomona._core")]
 pub struct PyLocalizer {
     localizer: Localizer,
-    pool: Option<Arc<rayon::ThreadPool>>,
+    threads: Option<Arc<Threads>>,
 }
 
 #[pymethods]
@@ -100,12 +100,9 @@ impl PyLocalizer {
     #[pyo3(signature = (seen, *, up=None))]
     fn locate(&self, py: Python<'_>, seen: Arrays<'_>, up: Up) -> PyResult<PyLocalization> {
         let (cloud, up) = (seen.to_cloud()?, vertical(up));
-        let locate = || self.localizer.locate(&cloud, up);
-        let found = py.detach(|| match &self.pool {
-            Some(pool) => pool.install(locate),
-            None => locate(),
-        });
-        found.map(PyLocalization).map_err(wrong)
+        detached_on(py, self.threads.as_deref(), || self.localizer.locate(&cloud, up))?
+            .map(PyLocalization)
+            .map_err(wrong)
     }
 
     #[pyo3(signature = (seen, *, previous_from_camera=None, motion_covariance=None, up=None))]
@@ -121,13 +118,10 @@ impl PyLocalizer {
         let covariance = motion_covariance.map(|rows| Matrix6::from_fn(|row, column| rows[row][column]));
         let moved = moved.map(|previous_from_camera| ToldMotion { previous_from_camera, covariance });
         let (cloud, up) = (seen.to_cloud()?, vertical(up));
-        let Self { localizer, pool } = self;
-        let mut update = || localizer.update(&cloud, moved.as_ref(), up);
-        let found = py.detach(|| match pool {
-            Some(pool) => pool.install(update),
-            None => update(),
-        });
-        found.map(PyLocalization).map_err(wrong)
+        let Self { localizer, threads } = self;
+        detached_on(py, threads.as_deref(), || localizer.update(&cloud, moved.as_ref(), up))?
+            .map(PyLocalization)
+            .map_err(wrong)
     }
 
     fn reset(&mut self) {
@@ -144,13 +138,9 @@ impl PyLocalizer {
         make: impl FnOnce(&FruitCloud, Config) -> pomona::Result<Localizer> + Send,
     ) -> PyResult<Self> {
         let config = parsed(config)?;
-        let pool = threads.map(PyThreads::pool);
+        let threads = threads.map(PyThreads::shared);
         let cloud = map.to_cloud()?;
-        let make = || make(&cloud, config);
-        let localizer = py.detach(|| match &pool {
-            Some(pool) => pool.install(make),
-            None => make(),
-        });
-        Ok(Self { localizer: localizer.map_err(wrong)?, pool })
+        let localizer = detached_on(py, threads.as_deref(), || make(&cloud, config))?.map_err(wrong)?;
+        Ok(Self { localizer, threads })
     }
 }

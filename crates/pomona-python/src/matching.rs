@@ -2,6 +2,7 @@
 
 use crate::cloud::Arrays;
 use crate::config::parsed;
+use crate::threads::{Threads, detached_on};
 use memmap2::{Mmap, MmapOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pomona::nalgebra::{Matrix4, Vector3};
@@ -123,7 +124,7 @@ impl PyMatch {
 #[pyclass(name = "MapIndex", module = "pomona._core", frozen)]
 pub struct PyMapIndex {
     index: MapIndex,
-    pool: Option<rayon::ThreadPool>,
+    threads: Option<Threads>,
 }
 
 #[pymethods]
@@ -197,11 +198,7 @@ impl PyMapIndex {
         let search = || {
             if per_frame { self.index.search_by_frame(&cloud, noise_m) } else { self.index.search(&cloud, noise_m, up) }
         };
-        let found = py.detach(|| match &self.pool {
-            Some(pool) => pool.install(search),
-            None => search(),
-        });
-        found.map(PyMatch).map_err(wrong)
+        detached_on(py, self.threads.as_ref(), search)?.map(PyMatch).map_err(wrong)
     }
 
     #[pyo3(signature = (query, *, map_from_query, noise_m=None))]
@@ -215,7 +212,8 @@ impl PyMapIndex {
         let cloud = query.to_cloud()?;
         let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
         let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
-        py.detach(|| self.index.pairs_under(&cloud, &pose, noise_m)).map(PyMatch).map_err(wrong)
+        let pairs = || self.index.pairs_under(&cloud, &pose, noise_m);
+        detached_on(py, self.threads.as_ref(), pairs)?.map(PyMatch).map_err(wrong)
     }
 }
 
@@ -229,14 +227,9 @@ impl PyReadyCloud {
     #[new]
     #[pyo3(signature = (cloud, *, threads=None))]
     fn new(py: Python<'_>, cloud: Arrays<'_>, threads: Option<usize>) -> PyResult<Self> {
-        let pool = threads.map(pool_of).transpose()?;
+        let threads = Threads::asked(threads)?;
         let cloud = cloud.to_cloud()?;
-        let make = || ReadyCloud::new(&cloud);
-        let made = py.detach(|| match &pool {
-            Some(pool) => pool.install(make),
-            None => make(),
-        });
-        made.map(Self).map_err(wrong)
+        detached_on(py, threads.as_ref(), || ReadyCloud::new(&cloud))?.map(Self).map_err(wrong)
     }
 }
 
@@ -254,16 +247,12 @@ pub fn match_expected(
     threads: Option<usize>,
 ) -> PyResult<PyMatch> {
     let config = parsed(config)?;
-    let pool = threads.map(pool_of).transpose()?;
+    let threads = Threads::asked(threads)?;
     let (query, map) = (&query.0, &map.0);
     let matrix = Matrix4::from_fn(|row, column| map_from_query[row][column]);
     let pose = Similarity::from_matrix(&matrix).map_err(wrong)?;
     let search = || pomona::match_expected(query, map, &pose, noise_m, &config);
-    let found = py.detach(|| match &pool {
-        Some(pool) => pool.install(search),
-        None => search(),
-    });
-    found.map(PyMatch).map_err(wrong)
+    detached_on(py, threads.as_ref(), search)?.map(PyMatch).map_err(wrong)
 }
 
 impl PyMapIndex {
@@ -272,12 +261,9 @@ impl PyMapIndex {
         threads: Option<usize>,
         make: impl FnOnce() -> pomona::Result<MapIndex> + Send,
     ) -> PyResult<Self> {
-        let pool = threads.map(pool_of).transpose()?;
-        let made = py.detach(|| match &pool {
-            Some(pool) => pool.install(make),
-            None => make(),
-        });
-        Ok(Self { index: made.map_err(wrong)?, pool })
+        let threads = Threads::asked(threads)?;
+        let index = detached_on(py, threads.as_ref(), make)?.map_err(wrong)?;
+        Ok(Self { index, threads })
     }
 }
 
@@ -291,15 +277,6 @@ pub fn mapped(path: &Path) -> PyResult<Mmap> {
     // SAFETY: a file that Pomona writes appears whole under its name and is never written into again.
     // All of it is summed when it is opened: one request costs less than a fault a page.
     Ok(unsafe { MmapOptions::new().populate().map(&file) }?)
-}
-
-/// Threads of their own, at most as many as the machine has cores: more would only wait for each other.
-pub fn pool_of(threads: usize) -> PyResult<rayon::ThreadPool> {
-    if threads == 0 {
-        return Err(wrong("threads: found 0, expected at least 1"));
-    }
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    rayon::ThreadPoolBuilder::new().num_threads(threads.min(cores)).build().map_err(wrong)
 }
 
 /// A name of an enumeration, spelled as in the configuration.

@@ -5,6 +5,7 @@ use crate::camera::Calibration;
 use crate::cloud::points;
 use crate::config::parsed;
 use crate::pose::{pose, pose_array, pose_arrays};
+use crate::threads::detached;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
@@ -132,7 +133,7 @@ impl PyLooking {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let taken: Vec<_> = columns::<2>("taken", &taken)?.into_iter().map(Vector2::from).collect();
         let pictures = greys(&pictures)?;
-        pixels(py, &py.detach(|| corners(&pictures, &taken, per_cell, &self.0)))
+        pixels(py, &detached(py, || corners(&pictures, &taken, per_cell, &self.0))?)
     }
 
     /// Disparities (N,) of points (N, 2) of the left picture, to some pixels, NaN where there is none; pictures with
@@ -151,7 +152,7 @@ impl PyLooking {
         if left.iter().map(size).ne(right.iter().map(size)) {
             return Err(wrong("left, right: expected pictures of the same sizes"));
         }
-        let found = py.detach(|| disparities(&left, &right, &points, farthest_px, &self.0));
+        let found = detached(py, || disparities(&left, &right, &points, farthest_px, &self.0))?;
         Ok(PyArray1::from_iter(py, found.into_iter().map(|found| found.unwrap_or(f64::NAN))))
     }
 
@@ -170,7 +171,7 @@ impl PyLooking {
             return Err(wrong(format!("expected: found {} rows, expected {}", expected.len(), points.len())));
         }
         let (first, second) = (greys(&first)?, greys(&second)?);
-        let found = py.detach(|| follow(&first, &second, &points, &expected, &self.0));
+        let found = detached(py, || follow(&first, &second, &points, &expected, &self.0))?;
         let places: Vec<_> = found.iter().map(|place| place.unwrap_or_default()).collect();
         Ok((pixels(py, &places)?, PyArray1::from_iter(py, found.iter().map(Option::is_some))))
     }
@@ -197,7 +198,7 @@ impl PyOdometry {
     }
 
     fn take<'py>(&mut self, py: Python<'py>, eyes: Py<PyAny>) -> PyResult<Told<'py>> {
-        let motion = py.detach(|| self.0.take(&mut PyEyes(&eyes))).map_err(|failure| failure.0)?;
+        let motion = detached(py, || self.0.take(&mut PyEyes(&eyes)))?.map_err(|failure| failure.0)?;
         told(py, motion)
     }
 
@@ -206,7 +207,7 @@ impl PyOdometry {
     }
 
     fn trajectory<'py>(&self, py: Python<'py>) -> PyResult<Way<'py>> {
-        let all = py.detach(|| self.0.trajectory());
+        let all = detached(py, || self.0.trajectory())?;
         let numbers = |all: Vec<usize>| PyArray1::from_iter(py, all.into_iter().map(|one| one as i64));
         let (first, second) = all.pairs.into_iter().unzip();
         Ok((
@@ -257,7 +258,7 @@ pub fn rejoin<'py>(
     let (before, part) = (places(&before)?, places(&part)?);
     let pose = |name, matrix| pose(name, matrix, Pose::from_exact_matrix);
     let passage = Passage { last: pose("last", &last)?, step: Vector3::from(step), first: pose("first", &first)? };
-    let found = py.detach(|| rejoined(&before, &part, &passage));
+    let found = detached(py, || rejoined(&before, &part, &passage))?;
     found.map(|found| pose_array(py, &found)).transpose()
 }
 

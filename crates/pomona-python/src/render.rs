@@ -2,6 +2,7 @@
 
 use crate::camera::Calibration;
 use crate::pose::{pose, poses};
+use crate::threads::detached;
 use numpy::ndarray::Axis;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -156,7 +157,7 @@ impl PyRowScene {
             leaves: leaves(&geometry.leaves)?,
         };
         let weather = weather.to_weather();
-        let scene = py.detach(|| Scene::new(row, &camera, &places, weather, seed));
+        let scene = detached(py, || Scene::new(row, &camera, &places, weather, seed))?;
         Ok(Self { scene, camera })
     }
 
@@ -169,7 +170,7 @@ impl PyRowScene {
         frame: u32,
     ) -> PyResult<PairArrays<'py>> {
         let pose = pose("session_from_camera", &session_from_camera, Pose::from_matrix)?;
-        let pair = py.detach(|| self.scene.pair(&self.camera, &pose, frame));
+        let pair = detached(py, || self.scene.pair(&self.camera, &pose, frame))?;
         let [height, width] = [self.camera.height, self.camera.width];
         Ok((
             PyArray1::from_vec(py, pair.left).reshape([height, width, 3])?,

@@ -3,6 +3,7 @@
 use crate::camera::Calibration;
 use crate::cloud::points;
 use crate::lifting::boxes;
+use crate::threads::detached;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pomona::stereo::alignment::{fitted, reach_px};
 use pomona::stereo::exposure::{Channels, gains, tables};
@@ -35,7 +36,8 @@ pub fn read_pair<'py>(
     let boxes = boxes(&boxes_px)?;
     let rig = Rig { camera, nearest_m };
     let (left, right) = (left.as_slice()?, right.as_slice()?);
-    let found = py.detach(|| read(Picture::new(left, camera.width), Picture::new(right, camera.width), &boxes, &rig));
+    let found =
+        detached(py, || read(Picture::new(left, camera.width), Picture::new(right, camera.width), &boxes, &rig))?;
     let numbers = found
         .fruits
         .iter()
@@ -68,7 +70,7 @@ pub fn exposure_gains(
     reference: PyReadonlyArray3<'_, u8>,
 ) -> PyResult<Vec<f64>> {
     let (picture, reference) = both(&picture, &reference)?;
-    Ok(py.detach(|| gains(picture, reference)))
+    Ok(detached(py, || gains(picture, reference))?)
 }
 
 /// For each channel (C, 256) what its values become in the exposure of another picture, None where both are alike.
@@ -80,7 +82,7 @@ pub fn exposure_tables<'py>(
     reference: PyReadonlyArray3<'py, u8>,
 ) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
     let (picture, reference) = both(&picture, &reference)?;
-    let Some(tables) = py.detach(|| tables(picture, reference)) else { return Ok(None) };
+    let Some(tables) = detached(py, || tables(picture, reference))? else { return Ok(None) };
     let values = PyArray1::from_iter(py, tables.iter().flatten().copied());
     Ok(Some(values.reshape([tables.len(), 256])?))
 }
@@ -95,7 +97,7 @@ pub fn row_alignment(
     centre_px: [f64; 2],
 ) -> PyResult<Option<(f64, f64, bool, bool)>> {
     let corners: Vec<_> = points(&corners)?.into_iter().map(|corner| corner.coords).collect();
-    let found = py.detach(|| fitted(&corners, centre_px));
+    let found = detached(py, || fitted(&corners, centre_px))?;
     Ok(found.map(|found| (found.lower_px, found.turned_rad, found.is_off(), found.is_correctable())))
 }
 

@@ -5,6 +5,7 @@ use crate::cloud::{matrices, points, rows};
 use crate::config::parsed;
 use crate::lifting::boxes;
 use crate::pose::{pose, poses};
+use crate::threads::detached;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
@@ -81,7 +82,7 @@ impl PyTracker {
             diameter_sigmas_m: &diameter_sigmas_m,
             support: &support,
         };
-        let numbers = py.detach(|| self.tracker.update(frame, &pose, &boxes, &lifted)).map_err(wrong)?;
+        let numbers = detached(py, || self.tracker.update(frame, &pose, &boxes, &lifted))?.map_err(wrong)?;
         Ok(PyArray1::from_iter(py, numbers.into_iter().map(|number| number.map_or(-1, |number| number as i64))))
     }
 
@@ -89,7 +90,7 @@ impl PyTracker {
     fn glimpse(&mut self, py: Python<'_>, picture: PyReadonlyArray3<'_, u8>) -> PyResult<()> {
         let width = picture.shape()[1];
         let values = picture.as_slice()?;
-        py.detach(|| self.tracker.glimpse(Picture::new(values, width)));
+        detached(py, || self.tracker.glimpse(Picture::new(values, width)))?;
         Ok(())
     }
 
@@ -99,8 +100,8 @@ impl PyTracker {
     }
 
     #[pyo3(signature = (min_views=None))]
-    fn finish(&self, py: Python<'_>, min_views: Option<usize>) -> PyTracks {
-        PyTracks(py.detach(|| self.tracker.finish(min_views.unwrap_or(self.min_views))))
+    fn finish(&self, py: Python<'_>, min_views: Option<usize>) -> PyResult<PyTracks> {
+        detached(py, || self.tracker.finish(min_views.unwrap_or(self.min_views))).map(PyTracks)
     }
 }
 
@@ -244,7 +245,7 @@ pub fn believed<'py>(
         missed_boxes: tracks.missed_boxes,
     };
     let colours = Colours { boxes: &boxes, elsewhere: &elsewhere };
-    let found = py.detach(|| belief(&tracks, &colours, (&camera, &poses), &config));
+    let found = detached(py, || belief(&tracks, &colours, (&camera, &poses), &config))?;
     let probability = PyArray1::from_vec(py, found.probability);
     Ok((probability, PyArray1::from_vec(py, found.is_believed), found.frames_in_view))
 }
@@ -284,6 +285,6 @@ pub fn one_fruit_each<'py>(
     for frames in &mut frames_of {
         frames.sort_unstable();
     }
-    let labels = py.detach(|| merge_duplicates(&bodies, &frames_of, place_sigma_m, &config));
+    let labels = detached(py, || merge_duplicates(&bodies, &frames_of, place_sigma_m, &config))?;
     Ok(PyArray1::from_iter(py, labels.into_iter().map(|label| label as i64)))
 }

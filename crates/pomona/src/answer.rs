@@ -55,7 +55,8 @@ pub struct Match {
     pub alternatives: Vec<Registration>,
     /// Fruits found again, sorted by query row; one to one.
     pub pairs: Vec<Pair>,
-    /// Relative noise per axis in metres, as given or as estimated; NaN where nothing was found.
+    /// Relative noise per axis, metres, as the distances of the pairs show it, the one given beforehand with them; of the paper's method
+    /// as given. NaN where nothing was found.
     pub noise_m: f64,
     /// What happened, stage by stage: name and count, for `--explain`.
     pub stages: Vec<(&'static str, f64)>,

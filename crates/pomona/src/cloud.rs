@@ -54,6 +54,9 @@ impl FruitCloud {
     }
 
     /// The rows `rows` as a cloud of their own, in that order; sightings are dropped.
+    ///
+    /// # Panics
+    /// A row beyond the last.
     #[must_use]
     pub fn select(&self, rows: &[usize]) -> Self {
         Self {
@@ -65,7 +68,7 @@ impl FruitCloud {
         }
     }
 
-    /// Checks lengths, finite coordinates and covariances.
+    /// Checks lengths, finite coordinates, covariances and diameters.
     ///
     /// # Errors
     /// The first row or array that is wrong.
@@ -83,6 +86,11 @@ impl FruitCloud {
         check("ids", self.ids.as_ref().map(Vec::len))?;
         if let Some(row) = self.covariances.iter().flatten().position(|c| !is_covariance(c)) {
             return Err(Error::Covariance { row });
+        }
+        let is_none = |diameter: &f64| *diameter <= 0.0 || diameter.is_infinite();
+        let mut diameters = self.diameters_m.iter().flatten().enumerate();
+        if let Some((row, &found)) = diameters.find(|(_, diameter)| is_none(diameter)) {
+            return Err(Error::Diameter { row, found });
         }
         match &self.views {
             Some(views) if views.frames.len() != views.fruits.len() => {
@@ -133,5 +141,16 @@ mod tests {
         let mut cloud = FruitCloud::from_positions(vec![Point3::origin(); 3]);
         cloud.views = Some(Views { frames: vec![0, 0], fruits: vec![2, 7] });
         assert_eq!(cloud.validate(), Err(Error::Row { what: "views.fruits", found: 7, below: 3 }));
+    }
+
+    #[test]
+    fn validate_refuses_a_diameter_that_is_no_length_and_takes_one_that_is_not_known() {
+        let mut cloud = FruitCloud::from_positions(vec![Point3::origin(); 2]);
+        cloud.diameters_m = Some(vec![f64::NAN, 0.07]);
+        assert_eq!(cloud.validate(), Ok(()));
+        for found in [0.0, -0.07, f64::INFINITY] {
+            cloud.diameters_m = Some(vec![0.07, found]);
+            assert_eq!(cloud.validate(), Err(Error::Diameter { row: 1, found }));
+        }
     }
 }

@@ -35,7 +35,14 @@ pub enum Error {
         /// Zero-based row of the fruit.
         row: usize,
     },
-    /// A fruit that was never seen, or whose sightings have a covariance that is not positive definite.
+    /// A diameter that is no length; one that is not known is NaN.
+    Diameter {
+        /// Zero-based row of the fruit.
+        row: usize,
+        /// The diameter, metres.
+        found: f64,
+    },
+    /// A fruit that was never seen, or whose sightings have a covariance that is not positive definite or a diameter that is no length.
     Unplaced {
         /// Zero-based row of the fruit.
         fruit: usize,
@@ -106,6 +113,12 @@ impl fmt::Display for Error {
             Self::Row { what, found, below } => write!(f, "{what}: found row {found}, expected one below {below}"),
             Self::Covariance { row } => {
                 write!(f, "covariances: row {row} is not symmetric positive semi-definite")
+            }
+            Self::Diameter { row, found } => {
+                write!(
+                    f,
+                    "diameters_m: row {row} is {found}, expected a length above 0 m, or NaN where it is not known"
+                )
             }
             Self::Unplaced { fruit } => {
                 write!(f, "fruit {fruit}: expected at least one sighting, each with a positive definite covariance")

@@ -1,6 +1,7 @@
 //! Rigid and similarity transforms and their least-squares fits.
 
 use crate::error::{Error, Result};
+use crate::pose::{is_rotation, orthogonal};
 use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Vector3};
 
 /// `p -> scale * rotation * p + translation`; rigid where `scale` is 1.
@@ -102,7 +103,8 @@ impl Similarity {
     /// Takes a homogeneous matrix apart.
     ///
     /// # Errors
-    /// The matrix is not finite, mirrors, shears or has another last row than 0, 0, 0, 1 (to 1e-6).
+    /// The matrix is not finite, mirrors, shears or has another last row than 0, 0, 0, 1. The rounding of its digits is no shear: it is
+    /// taken out of the rotation.
     pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self> {
         let wrong = |reason| Err(Error::Similarity { reason });
         let linear = matrix.fixed_view::<3, 3>(0, 0).into_owned();
@@ -111,15 +113,18 @@ impl Similarity {
             return wrong("found a mirrored or degenerate matrix, expected rotation, scale and translation");
         }
         let rotation = linear / scale;
-        if (rotation.transpose() * rotation - Matrix3::identity()).norm() > 1e-6 {
+        if !is_rotation(&rotation) {
             return wrong("found a sheared matrix, expected rotation, scale and translation");
         }
         let last = matrix.row(3);
         if (last[0].abs() + last[1].abs() + last[2].abs() + (last[3] - 1.0).abs()) > 1e-6 {
             return wrong("expected the last row 0, 0, 0, 1");
         }
-        let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned();
-        Ok(Self { rotation: Rotation3::from_matrix_unchecked(rotation), translation, scale })
+        let translation: Vector3<f64> = matrix.fixed_view::<3, 1>(0, 3).into_owned();
+        if !translation.iter().all(|x| x.is_finite()) {
+            return wrong("expected finite numbers");
+        }
+        Ok(Self { rotation: orthogonal(Rotation3::from_matrix_unchecked(rotation)), translation, scale })
     }
 
     /// Checks that it is one, for its numbers may be anyone's.
@@ -127,10 +132,14 @@ impl Similarity {
     /// # Errors
     /// A number that is not finite, a scale that is not above 0, a rotation that is none.
     pub fn validate(&self) -> Result<()> {
-        if !(self.scale > 0.0 && self.translation.iter().all(|x| x.is_finite())) {
+        let is_scale = self.scale.is_finite() && self.scale > 0.0;
+        if !(is_scale && self.translation.iter().all(|x| x.is_finite())) {
             return Err(Error::Similarity { reason: "expected finite numbers and a scale above 0" });
         }
-        Self::from_matrix(&self.to_matrix()).map(|_| ())
+        if !is_rotation(self.rotation.matrix()) {
+            return Err(Error::Similarity { reason: "found a matrix that does more than turn, expected a rotation" });
+        }
+        Ok(())
     }
 
     /// Homogeneous 4x4 matrix with the scale folded in.
@@ -255,5 +264,23 @@ mod tests {
         let target = source.map(|p| Point3::new(-p.x, p.y, p.z));
         let found = fit(&source, &target, None, Scale::Metric).expect("the points span space");
         assert!((found.rotation.matrix().determinant() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_rounding_of_a_written_matrix_is_no_shear() {
+        let truth = Similarity {
+            rotation: Rotation3::from_euler_angles(0.4, -0.9, 2.0),
+            translation: Vector3::new(3.0, -1.0, 0.5),
+            scale: 1.7,
+        };
+        let written = truth.to_matrix().map(|x| (x * 1e4).round() / 1e4);
+        let found = Similarity::from_matrix(&written).expect("a similarity with four decimals");
+        assert!((found.rotation.matrix().transpose() * found.rotation.matrix() - Matrix3::identity()).norm() < 1e-9);
+        assert!(found.rotation.angle_to(&truth.rotation) < 1e-4);
+        let mut sheared = truth.to_matrix();
+        sheared[(0, 1)] += 0.02;
+        assert!(Similarity::from_matrix(&sheared).is_err());
+        let twice = Similarity { rotation: Rotation3::from_matrix_unchecked(Matrix3::identity() * 2.0), ..truth };
+        assert!(truth.validate().is_ok() && twice.validate().is_err());
     }
 }

@@ -29,7 +29,8 @@ pub struct Request {
     pub method: Method,
     /// Whether both clouds are in metres.
     pub scale: Scale,
-    /// Relative noise of the two visits per axis, standard deviation in metres; estimated where `None`.
+    /// Relative noise of the two visits per axis, standard deviation in metres, known to a tenth or so: the verified method begins with
+    /// it, the paper's takes it as it is. Estimated where `None`.
     pub noise_m: Option<f64>,
     /// The vertical in both clouds' frames, query then map, true to some 5 degrees; need not be of unit length. The paper's
     /// method does not use it.

@@ -35,12 +35,18 @@ impl Pose {
     pub fn from_exact_matrix(session_from_camera: &Matrix4<f64>) -> Result<Self> {
         let rotation: Matrix3<f64> = session_from_camera.fixed_view::<3, 3>(0, 0).into();
         let translation: Vector3<f64> = session_from_camera.fixed_view::<3, 1>(0, 3).into();
-        let stray = (rotation * rotation.transpose() - Matrix3::identity()).abs().max();
-        // Poses written with six digits are orthogonal to 1e-5; a scale of 1 % is no rounding.
-        if stray < 1e-3 && rotation.determinant() > 0.0 && translation.iter().all(|x| x.is_finite()) {
+        if is_rotation(&rotation) && translation.iter().all(|x| x.is_finite()) {
             return Ok(Self { rotation: Rotation3::from_matrix_unchecked(rotation), translation });
         }
         Err(Error::Pose)
+    }
+
+    /// Checks that it is one, for its numbers may be anyone's.
+    ///
+    /// # Errors
+    /// As [`Self::from_matrix`].
+    pub fn validate(&self) -> Result<()> {
+        Self::from_exact_matrix(&self.to_matrix()).map(|_| ())
     }
 
     /// The 4 x 4 matrix.
@@ -107,8 +113,15 @@ impl Pose {
     }
 }
 
+/// Whether a matrix turns and does nothing else, but for the rounding of its digits.
+///
+/// Poses written with four digits are orthogonal to 3e-4; a scale of 1 % is no rounding.
+pub(crate) fn is_rotation(matrix: &Matrix3<f64>) -> bool {
+    (matrix * matrix.transpose() - Matrix3::identity()).abs().max() < 1e-3 && matrix.determinant() > 0.0
+}
+
 /// The nearest rotation to one that is nearly a rotation (Newton's steps of the polar decomposition).
-fn orthogonal(rotation: Rotation3<f64>) -> Rotation3<f64> {
+pub(crate) fn orthogonal(rotation: Rotation3<f64>) -> Rotation3<f64> {
     let mut matrix = rotation.into_inner();
     for _ in 0..3 {
         matrix = matrix * (Matrix3::identity() * 3.0 - matrix.transpose() * matrix) / 2.0;
@@ -155,5 +168,19 @@ mod tests {
             (session_from_a.to_camera(&session_from_b.to_session(&in_b)) - a_from_b.to_session(&in_b)).norm() < 1e-12
         );
         assert!((session_from_a.inverse().after(&session_from_b).to_matrix() - a_from_b.to_matrix()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_pose_is_one_that_turns_and_does_nothing_else() {
+        let good = pose([0.3, -0.2, 1.0], [1.0, 2.0, 3.0]);
+        assert_eq!(good.validate(), Ok(()));
+        let turned = |matrix: Matrix3<f64>| Pose { rotation: Rotation3::from_matrix_unchecked(matrix), ..good };
+        for wrong in
+            [Matrix3::zeros(), Matrix3::identity() * 2.0, Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0))]
+        {
+            assert_eq!(turned(wrong).validate(), Err(Error::Pose));
+        }
+        assert_eq!(turned(Matrix3::from_element(f64::NAN)).validate(), Err(Error::Pose));
+        assert_eq!(pose([0.0; 3], [f64::NAN, 0.0, 0.0]).validate(), Err(Error::Pose));
     }
 }

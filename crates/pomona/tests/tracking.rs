@@ -305,3 +305,24 @@ fn wrong_input_is_named() {
     let config = Config { tracking: TrackingConfig { min_views: 0, ..TrackingConfig::default() }, ..Config::default() };
     assert!(config.validate().is_err());
 }
+
+#[test]
+fn a_pose_that_is_none_is_refused_and_moves_no_fruit() {
+    let mut dice = Dice(8);
+    let fruits = row(&mut dice, 10);
+    let mut tracker = tracker();
+    for frame in 0..6 {
+        let (seen, _) = seen(&mut dice, &fruits, 0.0, 1.0, 0.02);
+        seen.take(&mut tracker, frame, &pose(0.0));
+    }
+    let before = tracker.finish(3);
+    let still = pose(0.0);
+    let turned = |matrix| Pose { rotation: Rotation3::from_matrix_unchecked(matrix), ..still };
+    let nowhere = Pose { translation: Vector3::new(f64::NAN, 0.0, 0.0), ..still };
+    let twice = turned(still.rotation.matrix() * 2.0);
+    let none = Boxes { edges_px: &[], scores: &[] };
+    for wrong in [nowhere, twice, turned(still.rotation.matrix() * -1.0)] {
+        assert_eq!(tracker.update(6, &wrong, &none, &LiftedBoxes::NONE), Err(Error::Pose));
+    }
+    assert_eq!(tracker.finish(3), before);
+}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pomona.arrays import checked_array
+from pomona.arrays import checked_array, kept_array
 from pomona.cards import as_card
 from pomona.cloud.columns import MOST_WHOLE
 from pomona.cloud.covariances import are_covariances
@@ -31,6 +31,8 @@ UNEVEN = 1e-3
 @dataclass(frozen=True, eq=False, repr=False)
 class FruitCloud:
     """Sparse landmarks of one visit, one row a fruit, in the session's own frame of reference.
+
+    Its arrays are copies that cannot be written into: `dataclasses.replace` makes another cloud.
 
     Attributes
     ----------
@@ -65,14 +67,14 @@ class FruitCloud:
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        positions = checked_array("positions", self.positions, np.float64, (None, 3))
+        positions = kept_array("positions", self.positions, np.float64, (None, 3))
         n = len(positions)
         _require_finite("positions", positions)
         object.__setattr__(self, "positions", positions)
         if self.diameters_m is not None:
             object.__setattr__(self, "diameters_m", _diameters(self.diameters_m, n))
         if self.covariances is not None:
-            covariances = checked_array("covariances", self.covariances, np.float64, (n, 3, 3))
+            covariances = kept_array("covariances", self.covariances, np.float64, (n, 3, 3))
             _require_covariances(covariances)
             object.__setattr__(self, "covariances", covariances)
         if self.n_views is not None:
@@ -221,7 +223,7 @@ def _require_covariances(covariances: NDArray[np.float64]) -> None:
 
 
 def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
-    diameters_m = checked_array("diameters_m", values, np.float64, (n,))
+    diameters_m: NDArray[np.float64] = kept_array("diameters_m", values, np.float64, (n,))
     # NaN compares false and so stays allowed: the diameter of that fruit is unknown.
     wrong = (diameters_m <= 0) | np.isinf(diameters_m)
     if wrong.any():
@@ -231,7 +233,7 @@ def _diameters(values: ArrayLike, n: int) -> NDArray[np.float64]:
 
 
 def _counts(values: ArrayLike, n: int) -> NDArray[np.int64]:
-    counts: NDArray[np.int64] = checked_array("n_views", values, np.int64, (n,))
+    counts: NDArray[np.int64] = kept_array("n_views", values, np.int64, (n,))
     wrong = (counts < 0) | (counts > MOST_WHOLE)  # no reader of a file believes them
     if wrong.any():
         row = int(np.argmax(wrong))

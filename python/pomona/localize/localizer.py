@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,7 +41,7 @@ class Localization:
         Takes points of the camera (x right, y down, z forward) into the map; None unless found.
     covariance : (6, 6) float64
         Of a step of the pose in the camera's own frame: x, y, z in metres, then turns about x, y, z in radians, so that
-        the true pose is ``map_from_camera @ exp(step)``. Zeros unless found.
+        the true pose is ``map_from_camera @ exp(step)``. NaN unless found.
     pairs : (M, 2) int64
         Row in the frame and row in the map of each fruit that was found again, one to one.
     probabilities : (M,) float64
@@ -77,7 +77,7 @@ class Localization:
 
     @property
     def sigma_m(self) -> float:
-        """Standard deviation of the place, metres, all three axes together."""
+        """Standard deviation of the place, metres, all three axes together; NaN unless found."""
         return float(np.sqrt(np.trace(self.covariance[:3, :3])))
 
 
@@ -139,6 +139,10 @@ class Localizer:
 
     def __repr__(self) -> str:
         return f"Localizer({len(self)} fruits)"
+
+    def __reduce__(self) -> NoReturn:
+        # A copy would share what `update` knows with the first.
+        raise TypeError("a Localizer is not copied, nor pickled: make another of the same map")
 
     def _repr_html_(self) -> str:
         return as_card("Localizer", {"fruits": len(self)})

@@ -51,8 +51,8 @@ pub struct FusedFruits {
 /// Fuses the sightings of every fruit; `poses` are `session_from_camera` of the frames.
 ///
 /// # Errors
-/// Arrays of different lengths, a row of a frame that does not exist, a fruit without a sighting or with a covariance that
-/// is not positive definite.
+/// Arrays of different lengths, a row of a frame that does not exist, a fruit without a sighting, with a covariance that is
+/// not positive definite, or with a diameter that is no length.
 pub fn fuse_fruits(sightings: &FruitSightings<'_>, poses: &[Pose]) -> Result<FusedFruits> {
     sightings.check(poses.len())?;
     let fused: Vec<Fused> = (sightings.of_each_fruit().into_par_iter().enumerate())

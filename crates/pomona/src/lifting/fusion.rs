@@ -163,8 +163,15 @@ pub struct MeasuredDiameter {
 
 /// Fuses diameters of one fruit by equation (1): mean and standard deviation of the likelihood.
 ///
-/// One sighting alone stays as it is: nothing says how much of it is hidden. None of none.
+/// One sighting alone stays as it is: nothing says how much of it is hidden. None of none, and where one is no length or its standard
+/// deviation none.
 pub fn fuse_diameters(measured: &[MeasuredDiameter]) -> Option<(f64, f64)> {
+    let is_known = |one: &MeasuredDiameter| {
+        one.diameter_m.is_finite() && one.diameter_m > 0.0 && one.sigma_m.is_finite() && one.sigma_m >= 0.0
+    };
+    if !measured.iter().all(is_known) {
+        return None;
+    }
     let [first, rest @ ..] = measured else { return None };
     if rest.is_empty() {
         return Some((first.diameter_m, first.sigma_m));

@@ -38,8 +38,9 @@ impl ToldMotion {
     /// Checks the way and its covariance.
     ///
     /// # Errors
-    /// The way, or the standard deviation of one, is beyond all ways; the covariance is not symmetric positive definite.
+    /// The way is no rigid transform; it, or the standard deviation of one, is beyond all ways; the covariance is not symmetric positive definite.
     pub fn validate(&self) -> Result<()> {
+        self.previous_from_camera.validate()?;
         let reason = "found one beyond 1,000 km, expected metres between two frames".to_owned();
         if self.previous_from_camera.translation.norm() > FAR_M {
             return Err(Error::Request { name: "moved", reason });
@@ -65,7 +66,7 @@ pub struct Localization {
     /// `map_from_camera`; `None` unless found.
     pub pose: Option<Pose>,
     /// Covariance of the pose's step (x, y, z, then turns about x, y, z), metres and radians, in the camera's own frame;
-    /// zeros unless found.
+    /// not numbers unless found.
     pub covariance: Matrix6<f64>,
     /// Fruits of this frame found again, sorted by row, one to one.
     pub pairs: Vec<MapPair>,
@@ -80,7 +81,7 @@ impl Localization {
         Self {
             verdict,
             pose: None,
-            covariance: Matrix6::zeros(),
+            covariance: Matrix6::from_element(f64::NAN),
             pairs: Vec::new(),
             log_odds: f64::NAN,
             tracked: false,

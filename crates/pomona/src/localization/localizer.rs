@@ -18,7 +18,7 @@ use crate::assignment::assign;
 use crate::bundle::steps::moved;
 use crate::cloud::FruitCloud;
 use crate::config::Config;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Scale;
 use crate::matching::{MapIndex, Method, require_directions};
 use crate::pose::Pose;
@@ -31,6 +31,9 @@ const MIN_PAIRED: f64 = 4.0;
 
 /// Fruits of the map below which sightings fix no pose: any may be any where all hang within the noise.
 const MIN_APART: usize = 3;
+
+/// Fruits of a frame at the most: a search of as many takes a second. Points of a surface in their place would take minutes.
+const MOST_SEEN: usize = 5_000;
 
 /// Fruits of a frame whose place is well known that are looked for without the others, at the least.
 const FEWEST_SURE: usize = 12;
@@ -79,6 +82,15 @@ pub struct Localizer {
     window: Window,
 }
 
+fn require_frame(seen: &FruitCloud) -> Result<()> {
+    seen.validate()?;
+    if seen.len() <= MOST_SEEN {
+        return Ok(());
+    }
+    let reason = format!("found {} fruits, expected at most {MOST_SEEN} in one frame, each one once", seen.len());
+    Err(Error::Request { name: "seen", reason })
+}
+
 impl Localizer {
     /// Prepares `map`.
     ///
@@ -119,9 +131,9 @@ impl Localizer {
     /// are thought to sink rather than to move aside.
     ///
     /// # Errors
-    /// A cloud or a direction that is wrong. That the camera is not found is no error.
+    /// A cloud or a direction that is wrong, more fruits than any frame shows. That the camera is not found is no error.
     pub fn locate(&self, seen: &FruitCloud, up: Option<[Vector3<f64>; 2]>) -> Result<Localization> {
-        seen.validate()?;
+        require_frame(seen)?;
         self.search(&Sighting::of(seen), seen, up)
     }
 
@@ -135,7 +147,7 @@ impl Localizer {
         told: Option<&ToldMotion>,
         up: Option<[Vector3<f64>; 2]>,
     ) -> Result<Localization> {
-        seen.validate()?;
+        require_frame(seen)?;
         require_directions(up)?;
         told.map_or(Ok(()), ToldMotion::validate)?;
         let step = self.motions.next(told, &mut self.window);

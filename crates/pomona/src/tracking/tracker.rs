@@ -91,7 +91,7 @@ impl Tracker {
     /// The track number of every box of the next frame, None where it shows no fruit that can be placed.
     ///
     /// # Errors
-    /// Arrays do not fit together, or the frame's number does not follow the last one's.
+    /// Arrays do not fit together, the pose is none, or the frame's number does not follow the last one's.
     pub fn update(
         &mut self,
         number: i64,
@@ -99,6 +99,7 @@ impl Tracker {
         boxes: &Boxes<'_>,
         lifted: &LiftedBoxes<'_>,
     ) -> Result<Vec<Option<usize>>> {
+        session_from_camera.validate()?;
         let observations = observations(&self.camera, boxes, lifted)?;
         self.arrive(number, session_from_camera)?;
         observations.iter().filter_map(|one| one.lift.as_ref()).for_each(|lift| self.population.add(lift));

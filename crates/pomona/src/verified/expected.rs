@@ -30,7 +30,10 @@ pub(crate) fn search_expected(
     config: &VerifiedConfig,
 ) -> Match {
     let search = Search::new(map, &query.landscape, request, config);
-    if search.query.len().min(search.map.len()) < MIN_FRUITS || request.scale != Scale::Metric {
+    if search.query.len().min(search.map.len()) < MIN_FRUITS {
+        return Match::too_few();
+    }
+    if request.scale != Scale::Metric {
         return Match::without_answer(Verdict::NoMatch, Vec::new());
     }
     let expected = map_from_query.about(&search.query.centre, &search.map.centre);

@@ -47,6 +47,9 @@ fn one_sighting_stays_as_it_is_and_none_is_nothing() {
     let [diameter] = diameters(&[0.07], |_, _| 0.004, &[0.05])[..] else { panic!("one") };
     assert_eq!(fuse_diameters(&[diameter]), Some((0.07, 0.004)));
     assert_eq!(fuse_diameters(&[]), None);
+    for none in [f64::NAN, 0.0, -0.07, f64::INFINITY] {
+        assert_eq!(fuse_diameters(&[diameter, MeasuredDiameter { diameter_m: none, ..diameter }]), None);
+    }
 }
 
 #[test]

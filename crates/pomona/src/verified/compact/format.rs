@@ -4,7 +4,7 @@
 //! everything once to compare the sums. Both are no proof against someone who makes a file on purpose: so the lengths of
 //! columns must agree, and no number out of a column is trusted as a row.
 
-use super::columns::{Bytes, Column};
+use super::columns::{Bytes, Column, aligned};
 use super::ground::n_buckets;
 use super::seed_blocks::LANES;
 use super::{CompactMap, Facts, MOST};
@@ -49,6 +49,7 @@ impl CompactMap {
     /// # Errors
     /// Another map or version, or bytes that are not as they were written.
     pub(crate) fn opened(bytes: &Bytes, map: &FruitCloud) -> Result<Self> {
+        let bytes = &aligned(bytes);
         let content = bytes.as_ref().as_ref();
         let header = header_of(content)?;
         let (facts, lengths, sum) = Facts::read(&header)?;

@@ -19,19 +19,17 @@ fn kept(map: &FruitCloud) -> Vec<u8> {
     compact(map).pieces().expect("it is compact").flatten().collect()
 }
 
-/// Bytes at an address that is a multiple of eight, as those of a mapped file are.
-struct Aligned(Vec<u64>, usize);
+/// Bytes at an address that is no multiple of anything, as those in a message are.
+struct Somewhere(Vec<u8>);
 
-impl AsRef<[u8]> for Aligned {
+impl AsRef<[u8]> for Somewhere {
     fn as_ref(&self) -> &[u8] {
-        &bytemuck::cast_slice(&self.0)[..self.1]
+        &self.0[1..]
     }
 }
 
 fn opened(content: &[u8], map: &FruitCloud) -> Result<MapIndex> {
-    let mut words = vec![0u64; content.len().div_ceil(8)];
-    bytemuck::cast_slice_mut(&mut words)[..content.len()].copy_from_slice(content);
-    let bytes: Bytes = Arc::new(Aligned(words, content.len()));
+    let bytes: Bytes = Arc::new(Somewhere([&[0], content].concat()));
     MapIndex::opened(&bytes, map, Config::default())
 }
 
