@@ -2,6 +2,7 @@
 //! Lau 2014).
 
 use crate::assignment::assign;
+use std::ops::Range;
 
 /// A fruit of the query and one of the map that may be the same.
 #[derive(Debug, Clone, Copy)]
@@ -29,37 +30,29 @@ const SETTLED: f64 = 1e-5;
 impl Beliefs {
     pub(crate) fn new(edges: Vec<Edge>, n_query: usize, n_map: usize) -> Self {
         let (map_of, met) = numbered(edges.iter().map(|edge| edge.map), n_map);
-        let mut to_query = vec![1.0; edges.len()];
-        let mut to_map = vec![0.0; edges.len()];
-        let mut of_map = vec![1.0; met];
-        for _ in 0..ROUNDS {
-            let of_query = sums(&edges, &to_query, n_query);
-            for ((edge, back), out) in edges.iter().zip(&to_query).zip(&mut to_map) {
-                *out = edge.ratio / (of_query[edge.query as usize] - edge.ratio * back).max(1e-12);
-            }
-            of_map.fill(1.0);
-            for (map, message) in map_of.iter().zip(&to_map) {
-                of_map[*map as usize] += message;
-            }
-            let mut change = 0.0f64;
-            for ((map, message), back) in map_of.iter().zip(&to_map).zip(&mut to_query) {
-                let next = 1.0 / (of_map[*map as usize] - message).max(1e-12);
-                change = change.max((next - *back).abs());
-                *back = next;
-            }
-            if change < SETTLED {
-                break;
-            }
+        let (order, ends) = by_groups(&edges, &map_of, n_query, met);
+        let linked = |&at: &u32| Edge { map: map_of[at as usize], ..edges[at as usize] };
+        let linked: Vec<Edge> = order.iter().map(linked).collect();
+        let mut all = Messages {
+            of_query: vec![1.0; n_query],
+            of_map: vec![1.0; met],
+            to_query: vec![1.0; edges.len()],
+            to_map: vec![0.0; edges.len()],
+        };
+        // Those that no edge links to others settle by themselves, most of them at once.
+        let mut first = 0;
+        for end in ends {
+            all.settle(&linked, first..end);
+            first = end;
         }
-        let of_query = sums(&edges, &to_query, n_query);
-        let probability = |(edge, back): (&Edge, &f64)| edge.ratio * back / of_query[edge.query as usize];
+        let Messages { of_query, of_map, to_query, to_map } = all;
+        let mut probabilities = vec![0.0; edges.len()];
+        for ((edge, back), &at) in linked.iter().zip(&to_query).zip(&order) {
+            probabilities[at as usize] = edge.ratio * back / of_query[edge.query as usize];
+        }
         let logarithms = |sums: &[f64]| sums.iter().map(|sum| sum.ln()).sum::<f64>();
         let shared: f64 = to_map.iter().zip(&to_query).map(|(there, back)| (there * back).ln_1p()).sum();
-        Self {
-            probabilities: edges.iter().zip(&to_query).map(probability).collect(),
-            log_sum: logarithms(&of_query) + logarithms(&of_map) - shared,
-            edges,
-        }
+        Self { edges, probabilities, log_sum: logarithms(&of_query) + logarithms(&of_map) - shared }
     }
 
     /// The same of several lists of edges: of all one-to-one sets of all of them, by lists.
@@ -113,13 +106,88 @@ impl Beliefs {
     }
 }
 
-/// Of each fruit of the query: it alone, and with each of its partners as far as they are free.
-fn sums(edges: &[Edge], to_query: &[f64], n_query: usize) -> Vec<f64> {
-    let mut sums = vec![1.0; n_query];
-    for (edge, back) in edges.iter().zip(to_query) {
-        sums[edge.query as usize] += edge.ratio * back;
+/// Messages along edges, and what fruits sum up to: each alone, and with each of its partners as far as they are free.
+struct Messages {
+    of_query: Vec<f64>,
+    of_map: Vec<f64>,
+    to_query: Vec<f64>,
+    to_map: Vec<f64>,
+}
+
+impl Messages {
+    /// Sends them along some of the edges, whose fruits have no others, until they settle.
+    fn settle(&mut self, edges: &[Edge], some: Range<usize>) {
+        let Self { of_query, of_map, to_query, to_map } = self;
+        let edges = &edges[some.clone()];
+        let (to_query, to_map) = (&mut to_query[some.clone()], &mut to_map[some]);
+        for _ in 0..ROUNDS {
+            sum_up(edges, to_query, of_query);
+            for ((edge, back), out) in edges.iter().zip(&*to_query).zip(&mut *to_map) {
+                *out = edge.ratio / (of_query[edge.query as usize] - edge.ratio * back).max(1e-12);
+            }
+            edges.iter().for_each(|edge| of_map[edge.map as usize] = 1.0);
+            for (edge, message) in edges.iter().zip(&*to_map) {
+                of_map[edge.map as usize] += message;
+            }
+            let mut change = 0.0f64;
+            for ((edge, message), back) in edges.iter().zip(&*to_map).zip(&mut *to_query) {
+                let next = 1.0 / (of_map[edge.map as usize] - message).max(1e-12);
+                change = change.max((next - *back).abs());
+                *back = next;
+            }
+            if change < SETTLED {
+                break;
+            }
+        }
+        sum_up(edges, to_query, of_query);
     }
-    sums
+}
+
+fn sum_up(edges: &[Edge], to_query: &[f64], of_query: &mut [f64]) {
+    edges.iter().for_each(|edge| of_query[edge.query as usize] = 1.0);
+    for (edge, back) in edges.iter().zip(to_query) {
+        of_query[edge.query as usize] += edge.ratio * back;
+    }
+}
+
+/// Numbers of the edges, those together that fruits link to each other, and where each such group ends.
+fn by_groups(edges: &[Edge], map_of: &[u32], n_query: usize, met: usize) -> (Vec<u32>, Vec<usize>) {
+    // Fruits of the query that an edge leads to the same fruit of the map, each knowing one of its group.
+    let mut known: Vec<u32> = (0..n_query as u32).collect();
+    let mut first = vec![u32::MAX; met];
+    for (edge, &map) in edges.iter().zip(map_of) {
+        let before = std::mem::replace(&mut first[map as usize], edge.query);
+        if before != u32::MAX {
+            let [one, other] = [before, edge.query].map(|row| leader(&mut known, row));
+            known[one.max(other) as usize] = one.min(other);
+        }
+    }
+    let (group_of, groups) = numbered(edges.iter().map(|edge| leader(&mut known, edge.query)), n_query);
+    let mut ends = vec![0usize; groups];
+    group_of.iter().for_each(|&group| ends[group as usize] += 1);
+    let mut end = 0;
+    for count in &mut ends {
+        end += *count;
+        *count = end;
+    }
+    let mut order = vec![0; edges.len()];
+    let mut next = ends.clone();
+    // From the last to the first, so that a group keeps the order of its edges.
+    for (at, &group) in group_of.iter().enumerate().rev() {
+        next[group as usize] -= 1;
+        order[next[group as usize]] = at as u32;
+    }
+    (order, ends)
+}
+
+/// The one of its group that knows itself.
+fn leader(known: &mut [u32], row: u32) -> u32 {
+    let mut row = row;
+    while known[row as usize] != row {
+        known[row as usize] = known[known[row as usize] as usize];
+        row = known[row as usize];
+    }
+    row
 }
 
 /// Those of `n` rows that occur, numbered as they come, and how many they are: a map has many more rows than have edges.
@@ -190,5 +258,25 @@ mod tests {
         let edge = |query, map, ratio| Edge { query, map, ratio };
         assert_close(&[edge(0, 0, 5.0), edge(0, 1, 0.7), edge(1, 1, 9.0)], 1e-5);
         assert_close(&[edge(0, 0, 5.0), edge(0, 1, 2.0), edge(1, 0, 1.0), edge(1, 1, 3.0)], 0.05);
+    }
+
+    #[test]
+    fn fruits_that_nothing_links_settle_as_they_would_alone() {
+        let edge = |query, map, ratio| Edge { query, map, ratio };
+        // A chain, a loop whose messages settle slowly, and a pair, mixed.
+        let chain = [edge(0, 0, 5.0), edge(2, 0, 0.7), edge(2, 3, 9.0)];
+        let ring = [edge(1, 1, 40.0), edge(1, 2, 30.0), edge(3, 1, 35.0), edge(3, 2, 45.0)];
+        let pair = [edge(4, 4, 2.0)];
+        let all = [ring[0], chain[0], pair[0], ring[1], chain[1], ring[2], chain[2], ring[3]];
+        let [of_chain, of_ring, of_pair, of_all] =
+            [&chain[..], &ring, &pair, &all].map(|some| Beliefs::new(some.to_vec(), 5, 5));
+        let probability = |of: &Beliefs, wanted: &Edge| {
+            let at = of.edges.iter().position(|one| (one.query, one.map) == (wanted.query, wanted.map));
+            of.probabilities[at.expect("an edge of these")]
+        };
+        for (of, edges) in [(&of_chain, &chain[..]), (&of_ring, &ring), (&of_pair, &pair)] {
+            assert!(edges.iter().all(|edge| probability(of, edge) == probability(&of_all, edge)));
+        }
+        assert!((of_chain.log_sum + of_ring.log_sum + of_pair.log_sum - of_all.log_sum).abs() < 1e-12);
     }
 }

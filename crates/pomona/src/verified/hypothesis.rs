@@ -110,7 +110,7 @@ pub(super) fn refined(
 ) -> Vec<Hypothesis> {
     let refiner = || Refiner::new(query, map, model);
     let from = |refiner: &mut Refiner, (start, place): &(Similarity, Vector3<f64>)| refiner.refine(start, place, reach);
-    let mut found: Vec<Hypothesis> = starts.par_iter().map_init(refiner, from).flatten_iter().collect();
+    let mut found: Vec<Hypothesis> = starts.par_iter().with_max_len(1).map_init(refiner, from).flatten_iter().collect();
     found.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
     found
 }

@@ -20,6 +20,9 @@ const FEW_SEEDS: u64 = 1500;
 /// Times more seeds where the vertical is known, which rules most candidates out before they cost much.
 const UPRIGHT_SEEDS: u64 = 2;
 
+/// Seeds that one thread asks without a look at what is left: some have a thousand times the candidates of others.
+const MOST_AT_ONCE: usize = 16;
+
 /// The `turn`-th seed of a fruit: its three companions in a fixed shuffled order without repeats.
 fn seed_of(query: &Landscape, row: u32, turn: u64) -> Option<Seed> {
     let near = query.neighbours(row as usize);
@@ -57,7 +60,8 @@ impl Search<'_> {
 
     /// Candidates of all seeds, most evidence first: the best of them, one of each pose, and the others.
     pub(super) fn ask(&self, seeds: &[Seed], log: &mut Log) -> [Vec<Contender>; 2] {
-        let of_each: Vec<(Vec<Contender>, Effort)> = seeds.par_iter().map(|&seed| self.candidates_of(seed)).collect();
+        let of_each: Vec<(Vec<Contender>, Effort)> =
+            seeds.par_iter().with_max_len(MOST_AT_ONCE).map(|&seed| self.candidates_of(seed)).collect();
         log.seeds += seeds.len();
         log.effort = log.effort + of_each.iter().fold(Effort::default(), |sum, (_, effort)| sum + *effort);
         log.threshold = self.threshold(log.effort.stands.share_left());
