@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pomona.cloud import FruitCloud, Views
     from pomona.growth.season_growth import SeasonGrowth, grow_season
     from pomona.localize import Localization, Localizer
-    from pomona.matching import Index, Match, Verdict, default_config, match
+    from pomona.matching import Index, Match, ReadyCloud, Verdict, default_config, match, match_expected
     from pomona.orchard import Observations, OrchardMap, Session, Visit, add_session, load_session, write_session
     from pomona.plot import draw_match, save_picture
     from pomona.recording import Calibration, Frame, Recording, open_recording
@@ -35,6 +35,7 @@ _MODULE_OF = {
     "Motions": "pomona.survey.refinement",
     "Observations": "pomona.orchard",
     "OrchardMap": "pomona.orchard",
+    "ReadyCloud": "pomona.matching",
     "Recording": "pomona.recording",
     "Refined": "pomona.survey.refinement",
     "SeasonGrowth": "pomona.growth.season_growth",
@@ -54,6 +55,7 @@ _MODULE_OF = {
     "lift": "pomona.survey.depth",
     "load_session": "pomona.orchard",
     "match": "pomona.matching",
+    "match_expected": "pomona.matching",
     "open_recording": "pomona.recording",
     "refine": "pomona.survey.refinement",
     "save_picture": "pomona.plot",
@@ -76,6 +78,7 @@ __all__ = [
     "OrchardMap",
     "PomonaError",
     "PomonaWarning",
+    "ReadyCloud",
     "Recording",
     "Refined",
     "SeasonGrowth",
@@ -96,6 +99,7 @@ __all__ = [
     "lift",
     "load_session",
     "match",
+    "match_expected",
     "open_recording",
     "refine",
     "save_picture",

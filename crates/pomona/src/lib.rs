@@ -59,7 +59,8 @@
 //! # Where to read on
 //!
 //! [`paper`] and [`verified`] are the two methods that match: [`Method`] chooses. [`neighbours`] tells which search
-//! structure answers which question. `examples/match_two_visits.rs` reads two clouds and prints what a match gives. The
+//! structure answers which question. `examples/match_two_visits.rs` reads two clouds and prints what a match gives;
+//! `examples/map_and_camera.rs` asks one map many things: an index of a file, a pose that is known to some decimetres, a camera. The
 //! equations, with their assumptions and limits, are in `docs/` of the repository: `algorithm.md`, `how-it-decides.md`,
 //! `depth.md`, `tracking.md`.
 
