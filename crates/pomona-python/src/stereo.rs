@@ -70,7 +70,7 @@ pub fn exposure_gains(
     reference: PyReadonlyArray3<'_, u8>,
 ) -> PyResult<Vec<f64>> {
     let (picture, reference) = both(&picture, &reference)?;
-    Ok(detached(py, || gains(picture, reference))?)
+    detached(py, || gains(picture, reference))
 }
 
 /// For each channel (C, 256) what its values become in the exposure of another picture, None where both are alike.
