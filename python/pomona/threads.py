@@ -25,7 +25,7 @@ def require_threads(asked: Any, place: str = "threads") -> int:
         When it is no whole number from 1.
     """
     # Those of NumPy are whole numbers, too.
-    if isinstance(asked, Integral) and not isinstance(asked, bool) and asked >= 1:
+    if isinstance(asked, Integral) and not isinstance(asked, bool) and int(asked) >= 1:
         return int(asked)
     raise PomonaError(f"{place}: found {asked!r}, expected a whole number from 1")
 
