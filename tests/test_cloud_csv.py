@@ -88,7 +88,7 @@ def test_a_blank_diameter_is_unknown(tmp_path: Path) -> None:
         ("", "the file is empty, expected a header with x,y,z"),
         ("\n \n", "the file is empty, expected a header with x,y,z"),
         ("1,2,3\n4,5,6\n", "line 1: found columns '1,2,3' without x,y,z, expected at least x,y,z"),
-        ("X,y,z\n", "line 1: found columns 'X,y,z' without x, expected at least x,y,z"),
+        ("X,y,z\n", "line 1: found columns 'X,y,z' without x, expected at least x,y,z, in small letters"),
         ("x,y,z,x\n", "line 1: column 'x' is there twice, expected each name once"),
         (
             "x,y,z,cxx\n",
@@ -101,7 +101,12 @@ def test_a_blank_diameter_is_unknown(tmp_path: Path) -> None:
         ("x,y,z\n1,1_0,3\n", "line 2 (row 0), column y: found '1_0', expected a number"),
         ("x,y,z\n1,2\n", "line 2: found 2 cells, expected 3 as in the header"),
         ("x,y,z\n1,2,3,4\n", "line 2: found 4 cells, expected 3 as in the header"),
-        ("x;y;z\n1;2;3\n", "line 1: found columns 'x;y;z' without x,y,z, expected at least x,y,z"),
+        (
+            "x;y;z\n1;2;3\n",
+            "line 1: found columns 'x;y;z' without x,y,z, expected at least x,y,z, separated by commas and not by "
+            "semicolons, with decimal points",
+        ),
+        ("X,Y,Z\n1,2,3\n", "line 1: found columns 'X,Y,Z' without x,y,z, expected at least x,y,z, in small letters"),
         ("id,x,y,z\na,1,2,3\nb,1,2,3\na,4,5,6\n", "line 4, column id: found 'a' as in line 2, expected each id once"),
         (
             "id,x,y,z\n,1,2,3\n",

@@ -87,6 +87,7 @@ def test_a_closed_standard_output_is_told_where_it_matters(here: Path) -> None:
     assert run(here, "pomona export map.csv --to csv -o fruits.csv >&-").returncode == 0
 
 
-def test_a_reader_that_has_enough_is_no_error(here: Path) -> None:
-    done = run(here, "set -o pipefail; { pomona match query.csv map.csv --json; echo $? >&2; } | true")
+@pytest.mark.parametrize("command", ["match query.csv map.csv --json", "export map.csv --to ply -o -", "--help"])
+def test_a_reader_that_has_enough_is_no_error(here: Path, command: str) -> None:
+    done = run(here, f"set -o pipefail; {{ pomona {command}; echo $? >&2; }} | true")
     assert done.stderr == "141\n"

@@ -101,7 +101,7 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 def _told(path: Path) -> Iterator[None]:
     try:
         yield
-    except FileExistsError:
+    except (FileExistsError, BrokenPipeError):
         raise
     except OSError as error:
         raise PomonaError(f"{path}: cannot be written: {error.strerror or error}") from None

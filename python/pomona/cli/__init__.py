@@ -32,7 +32,7 @@ from pomona.cli import (
     validate,
     view,
 )
-from pomona.cli.terminal import require_written, say, tell
+from pomona.cli.terminal import READER_GONE, require_written, say, tell
 from pomona.cli.verbs import Verbs
 from pomona.errors import PomonaError, PomonaWarning
 from pomona.reading import shown
@@ -100,6 +100,11 @@ def main() -> None:
         _refuse(str(error))
     except _UsageError as error:
         _refuse(_usage_line(error))
+    except SystemExit as error:
+        # Of Click, which gives 1 where `head` has its lines and goes.
+        if not isinstance(error.__context__, BrokenPipeError):
+            raise
+        code = READER_GONE
     except OSError as error:
         if error.filename is None:
             raise

@@ -36,7 +36,9 @@ def map_add(
         metavar="SESSION...", help="Sessions (.gpkg), or a cloud (.csv, .ply) with --date."
     ),
     date: str | None = typer.Option(
-        None, metavar="ISO-DATE", help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; a session has its own."
+        None,
+        metavar="ISO-DATE",
+        help="Day of the visit, 2024-08-09 or 2024-08-09T14:30:00; a session has its own, which this overrides.",
     ),
     method: Method | None = method_option,
     scale: Scale | None = scale_option,

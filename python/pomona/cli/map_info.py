@@ -89,7 +89,7 @@ def _info_as_lines(info: dict[str, Any]) -> list[str]:
         f"{info['path']}: {info['kind']}, format {info['format_version']}",
         f"{amount(info['n_fruits'], 'fruit')} seen so far ({states}), {amount(info['n_observations'], 'observation')} "
         f"in {amount(len(rows), 'session')}",
-        f"some {info['n_hanging']:.0f} of them hang now; the others went, or were none (how sure: pomona growth)",
+        f"about {info['n_hanging']:.0f} of them hang now; the others went, or were none (how sure: pomona growth)",
         "",
         *(line.rstrip() for line in table),
     ]

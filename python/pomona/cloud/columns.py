@@ -62,7 +62,9 @@ def check_names(names: Sequence[str], where: str) -> None:
     missing = [name for name in POSITION if name not in names]
     if missing:
         found = shown(",".join(names))
-        raise PomonaError(f"{where}: found columns {found} without {','.join(missing)}, expected at least x,y,z")
+        raise PomonaError(
+            f"{where}: found columns {found} without {','.join(missing)}, expected at least x,y,z{_hint(names)}"
+        )
     if len(names) > MOST_COLUMNS:
         raise PomonaError(f"{where}: found {len(names)} columns, expected at most {MOST_COLUMNS}")
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
@@ -167,3 +169,11 @@ def typed_columns(cloud: FruitCloud) -> dict[str, Any]:
     if cloud.ids is not None:
         columns["id"] = as_whole(cloud.ids) or list(cloud.ids)
     return columns
+
+
+def _hint(names: Sequence[str]) -> str:
+    """Say what the usual mistakes of a header are, where it is one of these."""
+    separator = next((mark for mark in (";", "\t") if any(mark in name for name in names)), None)
+    if separator is not None:
+        return f", separated by commas and not by {'semicolons' if separator == ';' else 'tabs'}, with decimal points"
+    return ", in small letters" if {name.lower() for name in names} >= set(POSITION) else ""

@@ -76,6 +76,8 @@ def read_cloud(path: Path, unit: Unit, make: type[FruitCloud], *, is_checked: bo
 
         return stored_cloud(path, make, in_metres=unit != "free")
     if suffix not in (".csv", ".ply"):
+        if path.is_dir():
+            raise PomonaError(f"{path}: is a folder, expected a .csv, .ply or .gpkg file")
         raise PomonaError(f"{path}: found suffix {suffix!r}, expected .csv, .ply or .gpkg")
     cloud = csv_file.read(path, make) if suffix == ".csv" else ply_file.read(path, make)
     cloud = _in_metres(cloud, METRES_PER_UNIT[unit])

@@ -167,7 +167,8 @@ def _transaction(connection: sqlite3.Connection, timeout_s: float, waiting: Wait
 
 def _require_there(path: Path) -> None:
     if not path.is_file():
-        raise PomonaError(f"{path}: is not there, expected a session or a map (.gpkg)")
+        found = "is a folder" if path.is_dir() else "is not there"
+        raise PomonaError(f"{path}: {found}, expected a session or a map (.gpkg)")
 
 
 def _require_kind(found: Kind, wanted: Kind) -> None:

@@ -180,7 +180,7 @@ impl Seen<'_> {
         let of_outline = self.diameter.sigma_m.powi(2) - ratio.powi(2) * self.covariance[(2, 2)];
         let diameter = MeasuredDiameter {
             diameter_m: stretch * self.diameter.diameter_m,
-            sigma_m: stretch * of_outline.sqrt(),
+            sigma_m: stretch * of_outline.max(0.0).sqrt(),
             hidden: self.diameter.hidden,
         };
         Placed { diameter, shared_variance: (stretch * ratio).powi(2) * depth_variance }

@@ -166,3 +166,11 @@ proptest! {
         prop_assert!((first - again).norm() < 1e-5, "{first} and {again}");
     }
 }
+
+#[test]
+fn what_leaves_hide_they_hide_in_the_next_frame_too() {
+    let sigma_m = |n: usize| fuse_diameters(&diameters(&vec![0.07; n], |_, _| 0.004, &vec![0.0; n])).expect("valid").1;
+    // Half of the variance of one sighting, of ever so many.
+    assert!((sigma_m(64) / 0.004 - 0.71).abs() < 0.03, "{}", sigma_m(64));
+    assert!(sigma_m(8) > sigma_m(64) && sigma_m(8) < 0.004);
+}
