@@ -14,8 +14,10 @@ import pytest
 from command_line import POMONA, Run, assert_refused, run, verbs, write_visits
 from pomona.cloud import FruitCloud, Views
 from pomona.mirrored import mirror_image
-from pomona.orchard import write_session
+from pomona.orchard import Session, write_session
 from pomona.synth.clouds import scene_pair
+from pomona.trajectory import Trajectory
+from pomona.viewer.row_frame import vertical_of_cameras
 
 
 @pytest.fixture(scope="module")
@@ -400,3 +402,23 @@ def test_no_match_under_a_vertical_that_is_not_theirs_says_so(run_here: Run, vis
     done = run_here("match", visits / "query.csv", visits / "map.csv", "--up", "0,0,1")
     assert (done.returncode, done.stdout.split(":")[0]) == (1, "NoMatch")
     assert "only poses that stand upright by --up were taken" in done.stderr
+
+
+def test_a_plot_of_sessions_stands_upright_by_their_cameras(tmp_path: Path) -> None:
+    """The camera's y points down: neither `--up` nor a guess by the fruits is needed."""
+    turned = np.eye(4)
+    turned[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # the camera looks along y, z is up
+    cloud = FruitCloud(np.random.default_rng(3).uniform((0, 0, 0), (4, 1, 2), (60, 3)))
+    way = Trajectory(np.arange(3), np.arange(3.0), np.repeat(turned[None], 3, axis=0))
+    write_session(tmp_path / "filmed.gpkg", Session("filmed", "2024-08-09", "drawn", cloud, way))
+    write_session(tmp_path / "bare.gpkg", Session("bare", "2024-08-09", "drawn", cloud))
+    up = vertical_of_cameras(tmp_path / "filmed.gpkg")
+    assert up is not None
+    assert np.allclose(up, (0, 0, 1))
+    assert vertical_of_cameras(tmp_path / "bare.gpkg") is None
+    pictures = []
+    for name in ("filmed", "bare"):
+        done = run("match", tmp_path / "bare.gpkg", tmp_path / f"{name}.gpkg", "--plot", tmp_path / f"{name}.png")
+        assert done.returncode == 0, done.stderr
+        pictures.append((tmp_path / f"{name}.png").read_bytes())
+    assert pictures[0] != pictures[1]

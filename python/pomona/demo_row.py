@@ -23,6 +23,7 @@ from pomona.recording import open_recording
 from pomona.scanning import scan
 from pomona.survey.same_fruits import Seen, draw_same_fruits
 from pomona.truth import WITHIN_M, aligned, true_fruits
+from pomona.viewer.row_frame import known_vertical
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -152,7 +153,7 @@ def _added(orchard: Path, session: Path, visits: list[Path], folder: Path) -> De
     day = visits[-1].name
     picture, pairs = folder / f"match_{day}.png", folder / f"pairs_{day}.csv"
     write_pairs(pairs, added.match, cloud, known)
-    save_picture(draw_match(cloud, known, added.match), picture)
+    save_picture(draw_match(cloud, known, added.match, up_in_map=known_vertical(orchard)), picture)
     score = _score(added.match, (cloud, known), (visits[-1] / TRUTH, visits[-2] / TRUTH))
     grown_mm = growth_mm(added.match, cloud, known)
     return DemoVisit(session, len(cloud), added.fruit_ids, sizes_mm, added.match, picture, pairs, grown_mm, score)

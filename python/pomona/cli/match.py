@@ -27,6 +27,8 @@ from pomona.cli.verbs import Writes
 from pomona.likes import PAIRS, PICTURE
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from pomona.cloud import FruitCloud
     from pomona.matching import Match
     from pomona.settings import Settings
@@ -99,7 +101,8 @@ def match(
     if output is not None:
         write_pairs(output, answer, in_query, in_map)
     if plot is not None:
-        _draw(plot, in_query, in_map, answer, settings.call["up"], plot_view)
+        up_in_map = _vertical(map) if settings.call["up"] is None else settings.call["up"][1]
+        _draw(plot, in_query, in_map, answer, up_in_map, plot_view)
     _print(answer, in_query, in_map, json=json, explain=explain)
     if answer.status == "NoMatch" and settings.call["up"] is not None:
         tell("pomona: only poses that stand upright by --up were taken; given once, it holds for both clouds")
@@ -140,12 +143,19 @@ def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Se
         tell(f"pomona: the mirror image of QUERY fits MAP, with {amount(pairs, 'pair')}: {left_handed}")
 
 
+def _vertical(path: Path) -> ArrayLike | None:
+    """Tell the vertical of a file by its cameras; None where it has none."""
+    from pomona.viewer.row_frame import vertical_of_cameras
+
+    return vertical_of_cameras(path) if path.suffix.lower() == ".gpkg" else None
+
+
 def _draw(
-    path: Path, query: FruitCloud, map: FruitCloud, answer: Match, up: list[list[float]] | None, view: PlotView
+    path: Path, query: FruitCloud, map: FruitCloud, answer: Match, up_in_map: ArrayLike | None, view: PlotView
 ) -> None:
     from pomona.plot import draw_match, save_picture
 
-    save_picture(draw_match(query, map, answer, up_in_map=up[1] if up else None, view=view.value), path)
+    save_picture(draw_match(query, map, answer, up_in_map=up_in_map, view=view.value), path)
 
 
 def _print(answer: Match, query: FruitCloud, map: FruitCloud, *, json: bool, explain: bool) -> None:
