@@ -14,7 +14,7 @@ import pytest
 from command_line import POMONA, Run, assert_refused, run, verbs, write_visits
 from pomona.cloud import FruitCloud, Views
 from pomona.mirrored import mirror_image
-from pomona.orchard import Session, write_session
+from pomona.orchard import write_session
 from pomona.synth.clouds import scene_pair
 from pomona.trajectory import Trajectory
 from pomona.viewer.row_frame import vertical_of_cameras
@@ -410,8 +410,9 @@ def test_a_plot_of_sessions_stands_upright_by_their_cameras(tmp_path: Path) -> N
     turned[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # the camera looks along y, z is up
     cloud = FruitCloud(np.random.default_rng(3).uniform((0, 0, 0), (4, 1, 2), (60, 3)))
     way = Trajectory(np.arange(3), np.arange(3.0), np.repeat(turned[None], 3, axis=0))
-    write_session(tmp_path / "filmed.gpkg", Session("filmed", "2024-08-09", "drawn", cloud, way))
-    write_session(tmp_path / "bare.gpkg", Session("bare", "2024-08-09", "drawn", cloud))
+    of_day = {"date": "2024-08-09", "recording": "drawn"}
+    write_session(tmp_path / "filmed.gpkg", cloud, name="filmed", trajectory=way, **of_day)
+    write_session(tmp_path / "bare.gpkg", cloud, name="bare", **of_day)
     up = vertical_of_cameras(tmp_path / "filmed.gpkg")
     assert up is not None
     assert np.allclose(up, (0, 0, 1))
