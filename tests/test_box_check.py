@@ -1,5 +1,6 @@
 """Boxes that cannot be right: on each other, halves of a fruit, around two fruits."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from pomona.cloud import FruitCloud
 from pomona.errors import PomonaWarning
 from pomona.recording import Calibration
-from pomona.survey.box_check import check_boxes, check_long_boxes
+from pomona.survey.box_check import check_boxes, check_long_boxes, check_places_of_boxes
 from pomona.survey.part import Boxes, Part
 from pomona.trajectory import Trajectory
 
@@ -77,3 +78,19 @@ def test_boxes_around_two_fruits_are_told() -> None:
 def test_large_fruits_and_those_behind_leaves_are_single() -> None:
     check_long_boxes(Path("row"), CAMERA, [surveyed((20, 21), (32, 30), (10, 20), (26, 20))])
     check_long_boxes(Path("row"), CAMERA, [])
+
+
+def test_boxes_that_are_not_where_their_fruits_are_are_told() -> None:
+    """Boxes with names of another date were scanned without a word: places, sizes and counts looked right."""
+    seen = surveyed((20, 20), (20, 21), (21, 20), (20, 22))
+    at_px = CAMERA.fx * seen.cloud.positions[:, 0] / 2.0 + CAMERA.cx
+    row_px = np.full(4, CAMERA.cy)
+    boxes_px = np.tile(np.column_stack([at_px - 10, row_px - 10, at_px + 10, row_px + 10]), (12, 1))
+    right = replace(seen.boxes, boxes_px=boxes_px)
+    check_places_of_boxes(Path("row"), CAMERA, [replace(seen, boxes=right)])
+    check_places_of_boxes(Path("row"), CAMERA, [])
+    strange = replace(seen, boxes=replace(right, boxes_px=boxes_px + 50.0))
+    with pytest.warns(
+        PomonaWarning, match=r"boxes are 3\.5 times their size from where their fruits lie, in the median"
+    ):
+        check_places_of_boxes(Path("row"), CAMERA, [strange])

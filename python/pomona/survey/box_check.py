@@ -13,7 +13,7 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Calibration
 from pomona.survey.part import Boxes, Part
 
-__all__ = ["check_boxes", "check_long_boxes", "check_small_boxes"]
+__all__ = ["check_boxes", "check_long_boxes", "check_places_of_boxes", "check_small_boxes"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,10 @@ LONG, LONGER = 1.5, 1.2
 
 MANY_LONG = 0.02
 """Of the boxes of fruits. On the rendered rows 0.1 to 0.4 % are as long; where fruits that touch share a box, 5 %."""
+
+ASTRAY = 1.0
+"""Sides of a box from its middle to where its fruit lies in the picture, in the median. Of the rendered rows, boxes of
+visible parts with names, it is a tenth; with the boxes of another recording 18."""
 
 SEVERAL = 40
 """Boxes below which no share of them is told."""
@@ -72,6 +76,15 @@ def check_long_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]
         warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
 
 
+def check_places_of_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]) -> None:
+    """Warn where boxes lie far from where their fruits are: names may join what is none, as in another recording."""
+    away = np.concatenate([np.zeros(0), *(_sides_away(part, calibration) for part in parts)])
+    if len(away) >= SEVERAL and (sides := float(np.nanmedian(away))) > ASTRAY:
+        found = f"boxes are {sides:.1f} times their size from where their fruits lie, in the median, expected a tenth"
+        advice = "they are of another recording, of other frames, or not named fruit by fruit"
+        warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+
+
 def _count(is_so: Callable[[Array, Array], NDArray[np.bool_]], of_frames: Sequence[Array]) -> int:
     """Count boxes that are so with another one of their frame; corners of both, (D, 1, 4) and (1, D, 4)."""
     count = 0
@@ -103,14 +116,33 @@ def _is_half(one: Array, other: Array) -> NDArray[np.bool_]:
 
 def _is_long(part: Part, calibration: Calibration) -> NDArray[np.bool_]:
     """Whether each box of a fruit is as long as two, (B,)."""
-    boxes, diameters_m = part.boxes, part.cloud.diameters_m
-    rows = np.flatnonzero(boxes.fruits >= 0)
-    if diameters_m is None or not len(rows):
+    boxes_px, fruits, in_camera = _of_fruits(part)
+    if part.cloud.diameters_m is None or not len(fruits):
         return np.zeros(0, bool)
+    sides_m = (boxes_px[:, 2:] - boxes_px[:, :2]) * in_camera[:, 2:] / (calibration.fx, calibration.fy)
+    longer_m, shorter_m = sides_m.max(axis=1), sides_m.min(axis=1)
+    long_m = LONG * np.nanmedian(part.cloud.diameters_m)
+    return np.asarray((longer_m > long_m) & (longer_m > LONGER * shorter_m))
+
+
+def _sides_away(part: Part, calibration: Calibration) -> Array:
+    """Distance of the middle of each box of a fruit from where that lies, over the box's side, (B,)."""
+    boxes_px, _, in_camera = _of_fruits(part)
+    with np.errstate(all="ignore"):
+        ahead = in_camera[:, :2] / in_camera[:, 2:]
+        off_px = (
+            ahead * (calibration.fx, calibration.fy)
+            + (calibration.cx, calibration.cy)
+            - (boxes_px[:, :2] + boxes_px[:, 2:]) / 2
+        )
+        return np.asarray(np.linalg.norm(off_px, axis=1) / np.sqrt((boxes_px[:, 2:] - boxes_px[:, :2]).prod(axis=1)))
+
+
+def _of_fruits(part: Part) -> tuple[Array, NDArray[np.int64], Array]:
+    """Give boxes that are of a fruit, (B, 4), their fruits, and where these are in the camera of the frame, (B, 3)."""
+    boxes = part.boxes
+    rows = np.flatnonzero(boxes.fruits >= 0)
     row_of = {int(frame): row for row, frame in enumerate(part.trajectory.frames)}
     poses = part.trajectory.session_from_camera[[row_of[int(frame)] for frame in boxes.frames[rows]]]
-    ahead_m = np.einsum("bi,bi->b", part.cloud.positions[boxes.fruits[rows]] - poses[:, :3, 3], poses[:, :3, 2])
-    sides_px = boxes.boxes_px[rows, 2:] - boxes.boxes_px[rows, :2]
-    sides_m = sides_px * ahead_m[:, None] / (calibration.fx, calibration.fy)
-    longer_m, shorter_m = sides_m.max(axis=1), sides_m.min(axis=1)
-    return np.asarray((longer_m > LONG * np.nanmedian(diameters_m)) & (longer_m > LONGER * shorter_m))
+    away = part.cloud.positions[boxes.fruits[rows]] - poses[:, :3, 3]
+    return boxes.boxes_px[rows], boxes.fruits[rows], np.einsum("bij,bi->bj", poses[:, :3, :3], away)

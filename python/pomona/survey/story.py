@@ -22,7 +22,7 @@ from pomona.recording import Frame, Recording
 from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
-from pomona.survey.box_check import check_boxes, check_long_boxes, check_small_boxes
+from pomona.survey.box_check import check_boxes, check_long_boxes, check_places_of_boxes, check_small_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.depth_check import check_depth_pictures
@@ -207,6 +207,7 @@ def scan(
     if depth == "auto":
         check_depth_pictures(recording, boxes)
     check_long_boxes(recording.path, recording.calibration, survey.parts)
+    check_places_of_boxes(recording.path, recording.calibration, survey.parts)
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
     tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
