@@ -17,7 +17,7 @@ from pomona.mirrored import mirror_image
 from pomona.orchard import write_session
 from pomona.synth.clouds import scene_pair
 from pomona.trajectory import Trajectory
-from pomona.viewer.row_frame import vertical_of_cameras
+from pomona.viewer.row_frame import known_vertical
 
 
 @pytest.fixture(scope="module")
@@ -413,10 +413,10 @@ def test_a_plot_of_sessions_stands_upright_by_their_cameras(tmp_path: Path) -> N
     of_day = {"date": "2024-08-09", "recording": "drawn"}
     write_session(tmp_path / "filmed.gpkg", cloud, name="filmed", trajectory=way, **of_day)
     write_session(tmp_path / "bare.gpkg", cloud, name="bare", **of_day)
-    up = vertical_of_cameras(tmp_path / "filmed.gpkg")
+    up = known_vertical(tmp_path / "filmed.gpkg")
     assert up is not None
     assert np.allclose(up, (0, 0, 1))
-    assert vertical_of_cameras(tmp_path / "bare.gpkg") is None
+    assert known_vertical(tmp_path / "bare.gpkg") is None
     pictures = []
     for name in ("filmed", "bare"):
         done = run("match", tmp_path / "bare.gpkg", tmp_path / f"{name}.gpkg", "--plot", tmp_path / f"{name}.png")

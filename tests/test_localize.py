@@ -396,7 +396,7 @@ def test_a_lost_camera_that_sees_nothing_is_not_looked_for(row, fresh):
         assert not fresh.update(seen_from(other, pose_at(4.0 + 0.1 * step), 1))
     found = fresh.update(EMPTY)
     assert (found.status, found.map_from_camera) == (Verdict.TOO_FEW, None)
-    assert np.isnan(found.log_odds)
+    assert np.isnan([found.log_odds, found.sigma_m, *found.covariance.flat]).all()
     assert_near(fresh.update(seen_from(row, pose_at(4.0), 1)), pose_at(4.0))
 
 
@@ -487,13 +487,6 @@ def test_a_setting_that_is_no_number_and_an_index_that_is_no_path_are_told() -> 
         Localizer(fruits, config={"localization": {"own_m": float("nan")}})
     with pytest.raises(PomonaError, match="index: found int, expected the path of a file"):
         Localizer(fruits, index=3)
-
-
-def test_what_is_not_found_is_not_known_exactly(fresh):
-    lost = fresh.update(EMPTY)
-    assert lost.map_from_camera is None
-    assert np.isnan(lost.sigma_m)
-    assert np.isnan(lost.covariance).all()
 
 
 def test_a_localizer_is_not_copied(fresh):

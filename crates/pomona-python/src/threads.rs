@@ -89,17 +89,14 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
     if FIRST.get() == Some(&process::id()) {
         return Ok(py.detach(work));
     }
-    let threads = {
-        let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
-        if forked.is_none() {
-            *forked = Some(Threads::started(0)?);
-        }
-        forked.as_ref().map(Threads::of_this_process).transpose()?
-    };
-    Ok(py.detach(|| match threads {
-        Some(threads) => threads.install(work),
-        None => work(),
-    }))
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    let threads = forked.take().map_or_else(|| Threads::started(0), Ok)?;
+    let own = threads.of_this_process();
+    *forked = Some(threads);
+    // Work may call Python, which may come back here.
+    drop(forked);
+    let own = own?;
+    Ok(py.detach(|| own.install(work)))
 }
 
 /// The same on these threads, where there are any.

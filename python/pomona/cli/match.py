@@ -144,10 +144,10 @@ def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Se
 
 
 def _vertical(path: Path) -> ArrayLike | None:
-    """Tell the vertical of a file by its cameras; None where it has none."""
-    from pomona.viewer.row_frame import vertical_of_cameras
+    """Tell the vertical of a map or session, where it is known."""
+    from pomona.viewer.row_frame import known_vertical
 
-    return vertical_of_cameras(path) if path.suffix.lower() == ".gpkg" else None
+    return known_vertical(path) if path.suffix.lower() == ".gpkg" else None
 
 
 def _draw(

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.cloud import FruitCloud
-from pomona.orchard import OrchardMap
+from pomona.orchard.earth_layers import stored_anchor
 from pomona.plot.projections import side_and_plan, view_from_above
 from pomona.store.opening import snapshot
 from pomona.store.rows import columns_of
 
-__all__ = ["Vertical", "guessed_vertical", "known_vertical", "page_from_map", "vertical_of_cameras"]
+__all__ = ["Vertical", "guessed_vertical", "known_vertical", "page_from_map"]
 
 Array = NDArray[np.float64]
 
@@ -72,14 +72,15 @@ def guessed_vertical(fruits: FruitCloud) -> Array:
 
 
 def known_vertical(path: Path) -> Array | None:
-    """Tell the vertical by the place of a map on Earth, else by its cameras; None where nobody knows it."""
-    anchor = OrchardMap(path).anchor()
+    """Tell the vertical of a map or session by its place on Earth, else by its cameras; None where nobody knows it."""
+    with snapshot(path) as (connection, _):
+        anchor = stored_anchor(connection)
     up = np.zeros(3) if anchor is None else anchor.enu_from_map[2, :3]
-    return np.asarray(up) if up.any() else vertical_of_cameras(path)
+    return np.asarray(up) if up.any() else _vertical_of_cameras(path)
 
 
-def vertical_of_cameras(path: Path) -> Array | None:
-    """Tell the vertical of a map or session by its cameras, whose y points down; None without, or where they differ."""
+def _vertical_of_cameras(path: Path) -> Array | None:
+    """Tell the vertical by cameras, whose y points down; None where there are none or they differ."""
     with snapshot(path) as (connection, _):
         cells = columns_of(connection, "poses", ("qx", "qy", "qz", "qw"))
     x, y, z, w = np.array(cells, dtype=np.float64)
