@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pomona import FruitCloud, PomonaError
-from pomona.atomic import whole_file, whole_folder
+from pomona.atomic import filled_folder, whole_file, whole_folder
 from pomona.orchard import add_session, load_session, write_session
 from pomona.synth.clouds import scene_pair
 
@@ -205,3 +205,26 @@ def test_a_map_that_came_while_it_was_written_stays(orchard: Path, tmp_path: Pat
     with pytest.raises(PomonaError, match="is an orchard map"):
         write(target, "whole", then=lambda: target.write_bytes(orchard.read_bytes()))
     assert target.read_bytes() == orchard.read_bytes()
+
+
+def fill(folder: Path, text: str, failing: str = "") -> None:
+    """Write series.csv; then fail where `failing` says with what."""
+    with filled_folder(folder) as partial:
+        (partial / "series.csv").write_text(text)
+        if failing:
+            raise PomonaError(failing.format(partial))
+
+
+def test_files_of_a_folder_take_their_places_together_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "growth"
+    with pytest.raises(PomonaError, match=rf"^{folder}/fruits.csv: no space$"):
+        fill(folder, "half", "{}/fruits.csv: no space")
+    assert not folder.exists()
+    fill(folder, "first")
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(PomonaError, match="no space"):
+        fill(folder, "half", "no space")
+    assert (folder / "series.csv").read_text() == "first"
+    fill(folder, "second")
+    assert (folder / "series.csv").read_text() == "second"
+    assert names(folder) == ["notes.txt", "series.csv"]

@@ -13,7 +13,7 @@ from pomona.outputs import refuse_database
 from pomona.partial import partial_folder
 from pomona.streams import is_stream, send
 
-__all__ = ["NoLinksError", "new_file", "whole_file", "whole_folder"]
+__all__ = ["NoLinksError", "filled_folder", "new_file", "whole_file", "whole_folder"]
 
 
 @contextlib.contextmanager
@@ -90,11 +90,57 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     with _told(path):
         target = Path(os.path.realpath(path))
-        with partial_folder(target) as folder:
-            yield folder / target.name
+        with partial_folder(target) as folder, _named(path, folder / target.name) as partial:
+            yield partial
             if target.exists():
                 raise PomonaError(f"{path}: is already there, expected a new folder")
-            (folder / target.name).rename(target)
+            partial.rename(target)
+
+
+@contextlib.contextmanager
+def filled_folder(path: str | Path) -> Iterator[Path]:
+    """Give a temporary folder to write files to; they take their places in `path` when the block ends well.
+
+    The folder is made where it does not exist. Other files in it stay, and when the block raises so do all.
+
+    Raises
+    ------
+    PomonaError
+        When the folder cannot be made or written to, for example on a full disk.
+    """
+    path = Path(path)
+    with _told(path):
+        target = Path(os.path.realpath(path))
+        is_new = not target.exists()
+        target.mkdir(parents=True, exist_ok=True)
+        try:
+            # Within it: of a folder that is mounted nobody may write beside it.
+            with partial_folder(target / "files") as folder, _named(path, folder / "files") as partial:
+                partial.mkdir()
+                yield partial
+                _take_places(partial, target)
+        finally:
+            if is_new:
+                with contextlib.suppress(OSError):
+                    target.rmdir()  # which leaves a folder with files in it
+
+
+def _take_places(partial: Path, target: Path) -> None:
+    written = sorted(partial.iterdir())
+    for file in written:
+        _flush(file)
+        refuse_database(target / file.name)
+    for file in written:
+        file.replace(target / file.name)
+
+
+@contextlib.contextmanager
+def _named(path: Path, partial: Path) -> Iterator[Path]:
+    """Call what is being written what the user calls it where it cannot be."""
+    try:
+        yield partial
+    except PomonaError as error:
+        raise PomonaError(str(error).replace(str(partial), str(path))) from None
 
 
 @contextlib.contextmanager

@@ -34,6 +34,7 @@ def growth(
     json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Tell how every fruit grows, with 90 % intervals: tables and pictures of fruits, trees and size classes."""
+    from pomona.atomic import filled_folder
     from pomona.growth.growth_pictures import write_pictures
     from pomona.growth.growth_tables import write_tables
     from pomona.growth.harvest_day import harvest_day
@@ -44,8 +45,9 @@ def growth(
     limits_mm = FIVE_MM if classes is None else parsed_classes(classes)
     grown = grow_season(orchard, harvest=harvest_day(harvest), temperature=temperature, limits_mm=limits_mm)
     warn_of_visits(orchard, of_visits(grown))
-    output.mkdir(parents=True, exist_ok=True)
-    written = (*write_tables(output, grown, pack_kg=pack_kg), *write_pictures(output, grown))
+    with filled_folder(output) as partial:
+        files = (*write_tables(partial, grown, pack_kg=pack_kg), *write_pictures(partial, grown))
+    written = [output / file.name for file in files]
     if json:
         say_json({"output": [str(path) for path in written], **_summary(grown)})
     else:

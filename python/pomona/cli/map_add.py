@@ -22,7 +22,7 @@ from pomona.cli.match_options import (
     threads_option,
     up_option,
 )
-from pomona.cli.terminal import say, say_json
+from pomona.cli.terminal import say, say_json, tell
 
 if TYPE_CHECKING:
     from typing import Any
@@ -72,6 +72,7 @@ def map_add(
     from pomona.cli.progress import working
     from pomona.errors import PomonaError
     from pomona.orchard import add_sessions, load_session
+    from pomona.row_length import length_told
     from pomona.settings import Settings
 
     if unit is Unit.free and not orchard.exists():
@@ -94,6 +95,9 @@ def map_add(
     with working(f"adding {amount(sum(len(visit.cloud) for visit in visits), 'fruit')} to {orchard.name}"):
         answers = add_sessions(orchard, visits, settings=settings, new_part=new_part, replacing=replace)
     told = list(zip(visits, answers, strict=True))
+    for visit, added in told:
+        if added.length_in_map is not None:
+            tell(f"pomona: warning: {orchard}: {length_told(added.length_in_map, visit.name, 'the map')}")
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
         say_json(objects[0] if len(objects) == 1 else objects)
@@ -119,6 +123,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "torn_near": list(added.torn_near),
         "torn_like": added.torn_like,
         "season_before": added.season_before,
+        "length_in_map": added.length_in_map,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
         "fruits": {visit.cloud.label(row): fruit_id for row, fruit_id in enumerate(added.fruit_ids.tolist())}

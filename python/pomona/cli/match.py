@@ -80,6 +80,7 @@ def match(
     from pomona.cloud.files import read_cloud
     from pomona.file_names import require_suffix
     from pomona.pairs import write_pairs
+    from pomona.row_length import length_in_map, length_told
     from pomona.settings import Settings
 
     if output is not None:
@@ -106,6 +107,9 @@ def match(
     _print(answer, in_query, in_map, json=json, explain=explain)
     if answer.status == "NoMatch" and settings.call["up"] is not None:
         tell("pomona: only poses that stand upright by --up were taken; given once, it holds for both clouds")
+    length = length_in_map(answer, in_query, in_map)
+    if length is not None:
+        tell(f"pomona: {length_told(length, 'QUERY', 'MAP')}")
     _doubt_hands(in_query, in_map, answer, settings)
     if answer.status != "Found":
         raise typer.Exit(1)

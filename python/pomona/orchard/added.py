@@ -44,6 +44,9 @@ class Added:
     season_before : str, optional
         Of the first visit of a season to a part of the map, the date of the last one before that winter: it was found
         by the fruits of that season, and none of its own can be one of these.
+    length_in_map : float, optional
+        How long the row is in the map for each metre in the session, where metres of one of the two are wrong; None
+        where it is as long, as far as its bends let tell.
     was_there : bool
         Whether the map held the very session before, and stays as it was.
     """
@@ -60,3 +63,4 @@ class Added:
     torn_like: str | None = None
     was_there: bool = False
     season_before: str | None = None
+    length_in_map: float | None = None

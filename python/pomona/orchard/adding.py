@@ -27,6 +27,7 @@ from pomona.orchard.settling import SettledPart, Settlement, write_changes
 from pomona.orchard.tears import beside_tears, torn_alike
 from pomona.orchard.visit_days import require_visit_day
 from pomona.orchard.writing import Placement
+from pomona.row_length import length_in_map
 from pomona.settings import Settings
 from pomona.store import schema
 from pomona.store.failures import WrongContentError
@@ -202,7 +203,8 @@ def _add(
         else:
             added = Added(np.zeros(len(session.cloud), np.int64), 0, 0, 0, None)
         found = parts[0].found if parts else found
-        added = replace(added, match=found.match, known=found.known)
+        length = length_in_map(found.match, session.cloud, found.known)
+        added = replace(added, match=found.match, known=found.known, length_in_map=length)
         if found.match.n_parts > 1:
             near = tuple(beside_tears(found.match, session.cloud, found.known))
             added = replace(added, torn_near=near, torn_like=torn_like)

@@ -19,8 +19,12 @@ pub(crate) struct Cell {
     /// Sums over the pairs in the cell.
     pub(super) moments: Moments,
     pub(super) pose: Similarity,
+    /// What neighbours' residuals share in the cell: sums of their products and of the pairs.
+    pub(super) shared: [f64; 2],
     /// Whether growth has come here.
     pub(super) reached: bool,
+    /// Whether it stays as it is for now, its fruits with their partners: growth goes on elsewhere.
+    pub(super) at_rest: bool,
 }
 
 /// The cells of a cloud, as every growth starts with them.
@@ -34,6 +38,18 @@ pub(crate) struct Cut {
     pub(super) cell_of: Vec<u32>,
     /// Number of the cell at each place of the grid.
     pub(super) index: CellMap<usize>,
+}
+
+impl Cell {
+    /// Whether its pose and pairs are made anew.
+    pub(super) fn is_open(&self) -> bool {
+        self.reached && !self.at_rest
+    }
+
+    /// Whether they stay as they are.
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.reached && self.at_rest
+    }
 }
 
 impl Cut {
@@ -71,7 +87,9 @@ impl Cut {
                 around: neighbours(keys[i]).map(|other| (other as u32, closeness(i, other))).collect(),
                 moments: Moments::default(),
                 pose: Similarity::identity(),
+                shared: [0.0; 2],
                 reached: false,
+                at_rest: false,
             })
             .collect();
         // No corner of a cell is two edges from a fruit in it.

@@ -1,34 +1,30 @@
 //! What a fruit's displacement shares with its neighbours': sag and drift do, noise does not.
 
 use super::landscape::Landscape;
-use crate::neighbours::others::SHARE_OF_ROWS;
 use nalgebra::{SMatrix, SVector, Vector3};
-use rayon::prelude::*;
 
 /// From where a fruit was put to its partner, or to the mean of all that it may be, and the probability that it has one.
 pub(super) type Residual = Option<(Vector3<f64>, f64)>;
 
 /// Variance per axis of what neighbours' residuals share: noise is independent from fruit to fruit, sag is not.
-pub(super) fn shared_by_neighbours(query: &Landscape, residuals: &[Residual]) -> f64 {
-    let rows: Vec<usize> = (0..query.len()).collect();
-    let parts: Vec<[f64; 2]> = rows
-        .par_chunks(SHARE_OF_ROWS)
-        .map(|rows| {
-            let [mut products, mut pairs] = [0.0; 2];
-            for &row in rows {
-                let Some((own, weight)) = residuals[row] else { continue };
-                for (other, kinship) in query.kin(row) {
-                    let Some((rival, other_weight)) = residuals[other as usize] else { continue };
-                    let kernel = weight * other_weight * kinship;
-                    products += kernel * own.dot(&rival);
-                    pairs += kernel;
-                }
-            }
-            [products, pairs]
-        })
-        .collect();
-    let [products, pairs] = parts.iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+pub(super) fn shared_by_neighbours(parts: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let [products, pairs] = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
     if products > 0.0 { products / pairs / 3.0 } else { 0.0 }
+}
+
+/// Sums of the products of these fruits' residuals with their neighbours', and of the pairs.
+pub(super) fn products(query: &Landscape, rows: &[u32], residuals: &[Residual]) -> [f64; 2] {
+    let [mut products, mut pairs] = [0.0; 2];
+    for &row in rows {
+        let Some((own, weight)) = residuals[row as usize] else { continue };
+        for (other, kinship) in query.kin(row as usize) {
+            let Some((rival, other_weight)) = residuals[other as usize] else { continue };
+            let kernel = weight * other_weight * kinship;
+            products += kernel * own.dot(&rival);
+            pairs += kernel;
+        }
+    }
+    [products, pairs]
 }
 
 /// Neighbours that tell where a fruit has moved, at the most.

@@ -22,6 +22,10 @@ const WHOLE_ROUNDS: usize = 2;
 /// A patch, and its surroundings, may differ from the pose that they had as if this many pairs held them to it.
 pub(super) const HOLD: f64 = 2.0;
 
+/// Rounds after which a cell rests once it and those around it are reached: what pairs and patches make of each other has settled
+/// by then, and a long row costs no more for each of its trees than a short one.
+const SETTLES: usize = 6;
+
 /// Evidence in nats of a cell and its neighbours that lets growth go on from there.
 pub(super) const CONVINCING: f64 = 2.0;
 
@@ -31,8 +35,17 @@ pub(crate) struct Growth<'a> {
     pub(super) patches: Patchwork<'a>,
     /// The nearest fruit of the map, where no other fruit of the query is likelier to be it.
     pub(super) partners: Vec<Option<u32>>,
+    /// The nearest fruit of the map, and the likelihood ratio of the two being one.
+    nearest: Vec<Option<(u32, f64)>>,
+    /// What every fruit says, nats.
+    gains: Vec<f64>,
     /// Evidence of every cell that is reached, nats.
     log_odds: Vec<f64>,
+    /// Rounds of pairing so far, and after which of them each cell or one around it was reached last, or to be looked at again.
+    round: usize,
+    touched: Vec<usize>,
+    /// The cells that were reached in the last round.
+    reached: Vec<bool>,
     /// The pose is known to hold everywhere, and the noise is not what its pairs show.
     pub(super) whole: bool,
     /// Noise under which all fruits together say most, metres of the map, where they were asked.
@@ -51,6 +64,9 @@ pub(crate) fn grow<'a>(query: &'a Landscape, map: &'a Landscape, seed: &Hypothes
         growth.meet(rigid.copied().unwrap_or(1.0));
         growth.refit(rigid.is_some());
         settled = if growth.spread() { 0 } else { settled + 1 };
+        if settled > 0 || rigid.is_some() {
+            growth.wake();
+        }
         if settled >= TURNS && round > RIGID.len() + 2 {
             break;
         }
@@ -90,30 +106,68 @@ impl<'a> Growth<'a> {
         if let Some(nearest) = patches.cells.iter_mut().min_by(|a, b| far(a).total_cmp(&far(b))) {
             nearest.reached = true;
         }
-        let log_odds = vec![0.0; patches.cells.len()];
-        Self { patches, partners: vec![None; query.len()], log_odds, whole: false, sharpest: None }
+        let (fruits, cells) = (query.len(), patches.cells.len());
+        Self {
+            patches,
+            partners: vec![None; fruits],
+            nearest: vec![None; fruits],
+            gains: vec![0.0; fruits],
+            log_odds: vec![0.0; cells],
+            round: 0,
+            touched: vec![0; cells],
+            reached: vec![false; cells],
+            whole: false,
+            sharpest: None,
+        }
+    }
+
+    /// All cells are to be looked at again.
+    fn wake(&mut self) {
+        self.touched.fill(self.round);
+    }
+
+    /// A new round, in which those cells rest around which none was reached, or given up, for some rounds.
+    fn begin(&mut self) {
+        for (i, cell) in self.patches.cells.iter().enumerate() {
+            if cell.reached != self.reached[i] {
+                self.reached[i] = cell.reached;
+                cell.around.iter().for_each(|&(other, _)| self.touched[other as usize] = self.round);
+            }
+        }
+        for (cell, touched) in self.patches.cells.iter_mut().zip(&self.touched) {
+            cell.at_rest = self.round > touched + SETTLES;
+        }
+        self.round += 1;
     }
 
     /// Predicts the fruits of the reached cells, and finds their nearest partners; of several claims on one fruit the likeliest
     /// wins.
     pub(super) fn meet(&mut self, widening: f64) {
+        self.begin();
         self.patches.predict(
             |patches, cell| patches.footing(cell, ALL, HOLD),
             |patches, row, footing| patches.landing(row, footing.looseness(&patches.query.points[row]), widening),
         );
-        let Patchwork { map, model, .. } = self.patches;
-        let met = each_row(self.partners.len(), |row| self.nearest(row, self.patches.predictions[row].as_ref()?));
+        let Patchwork { map, model, cut, .. } = self.patches;
+        let rests = |row: usize| self.patches.cells[cut.cell_of[row] as usize].is_at_rest();
+        let nearest = |row: usize| {
+            if rests(row) { self.nearest[row] } else { self.nearest_to(row, self.patches.predictions[row].as_ref()?) }
+        };
+        self.nearest = each_row(self.partners.len(), nearest);
         let mut claims = Claims::on(map.len());
-        for (row, met) in met.iter().enumerate() {
-            if let Some((partner, ratio)) = *met {
+        for (row, nearest) in self.nearest.iter().enumerate() {
+            if let Some((partner, ratio)) = *nearest {
                 claims.claim(partner, row, ratio);
             }
         }
-        let mut gains = vec![0.0; met.len()];
-        for (row, met) in met.into_iter().enumerate() {
-            let kept = met.filter(|met| claims.owner(met.0) == Some(row));
-            gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
-            self.partners[row] = kept.map(|(partner, _)| partner);
+        for row in 0..self.partners.len() {
+            let kept = self.nearest[row].filter(|met| claims.owner(met.0) == Some(row));
+            let partner = kept.map(|(partner, _)| partner);
+            if partner == self.partners[row] && self.patches.cells[cut.cell_of[row] as usize].is_at_rest() {
+                continue;
+            }
+            self.gains[row] = kept.map_or_else(|| self.alone(row), |(_, ratio)| ratio.ln());
+            self.partners[row] = partner;
             let model = model.of_share(self.patches.share_seen(row));
             let target =
                 |(partner, ratio): (u32, f64)| (map.points[partner as usize], model.no_stranger(ratio).max(0.0));
@@ -121,12 +175,12 @@ impl<'a> Growth<'a> {
         }
         self.patches.look();
         self.patches.sum_up();
-        let of_cell = |cell: &Cell| cell.rows.iter().map(|&row| gains[row as usize]).sum();
+        let of_cell = |cell: &Cell| cell.rows.iter().map(|&row| self.gains[row as usize]).sum();
         self.log_odds = self.patches.cells.iter().map(of_cell).collect();
     }
 
     /// The fruit of the map nearest to where one is expected, and the likelihood ratio of the two being one.
-    fn nearest(&self, row: usize, Landing { place, variance }: &Landing) -> Option<(u32, f64)> {
+    fn nearest_to(&self, row: usize, Landing { place, variance }: &Landing) -> Option<(u32, f64)> {
         let Patchwork { map, model, .. } = self.patches;
         let (partner, d2) = map.nearest(place, GATE * variance.sqrt())?;
         let model = model.of_share(self.patches.share_seen(row));
@@ -180,6 +234,7 @@ impl<'a> Growth<'a> {
 
     /// Fits to the pairs and makes them anew.
     pub(super) fn go_on(&mut self) {
+        self.wake();
         for _ in 0..WHOLE_ROUNDS {
             self.refit(false);
             self.meet(1.0);

@@ -8,7 +8,7 @@
 
 use super::cut::{Cell, Cut};
 use super::direction::Direction;
-use super::displacement::{Residual, carried_on, shared_by_neighbours};
+use super::displacement::{Residual, carried_on, products, shared_by_neighbours};
 use super::footing::Footing;
 use super::hypothesis::Model;
 use super::landscape::Landscape;
@@ -109,11 +109,14 @@ impl<'a> Patchwork<'a> {
         footing: impl Fn(&Self, &Cell) -> F + Sync,
         landing: impl Fn(&Self, usize, F) -> Landing + Sync,
     ) {
-        let footing = |cell: &Cell| cell.reached.then(|| footing(self, cell));
+        let footing = |cell: &Cell| cell.is_open().then(|| footing(self, cell));
         let footings: Vec<Option<F>> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(footing).collect();
         let at = |row: usize| {
-            let footing = footings[self.cut.cell_of[row] as usize]?;
-            Some(landing(self, row, footing))
+            let cell = self.cut.cell_of[row] as usize;
+            if let Some(footing) = footings[cell] {
+                return Some(landing(self, row, footing));
+            }
+            self.predictions[row].filter(|_| self.cells[cell].reached)
         };
         self.predictions = each_row(self.query.len(), at);
     }
@@ -146,7 +149,7 @@ impl<'a> Patchwork<'a> {
                 }
             }
         };
-        self.cells.par_iter_mut().with_min_len(SHARE_OF_CELLS).filter(|cell| cell.reached).for_each(of_cell);
+        self.cells.par_iter_mut().with_min_len(SHARE_OF_CELLS).filter(|cell| cell.is_open()).for_each(of_cell);
     }
 
     /// Sums over all pairs.
@@ -192,7 +195,10 @@ impl<'a> Patchwork<'a> {
 
     /// What neighbours share of what patches left over; returns the squares of the rest and the weight of the pairs.
     pub(super) fn share(&mut self) -> (f64, f64) {
-        self.shared = shared_by_neighbours(self.query, &self.left_over);
+        let (query, left_over) = (self.query, &self.left_over);
+        let of_cell = |cell: &mut Cell| cell.shared = products(query, &cell.rows, left_over);
+        self.cells.par_iter_mut().with_min_len(SHARE_OF_CELLS).filter(|cell| cell.is_open()).for_each(of_cell);
+        self.shared = shared_by_neighbours(self.cells.iter().filter(|cell| cell.reached).map(|cell| cell.shared));
         let (squares, weight) = self
             .left_over
             .iter()
@@ -204,7 +210,10 @@ impl<'a> Patchwork<'a> {
     /// Pairs that hold a pose to the one above it: noise over the variance by which neighbours differ from that
     /// together.
     pub(super) fn firmness(&self) -> f64 {
-        let shared = shared_by_neighbours(self.query, &self.residuals());
+        let residuals = self.residuals();
+        let of_cell = |cell: &Cell| products(self.query, &cell.rows, &residuals);
+        let parts: Vec<[f64; 2]> = self.cells.par_iter().with_min_len(SHARE_OF_CELLS).map(of_cell).collect();
+        let shared = shared_by_neighbours(parts.into_iter());
         1.0 / (shared / (self.sigma * self.sigma)).max(f64::EPSILON)
     }
 
@@ -212,7 +221,7 @@ impl<'a> Patchwork<'a> {
     fn fit(&mut self, least: f64, hold: f64) {
         let prior = hold * self.cut.edge * self.cut.edge;
         let fitted = |cell: &Cell| {
-            if !cell.reached {
+            if !cell.is_open() {
                 return cell.pose;
             }
             let mut moments = self.pairs_around(cell, least);

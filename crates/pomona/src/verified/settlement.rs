@@ -124,6 +124,7 @@ impl<'a> Settlement<'a> {
             None => KnownNoise { sigma: growth.patches.model.sigma, width: GUESSED },
         };
         let mut patches = Patchwork { direction: direction.clone(), ..growth.patches.clone() };
+        patches.cells.iter_mut().for_each(|cell| cell.at_rest = false);
         // Trees that were replaced would be taken for noise from the first turn on.
         let grown: Vec<f64> = patches.targets.iter().map(|target| target.map_or(0.0, |(_, weight)| weight)).collect();
         patches.replaced = of_places(patches.query, &grown, &patches.due()).replaced;
