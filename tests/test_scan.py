@@ -273,7 +273,7 @@ def test_a_part_that_saw_nothing_twice_has_no_fruits(row, n_frames, n_fruits):
         "\n".join(line.rpartition(",")[0] for line in (row / "detections.csv").read_text().splitlines()) + "\n"
     )
     seeing = Seeing(recording, open_detector(None, None, recording))
-    part = OpenPart(0, None, lambda: Tracker(recording.calibration), Believing(recording.calibration, {}))
+    part = OpenPart(0, None, lambda _: Tracker(recording.calibration), Believing(recording.calibration, {}))
     frames = list(recording.frames())[:n_frames]
     for frame in frames:
         part.add(seeing(frame), frame.time_s, frame.session_from_camera)

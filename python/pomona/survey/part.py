@@ -18,11 +18,18 @@ from pomona.survey.registration import Fruits
 from pomona.survey.rows_behind import rows_behind
 from pomona.survey.seeing import Look
 from pomona.survey.sightings import Sightings, fruits_of, places_of
+from pomona.survey.swinging import allowed_m, swing_m
 from pomona.survey.tally import Tally, TrackFate, often_enough, track_fates
 from pomona.survey.tracking import Tracker, Tracks
 from pomona.trajectory import Trajectory
 
 __all__ = ["Boxes", "OpenPart", "Part"]
+
+SWINGS = 4
+"""Times that a swing is measured at the most."""
+
+ALLOWED_FOR = 1.25
+"""A swing that asks for so much more than was allowed for is as good as allowed for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +76,8 @@ class Part:
         What became of its boxes and tracks.
     crops : mapping of int to FruitCrop
         Of each fruit, by its row in the cloud, as far as there are any.
+    swing_m : float
+        By how much fruits that were tracked swing while they are filmed, standard deviation per axis, metres.
     """
 
     cloud: FruitCloud
@@ -78,6 +87,7 @@ class Part:
     frames_in_view: float | None = None
     tally: Tally = field(default_factory=Tally)
     crops: Mapping[int, FruitCrop] = field(default_factory=dict)
+    swing_m: float = 0.0
 
     def __repr__(self) -> str:
         return f"Part({', '.join(f'{name}: {value}' for name, value in self.facts.items())})"
@@ -105,7 +115,8 @@ class OpenPart:
     began : str or None
         Why it began.
     open_tracker : callable
-        Opens what tells which boxes are one fruit; gives None where the boxes carry names, or there is one frame.
+        Opens what tells which boxes are one fruit, where it may be so many metres from where it was seen last; gives
+        None where the boxes carry names, or there is one frame.
     believing : Believing
         Tells which tracks are fruits.
     with_crops : bool
@@ -118,14 +129,14 @@ class OpenPart:
         self,
         number: int,
         began: str | None,
-        open_tracker: Callable[[], Tracker | None],
+        open_tracker: Callable[[float], Tracker | None],
         believing: Believing,
         *,
         with_crops: bool = True,
         all_rows: bool = False,
     ) -> None:
         self._number, self._began, self._open_tracker, self._believing = number, began, open_tracker, believing
-        self._tracker, self._with_crops, self._shots = open_tracker(), with_crops, BestShots()
+        self._tracker, self._with_crops, self._shots = open_tracker(0.0), with_crops, BestShots()
         self._all_rows = all_rows
         self._looks: list[Look] = []
         self._times_s: list[float] = []
@@ -189,6 +200,7 @@ class OpenPart:
     def closed(self, poses: NDArray[np.float64]) -> Part:
         """Make the fruits of all the frames, at these poses (F, 4, 4)."""
         sightings = Sightings.of(self._looks)
+        swing = 0.0 if self._tracker is None else self._track_swinging(sightings, poses)
         tracks = None if self._tracker is None else self._tracker.finish(min_views=1)
         first = joined = owners = self._named() if tracks is None else self._tracked(tracks)
         frames = [look.frame for look in self._looks]
@@ -207,6 +219,9 @@ class OpenPart:
             fruits_of(measured.sightings, measured.fruits, self._looks, poses, measured.names),
             measured.row_of,
         )
+        if swing > 0.0 and cloud.covariances is not None:
+            # Of a swing a fruit shows a part while it is in view: its middle lies anywhere in it.
+            cloud = replace(cloud, covariances=cloud.covariances + swing**2 * np.eye(3))
         if probability is not None:
             of_cloud = np.argsort(row_of[:-1])[len(row_of) - 1 - len(cloud) :]
             cloud = _with_probability(cloud, probability[of_cloud])
@@ -218,7 +233,24 @@ class OpenPart:
         boxes = _boxes(self._looks, row_of[owners.fruits])
         tally = Tally.of(self._looks, boxes.fruits, first.fruits, joined.fruits, fates, is_behind)
         crops = self._shots.crops(boxes.frames, boxes.fruits)
-        return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally, crops)
+        return Part(cloud, trajectory, boxes, self._began, frames_in_view, tally, crops, swing)
+
+    def _track_swinging(self, sightings: Sightings, poses: NDArray[np.float64]) -> float:
+        """Track the boxes again as far as fruits are found to swing; return by how much, metres."""
+        allowed = 0.0
+        for _ in range(SWINGS):
+            measured = _Measured.of(sightings, self._owners())
+            centres, _ = places_of(measured.sightings, measured.fruits, poses)
+            found_m = swing_m(measured.sightings, measured.fruits, poses, centres)
+            if allowed_m(found_m) <= ALLOWED_FOR * allowed:
+                break
+            allowed = allowed_m(found_m)
+            self._tracker = self._open_tracker(allowed)
+            assert self._tracker is not None
+            for look, pose in zip(self._looks, poses, strict=True):
+                if look.detections.looked:
+                    self._tracker.update(look.frame, pose, look.detections, look.lifted)
+        return found_m
 
     def _behind(self, tracks: Tracks, is_fruit: NDArray[np.bool_], poses: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which of the tracks that are fruits hang in a row behind, (N,)."""

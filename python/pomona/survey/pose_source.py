@@ -174,7 +174,9 @@ class Followed:
         rows = np.array([row_of.get(int(count), -1) for count in way.frames], np.int64).reshape(-1)
         first, second = rows[way.first], rows[way.second]
         kept = np.flatnonzero((first >= 0) & (second >= 0))
-        return Motions(first[kept], second[kept], way.first_from_second[kept], way.information[kept])
+        # In a gust most points of the picture move with the leaves, and what agrees may be a motion that never was.
+        doubtful = np.ones(len(kept), bool)
+        return Motions(first[kept], second[kept], way.first_from_second[kept], way.information[kept], doubtful)
 
     def refined(
         self, part: int, frames: Sequence[int], sightings: Sightings, fruits: NDArray[np.int64]

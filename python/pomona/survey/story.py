@@ -35,6 +35,7 @@ from pomona.survey.prefetch import prefetched
 from pomona.survey.rejoining import rejoined
 from pomona.survey.seeing import Look, Seeing, looked_ahead
 from pomona.survey.standing import Standing
+from pomona.survey.swinging import allowing, tell_swing
 from pomona.survey.tally import BoxFate, Tally, tell_little
 from pomona.survey.told_layers import tell_farther_layer
 from pomona.survey.tracking import Tracker
@@ -207,6 +208,7 @@ def scan(
     if depth == "auto":
         check_depth_pictures(recording, boxes)
     check_long_boxes(recording.path, recording.calibration, survey.parts)
+    tell_swing(recording.path, [part.swing_m for part in survey.parts])
     check_places_of_boxes(recording.path, recording.calibration, survey.parts)
     _check_sizes(recording, survey)
     _check_pace(recording, survey)
@@ -228,8 +230,8 @@ def _open_part(
 ) -> OpenPart:
     """Open a part whose boxes are tracked, or, without a configuration, go by their names."""
 
-    def open_tracker() -> Tracker | None:
-        return None if config is None else Tracker(recording.calibration, config)
+    def open_tracker(allowed_m: float) -> Tracker | None:
+        return None if config is None else Tracker(recording.calibration, allowing(config, allowed_m))
 
     believing = Believing(recording.calibration, config or {})
     return OpenPart(number, began, open_tracker, believing, with_crops=crops, all_rows=all_rows)
