@@ -136,6 +136,18 @@ def test_poses_of_ten_a_second_reach_pictures_of_ten_a_second(video, tmp_path):
     assert_poses(open_recording(video, poses=poses), range(12))
 
 
+def test_pictures_in_milliseconds_and_poses_in_seconds_are_told_apart(tmp_path):
+    folder = make_recording(tmp_path / "2024-08-09", (0.0, 0.1, 0.2, 0.3, 0.4))
+    (folder / "times.txt").write_text("0\n100\n200\n300\n400\n")
+    (folder / "poses_tum.txt").write_text("".join(f"{at_s} {at_s} 0 0 0 0 0 1\n" for at_s in np.arange(5) / 10))
+    with pytest.raises(PomonaError, match="expected seconds in both: those of the pictures look like milliseconds"):
+        open_recording(folder)
+    (folder / "times.txt").write_text("0.0\n0.1\n0.2\n0.3\n0.4\n")
+    (folder / "poses_tum.txt").write_text("".join(f"{at} {at} 0 0 0 0 0 1\n" for at in np.arange(5) * 1e8))
+    with pytest.raises(PomonaError, match="those of the poses look like nanoseconds"):
+        open_recording(folder)
+
+
 def test_boxes_are_those_of_all_frames_whether_they_have_poses_or_not(pomona, tmp_path):
     folder = make_recording(tmp_path / "2024-08-09", (0.0, 0.1, 0.2, 0.3, 0.4))
     (folder / "times.txt").write_text("0.0\n0.1\n0.2\n0.3\n0.4\n")

@@ -9,7 +9,7 @@ import pytest
 
 import pomona
 from depth_scene import picture
-from pomona import FruitCloud, PomonaError
+from pomona import FruitCloud, PomonaError, PomonaWarning
 from pomona.detect import Detections
 from pomona.detect.from_file import FileDetector
 from pomona.detect.masks import MIN_SIDE_PX, boxes_of
@@ -64,6 +64,23 @@ def test_boxes_of_the_whole_serve_its_parts(row: Path) -> None:
     (row / "detections.csv").write_text("frame,xmin,ymin,xmax,ymax\n3,10,10,40,40\n")
     with pytest.raises(PomonaError, match=r"line 2: frame: found 3, expected a frame there is \(0 to 2\)"):
         pomona.scan(part)
+
+
+def test_boxes_of_frames_whose_pictures_are_gone_are_left_out_and_told(row: Path) -> None:
+    header, *lines = (row / "detections.csv").read_text().splitlines()
+    middle = [line for line in lines if line.startswith("1,")]
+    for file in row.glob("*/0001.png"):
+        file.unlink()
+    (row / "poses_tum.txt").unlink(missing_ok=True)
+    others = [line for line in lines if not line.startswith("1,")]
+    (row / "detections.csv").write_text("\n".join([header, *others, *middle]) + "\n")
+    recording = open_recording(row)
+    with pytest.warns(PomonaWarning, match=f"found 1, which has no picture: {len(middle)} boxes of 1 frame are left"):
+        detector = FileDetector.read(row / "detections.csv", recording.calibration, recording.recorded_numbers)
+    assert [len(detector(frame)) for frame in recording.frames()] == [3, 3]
+    (row / "detections.csv").write_text("\n".join([header, others[0], *middle]) + "\n")
+    with pytest.raises(PomonaError, match="which has no picture, as 3 of 4 boxes: of other frames"):
+        FileDetector.read(row / "detections.csv", recording.calibration, recording.recorded_numbers)
 
 
 def test_takes_a_detector_of_ones_own(row: Path, tmp_path: Path) -> None:

@@ -52,24 +52,43 @@ def by_frame(
 ) -> dict[int, Detections]:
     """Sort boxes by frame; a box partly outside the picture is cut at its edge, and it is told where most are outside.
 
+    Boxes of frames whose pictures are missing are left out, and told.
+
     Raises
     ------
     PomonaError
-        When a box is not in a frame there is, wholly outside the picture, or its score is not 0 to 1; when only some
-        boxes have ids, or one frame has an id twice.
+        When a box is not in a frame there is and in none that is missing between those, wholly outside the picture, or
+        its score is not 0 to 1; when only some boxes have ids, or one frame has an id twice.
     """
     frames: dict[int, list[ListedBox]] = {}
+    without_picture: list[ListedBox] = []
     known = set(numbers)
     for box in boxes:
         if box.frame not in known:
             have = f"{min(known)} to {max(known)}" if known else "none"
-            found = f"frame: found {box.frame}"
-            raise PomonaError(f"{path}: {box.where}: {found}, expected a frame there is ({have})")
+            if not known or not min(known) < box.frame < max(known):
+                raise PomonaError(f"{path}: {box.where}: frame: found {box.frame}, expected a frame there is ({have})")
+            without_picture.append(box)
+            continue
         _check(path, box, calibration)
         frames.setdefault(box.frame, []).append(box)
+    _tell_without_picture(path, without_picture, sum(map(len, frames.values())))
     _require_ids_of_all_or_none(path, frames)
     _tell_outside(path, [box for found in frames.values() for box in found], calibration)
     return {number: _detections(path, number, found, calibration) for number, found in sorted(frames.items())}
+
+
+def _tell_without_picture(path: Path, boxes: Sequence[ListedBox], others: int) -> None:
+    """Warn of boxes of frames that are missing among those there are; where most are, they are of other frames."""
+    if not boxes:
+        return
+    missing = amount(len({box.frame for box in boxes}), "frame")
+    found = f"{boxes[0].where}: frame: found {boxes[0].frame}, which has no picture"
+    if len(boxes) > others:
+        raise PomonaError(f"{path}: {found}, as {len(boxes)} of {amount(len(boxes) + others, 'box')}: of other frames?")
+    warnings.warn(
+        f"{path}: {found}: {amount(len(boxes), 'box')} of {missing} are left out", PomonaWarning, stacklevel=4
+    )
 
 
 def _check(path: Path, box: ListedBox, calibration: Calibration) -> None:

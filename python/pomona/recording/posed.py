@@ -105,7 +105,7 @@ def with_poses(recording: RectifiedRecording, path: Path) -> Recording:
     if times_s is not None:
         poses, has_pose = poses_at(times_s, known_s, known)
         if has_pose.any() or len(known) != len(recording):
-            rows = posed_rows(path, has_pose)
+            rows = posed_rows(path, has_pose, clocks=(times_s, known_s))
             return _posed(recording, path, rows, times_s[rows], poses[rows])
         message = f"{path}: no pose at the time of any picture: taken one for each frame, in order"
         warnings.warn(message, PomonaWarning, stacklevel=3)

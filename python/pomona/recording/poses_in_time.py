@@ -18,6 +18,12 @@ LONGEST_GAP_S = 0.1
 SAME_S = 0.005
 """Times that are so near are one: clocks are written in milliseconds, and in these a camera in a row moves 5 mm."""
 
+UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+"""By how many times a span is too long in them."""
+
+ALIKE = 1.3
+"""Spans of one drive, in one unit, differ by this factor at most: poses begin earlier and end later."""
+
 
 def poses_at(
     times_s: NDArray[np.float64],
@@ -65,15 +71,33 @@ def poses_at(
     return poses, has_pose | same
 
 
-def posed_rows(path: Path, has_pose: NDArray[np.bool_], longest_gap_s: float = LONGEST_GAP_S) -> NDArray[np.int64]:
+def posed_rows(
+    path: Path,
+    has_pose: NDArray[np.bool_],
+    longest_gap_s: float = LONGEST_GAP_S,
+    *,
+    clocks: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+) -> NDArray[np.int64]:
     """Rows that have a pose; says how many have none.
+
+    Parameters
+    ----------
+    path : Path
+        What has the poses.
+    has_pose : (F,) bool
+    longest_gap_s : float
+        As in `poses_at`.
+    clocks : two arrays of float64, optional
+        Times of the pictures and of the poses, as they were written: where most have none, their units are compared.
 
     Raises
     ------
     PomonaError
-        When none has.
+        When none has, or hardly one for the times are in another unit.
     """
     missing = int((~has_pose).sum())
+    if clocks is not None and 2 * missing > len(has_pose):
+        _require_same_unit(path, *clocks)
     if missing == len(has_pose):
         raise PomonaError(f"{path}: found no pose at the time of any picture, expected the same clock")
     if missing:
@@ -82,3 +106,17 @@ def posed_rows(path: Path, has_pose: NDArray[np.bool_], longest_gap_s: float = L
         )
         warnings.warn(message, PomonaWarning, stacklevel=4)
     return np.flatnonzero(has_pose)
+
+
+def _require_same_unit(path: Path, times_s: NDArray[np.float64], known_s: NDArray[np.float64]) -> None:
+    """Refuse times of which those of pictures or of poses go a thousand times as fast, or a million."""
+    spans = [float(np.ptp(clock)) if len(clock) else 0.0 for clock in (times_s, known_s)]
+    if min(spans) <= 0.0:
+        return
+    for factor, unit in UNITS.items():
+        for (longer, shorter), names in ((spans, ("pictures", "poses")), (spans[::-1], ("poses", "pictures"))):
+            if 1.0 / ALIKE < longer / shorter / factor < ALIKE:
+                raise PomonaError(
+                    f"{path}: found times of the {names[0]} over {longer:g} s and of the {names[1]} over {shorter:g} "
+                    f"s, expected seconds in both: those of the {names[0]} look like {unit}"
+                )

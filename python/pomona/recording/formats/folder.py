@@ -204,7 +204,7 @@ def _trajectory(
     rows = np.arange(len(numbers))
     if times_s is not None:
         poses, has_pose = poses_at(times_s, known_s, known)
-        rows = posed_rows(path, has_pose)
+        rows = posed_rows(path, has_pose, clocks=(times_s, known_s))
         known_s, known = times_s[rows], poses[rows]
     elif len(known_s) != len(numbers):
         expected = f"one for each of the {len(numbers)} frames, or the times of the frames in times.txt"
