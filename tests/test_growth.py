@@ -1,12 +1,12 @@
 """Growth of the fruits of a map against curves that are known: sizes, rates, forecasts and how far each is trusted."""
 
 from dataclasses import replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.growth_draw import draw_sizes
+from benchmarks.growth_draw import as_fruits, draw_sizes
 from benchmarks.growth_outside import course_outside
 from benchmarks.growth_scores import scores
 from numpy.typing import NDArray
@@ -158,6 +158,21 @@ def test_what_no_curve_foretells_is_in_the_interval() -> None:
     assert found["bias_mm"] > 2.5
     assert found["block_covered"]
     assert found["fruits_covered"] > 0.8 * found["n_fruits"]
+
+
+def test_rates_of_three_visits_hold_a_bend_that_is_sharper_than_usual() -> None:
+    """Growth that falls from 0.9 to 0.4 mm a day in five weeks, where the usual curve falls to 0.5."""
+    rng, days = np.random.default_rng(5), np.array([0.0, 16.0, 34.0])
+    last_mm, onsets = 72.0 * np.exp(rng.normal(0.0, 0.08, (60, 1))), rng.normal(0.0, 3.0, (60, 1))
+    rates = (0.026 * last_mm * np.exp(-0.026 * (days[-1] + 25.0 - onsets)))[:, 0]
+    true_mm = last_mm * (1.0 - np.exp(-0.026 * (days + 25.0 - onsets)))
+    sizes_mm = true_mm * np.exp(rng.normal(0.0, 0.035, (60, 3)))
+    moments = tuple(datetime(2024, 5, 25) + timedelta(day) for day in days)
+    told = growth_of(as_fruits(sizes_mm, np.zeros(60, np.int64), moments, np.ones(60, bool))).foretold
+    surprises = (told.rates_mm_per_day - rates) / told.rate_sigmas_mm_per_day
+    assert np.mean(np.abs(surprises) < ndtri(NINETY[1])) > 0.85
+    low, high = np.quantile(told.summaries["blocks"][:, 0, -1], NINETY)
+    assert low < rates.mean() < high
 
 
 def test_a_forecast_is_the_wider_the_farther_ahead(row_growth: SeasonGrowth) -> None:

@@ -40,16 +40,23 @@ def _numbers(grown: SeasonGrowth) -> np.ndarray:
     return np.array([int(labels[0].split()[1]) for labels in grown.fruits.labels])
 
 
-@pytest.mark.parametrize(("slowed_from", "is_told"), [(0.0, False), (80.0, True)])
+@pytest.mark.parametrize(("slowed_from", "is_told"), [(0.0, False), (76.0, True)])
 def test_that_all_fruits_have_hardly_grown_is_told(tmp_path: Path, slowed_from: float, is_told: bool) -> None:
     """Curves go on where one visit alone says that a whole row does not: it may be off."""
     slow = range(3 * FRUITS_OF_TREE) if is_told else ()
-    row = grow_row(tmp_path / "o.gpkg", (50, 65, 80, 110), dropping=slow, slowed_from=slowed_from)
+    row = grow_row(tmp_path / "o.gpkg", (50, 75, 100), dropping=slow, slowed_from=slowed_from)
     lines = [line for line in of_visits(grow_season(row.path)) if "have they stopped?" in line]
     assert len(lines) == is_told
     if is_told:
         assert lines[0].startswith("fruits grew by ")
-        assert f"from {row.day(80)} to {row.day(110)} where the curves say +" in lines[0]
+        assert f"from {row.day(75)} to {row.day(100)} where the curves say +" in lines[0]
+
+
+def test_a_row_that_slows_down_has_its_slower_rate(tmp_path: Path) -> None:
+    """A quarter of the pace for the month before the last of four visits: growth has strayed, no visit is off."""
+    row = grow_row(tmp_path / "o.gpkg", (50, 65, 80, 110), dropping=range(90), slowed_from=80.0)
+    rate = np.mean(row.sizes_mm(110.5) - row.sizes_mm(109.5))
+    assert grow_season(row.path).foretold.rates_mm_per_day.mean() == pytest.approx(rate, abs=0.08)
 
 
 def test_who_has_stopped_is_told(row_growth: SeasonGrowth, stopped: SeasonGrowth) -> None:
