@@ -24,7 +24,7 @@ from pomona.errors import PomonaWarning
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
 from pomona.recording.late_eye import FEWEST, SURE_SHARE, frames_late
-from pomona.recording.lens_bend import Bend, bend_of
+from pomona.recording.lens_bend import Bend, bend_of, distinct
 from pomona.recording.part_of_recording import PartOfRecording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.recording.row_corners import row_errors
@@ -35,8 +35,9 @@ __all__ = ["Alignment", "StraightenedRecording", "alignment_of", "straightened"]
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-LOOKED_AT = 6
-"""Frames, evenly over the recording, that are measured."""
+LOOKED_AT, LOOKED_AT_LONGER = 6, 24
+"""Frames, evenly over the recording, that are measured; where those may show a bend, which parts the corners of leaves
+by less than they err, so many."""
 
 STRETCH_TOLD, MOST_STRETCH = 0.003, 0.02
 """By which the right picture is larger: told from, and taken out up to; good pairs are measured below 0.001."""
@@ -134,8 +135,7 @@ def straightened(recording: Recording) -> Recording:
 
 def alignment_of(recording: Recording) -> Alignment | None:
     """Measure how right pictures lie to left ones; None where too little shows in both, or one is not there."""
-    middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
-    rows = list(dict.fromkeys(min(row, len(recording) - 1) for row in middles.tolist()))
+    rows = _evenly(len(recording), LOOKED_AT)
     centre_px = (recording.calibration.cx, recording.calibration.cy)
     found = _corners(recording, rows, row_errors)
     if found is None:
@@ -143,16 +143,36 @@ def alignment_of(recording: Recording) -> Alignment | None:
     within_px = max(AT_ONCE_WIDTHS * recording.calibration.width, LEAST_AT_ONCE_PX)
     agreeing = partial(_agreeing, centre_px=centre_px, within_px=within_px)
     n_agreeing = agreeing(found)
-    bend = bend_of(found, centre_px, recording.calibration.fx)
+    longer, bend = _looked_at_longer(recording, found)
     # Most corners of pictures that were not taken at once agree on nothing, bent or not.
-    if bend is not None and agreeing(bend.taken_out_of(found)) >= SURE_SHARE * len(found):
+    if bend is not None and bend.is_sure and agreeing(bend.taken_out_of(longer)) >= SURE_SHARE * len(longer):
         return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, bend=bend)
+    # Corners that are mostly above or below the middle show a turn about the vertical as one about the axis, too.
+    fitted = _fitted(bend.taken_out_of(longer) if bend is not None and bend.is_likely else longer, centre_px)
     if n_agreeing >= max(SURE, SURE_SHARE * len(found)):
-        return _fitted(found, centre_px)
+        return fitted
     if len(found) >= FEWEST and (late := frames_late(recording, rows, n_agreeing, agreeing)):
         return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, frames_late=late)
     anywhere = _corners(recording, rows, far_corners)
-    return (None if anywhere is None else _beyond(anywhere, centre_px)) or _fitted(found, centre_px)
+    return (None if anywhere is None else _beyond(anywhere, centre_px)) or fitted
+
+
+def _evenly(n_frames: int, most: int) -> list[int]:
+    """Give the rows of the frames in the middles of so many equal parts of a recording."""
+    middles = (2 * np.arange(min(most, n_frames)) + 1) * n_frames // (2 * most)
+    return list(dict.fromkeys(min(row, n_frames - 1) for row in middles.tolist()))
+
+
+def _looked_at_longer(recording: Recording, found: Array) -> tuple[Array, Bend | None]:
+    """Fit a bend to the corners of a few frames, and of more where those may show one; give the last ones."""
+    calibration = recording.calibration
+    centre_px = (calibration.cx, calibration.cy)
+    bend = bend_of(found, centre_px, calibration.fx)
+    if bend is None or not bend.is_suspected:
+        return found, bend
+    many = _corners(recording, _evenly(len(recording), LOOKED_AT_LONGER), row_errors)
+    longer = distinct(found if many is None else many)
+    return longer, bend_of(longer, centre_px, calibration.fx)
 
 
 def _corners(recording: Recording, rows: list[int], find: Callable[[Picture, Picture], Array]) -> Array | None:
