@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -37,7 +38,17 @@ def depth_of(frame: int, moved_px: tuple[int, int], size: float) -> np.ndarray:
     return np.where(rng.random(leaves.shape) < 0.2, 0, noisy).astype(np.uint16)
 
 
-def told(folder: Path, moved_px: tuple[int, int] = (0, 0), size: float = 1.0, late: int = 0) -> str:
+def told(folder: Path, **wrong: Any) -> str:
+    """What is warned of."""
+    boxes = made(folder, **wrong)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", PomonaWarning)
+        check_depth_pictures(open_recording(folder), [boxes])
+    return " ".join(str(one.message) for one in caught)
+
+
+def made(folder: Path, moved_px: tuple[int, int] = (0, 0), size: float = 1.0, late: int = 0) -> Boxes:
+    """Write a recording, and give its boxes."""
     for side in ("left", "depth"):
         (folder / side).mkdir(parents=True)
     for frame in range(N_FRAMES):
@@ -47,12 +58,7 @@ def told(folder: Path, moved_px: tuple[int, int] = (0, 0), size: float = 1.0, la
     frames = np.repeat(np.arange(N_FRAMES), [len(places(frame)) for frame in range(N_FRAMES)])
     middles = np.concatenate([places(frame) for frame in range(N_FRAMES)])
     boxes_px = np.hstack([middles - RADIUS_PX, middles + RADIUS_PX])
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", PomonaWarning)
-        check_depth_pictures(
-            open_recording(folder), [Boxes(frames, boxes_px, np.ones(len(frames)), np.full(len(frames), -1))]
-        )
-    return " ".join(str(one.message) for one in caught)
+    return Boxes(frames, boxes_px, np.ones(len(frames)), np.full(len(frames), -1))
 
 
 def test_depth_of_the_same_view_is_left_alone(tmp_path: Path) -> None:
@@ -65,6 +71,7 @@ def test_depth_of_the_same_view_is_left_alone(tmp_path: Path) -> None:
         ({"moved_px": (12, 0)}, "12 px to the right"),
         ({"moved_px": (-30, 6)}, "30 px to the left and 6 px lower"),
         ({"size": 0.8}, "0.8 times as large"),
+        ({"size": 0.86, "moved_px": (8, 0)}, "0.85 times as large and 6 px to the right"),
         ({"late": 1}, "a frame later"),
         ({"late": -2}, "2 frames earlier"),
     ],
@@ -73,3 +80,15 @@ def test_depth_of_another_view_is_told(tmp_path: Path, wrong: dict[str, object],
     assert f"the fruits of the colour pictures are in the depth pictures {where}: register" in told(
         tmp_path / "row", **wrong
     )
+
+
+@pytest.mark.parametrize(("size", "code"), [(1.0, 0), (0.86, 1)])
+def test_info_tells_by_boxes_that_came_with_it(pomona, tmp_path: Path, size: float, code: int) -> None:
+    boxes = made(tmp_path / "row", (8, 0) if code else (0, 0), size)
+    table = np.column_stack([boxes.frames, boxes.boxes_px])
+    header = "frame,xmin,ymin,xmax,ymax"
+    np.savetxt(tmp_path / "row" / "detections.csv", table, delimiter=",", header=header, comments="")
+    found, printed, _ = pomona("info", tmp_path / "row", "--check", "--json")
+    told = json.loads(printed)["unregistered"]
+    assert found == code
+    assert told is None if code == 0 else "0.85 times as large" in told

@@ -276,7 +276,8 @@ def test_info_prints_what_shows_a_wrong_unit(pomona, kitti):
 
 
 def test_info_checks_every_picture(pomona, kitti):
-    assert pomona("info", kitti, "--check")[0] == 0
+    # The exit code is 1 for the bend that KITTI's rectification leaves.
+    assert json.loads(pomona("info", kitti, "--check", "--json")[1])["unreadable"] == []
     picture = kitti / "image_r" / "000002.png"
     picture.write_bytes(picture.read_bytes()[:5000])
     code, printed, _ = pomona("info", kitti, "--check")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pomona.survey.part import Boxes
 
-__all__ = ["frames_in_words", "sampled_boxes"]
+__all__ = ["LOOKED_AT", "frames_in_words", "sampled_boxes"]
 
 LOOKED_AT = 5
 """Frames."""
