@@ -89,6 +89,6 @@ def test_info_tells_by_boxes_that_came_with_it(pomona, tmp_path: Path, size: flo
     header = "frame,xmin,ymin,xmax,ymax"
     np.savetxt(tmp_path / "row" / "detections.csv", table, delimiter=",", header=header, comments="")
     found, printed, _ = pomona("info", tmp_path / "row", "--check", "--json")
-    told = json.loads(printed)["unregistered"]
+    told = json.loads(printed)["depth_fault"]
     assert found == code
     assert told is None if code == 0 else "0.85 times as large" in told

@@ -37,7 +37,7 @@ def info(
     """Say what RECORDING holds: frames, rate, camera, depth error at 1.5 m, pictures, poses, detections.
 
     With --check the exit code is 1 when a picture cannot be read, the right pictures lie so far off that a scan cannot
-    take it out, or depth does not fit the boxes beside it, and 2 when left and right are swapped or the same.
+    take it out, or depth is not that of the left pictures, and 2 when left and right are swapped or the same.
     """
     from pomona.recording import open_recording
     from pomona.recording.bags.topics import parsed_topics
@@ -46,17 +46,17 @@ def info(
         recording, calibration=calibration, topics=None if topics is None else parsed_topics(topics), poses=poses
     )
     found = opened.description()
-    faults, unregistered = _checked(opened) if check else None, None
+    faults, depth_fault = _checked(opened) if check else None, None
     if faults is not None:
         for name, frames in (("unreadable", faults.unreadable), ("blank", faults.blank)):
             found[name] = [{"frame": frame, "reason": reason} for frame, reason in frames.items()]
         found["misaligned"] = faults.misaligned
-        found["unregistered"] = unregistered = _unregistered(opened)
+        found["depth_fault"] = depth_fault = _fault_of_depth(opened)
     if json:
         say_json(found)
     else:
         say(*_as_lines(found))
-    if faults is not None and (faults.unreadable or faults.is_spoiled or unregistered is not None):
+    if faults is not None and (faults.unreadable or faults.is_spoiled or depth_fault is not None):
         raise typer.Exit(1)
 
 
@@ -71,11 +71,11 @@ def _checked(recording: Recording) -> Checked:
         return checked(recording, progress)
 
 
-def _unregistered(recording: Recording) -> str | None:
-    """Say where the fruits lie in the depth pictures, by boxes that came with the recording, if not in the boxes."""
-    from pomona.survey.depth_check import fault_by_boxes_beside
+def _fault_of_depth(recording: Recording) -> str | None:
+    """Say what is wrong with the depth pictures, by the pictures and boxes that came with the recording."""
+    from pomona.survey.depth_check import fault_of_depth
 
-    return fault_by_boxes_beside(recording)
+    return fault_of_depth(recording)
 
 
 def _as_lines(found: dict[str, object]) -> Iterator[str]:

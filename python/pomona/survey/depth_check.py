@@ -17,11 +17,12 @@ from pomona.detect.opening import open_detector
 from pomona.errors import PomonaWarning
 from pomona.recording import Calibration, Recording
 from pomona.recording.boxes_beside import boxes_beside
+from pomona.recording.checks.along_rays import depth_along_rays
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 from pomona.survey.sampled_boxes import LOOKED_AT, frames_in_words, sampled_boxes
 
-__all__ = ["check_depth_pictures", "fault_by_boxes_beside"]
+__all__ = ["check_depth_pictures", "fault_of_depth"]
 
 MOST_BOXES = 100
 """Of those of a few frames, evenly, that are looked at."""
@@ -57,13 +58,17 @@ Share = tuple[float, float]
 
 
 def check_depth_pictures(recording: Recording, parts: Sequence[Boxes]) -> None:
-    """Warn where the boxes fit the pictures of depth elsewhere than where they are."""
-    if (found := _fault(recording, sampled_boxes(parts))) is not None:
+    """Warn where the boxes fit the pictures of depth elsewhere than where they are, or these hold no depths."""
+    if (found := _fault(recording, sampled_boxes(parts)) or depth_along_rays(recording)) is not None:
         warnings.warn(f"{recording.path}: {found}", PomonaWarning, stacklevel=3)
 
 
-def fault_by_boxes_beside(recording: Recording) -> str | None:
-    """Say where the boxes that came with a recording fit the pictures of depth instead; None without such boxes."""
+def fault_of_depth(recording: Recording) -> str | None:
+    """Say where boxes that came with a recording fit the pictures of depth instead, or that these hold no depths."""
+    return _by_boxes_beside(recording) or depth_along_rays(recording)
+
+
+def _by_boxes_beside(recording: Recording) -> str | None:
     if boxes_beside(recording.path) is None:
         return None
     boxes_of = open_detector(None, None, recording)
