@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pomona.detect import Detections
+from pomona.errors import PomonaWarning
 from pomona.survey.depth import Lifted, Refusal
 from pomona.survey.seeing import Look
 from pomona.survey.tally import BoxFate, Tally, TrackFate, tell_little, track_fates
@@ -74,3 +75,9 @@ def test_little_is_told_with_what_to_do(tmp_path, boxes, tracks, n_frames, told)
         warnings.simplefilter("always")
         tell_little(tmp_path, n_frames, Tally(Counter(boxes), Counter(tracks)))
     assert [str(one.message).split(": ", 1)[1].startswith(told) for one in caught] == [True] * (told is not None)
+
+
+def test_slower_filming_is_no_advice_where_something_else_was_told(tmp_path):
+    tracks = Counter({TrackFate.FEW_VIEWS: 60, TrackFate.FRUIT: 1})
+    with pytest.warns(PomonaWarning, match="1 of 61 tracks are fruits, .*: mend first what is told above"):
+        tell_little(tmp_path, 40, Tally(Counter({BoxFate.NO_FRUIT: 200}), tracks), explained=True)

@@ -76,13 +76,18 @@ def check_long_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]
         warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
 
 
-def check_places_of_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]) -> None:
-    """Warn where boxes lie far from where their fruits are: names may join what is none, as in another recording."""
+def check_places_of_boxes(path: Path, calibration: Calibration, parts: Iterable[Part]) -> bool:
+    """Warn where boxes lie far from where their fruits are: names may join what is none, as in another recording.
+
+    Returns whether something was said.
+    """
     away = np.concatenate([np.zeros(0), *(_sides_away(part, calibration) for part in parts)])
-    if len(away) >= SEVERAL and (sides := float(np.nanmedian(away))) > ASTRAY:
-        found = f"boxes are {sides:.1f} times their size from where their fruits lie, in the median, expected a tenth"
-        advice = "they are of another recording, of other frames, or not named fruit by fruit"
-        warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+    if len(away) < SEVERAL or not (sides := float(np.nanmedian(away))) > ASTRAY:
+        return False
+    found = f"boxes are {sides:.1f} times their size from where their fruits lie, in the median, expected a tenth"
+    advice = "they are of another recording, of other frames, or not named fruit by fruit"
+    warnings.warn(f"{path}: {found}: {advice}", PomonaWarning, stacklevel=3)
+    return True
 
 
 def _count(is_so: Callable[[Array, Array], NDArray[np.bool_]], of_frames: Sequence[Array]) -> int:

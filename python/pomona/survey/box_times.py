@@ -36,27 +36,29 @@ NEAR, SOME = 2, 20
 Box = NDArray[np.float64]
 
 
-def check_box_times(recording: Recording, parts: Sequence[Boxes]) -> None:
+def check_box_times(recording: Recording, parts: Sequence[Boxes]) -> bool:
     """Warn where boxes go with pictures of other frames than theirs, or of another size; without colour, say nothing.
 
-    Boxes that are around fruits tell two kinds of colours apart, whatever the fruits; boxes beside them do not.
+    Boxes that are around fruits tell two kinds of colours apart, whatever the fruits; boxes beside them do not. Returns
+    whether something was said.
     """
     if "left" not in recording.description()["pictures"]:
-        return
+        return False
     boxes_of = sampled_boxes(parts)
     own = _told_apart(recording, boxes_of, 0)
     if not len(own) or own.mean() >= SURE:
-        return
+        return False
     near = [away for away in FRAMES_AWAY if abs(away) <= NEAR]
-    if told := _best([(_of_frame(away), _told_apart(recording, boxes_of, away)) for away in near], LEAST, own):
-        warnings.warn(f"{recording.path}: {told}", PomonaWarning, stacklevel=3)
-    elif sum(map(len, boxes_of.values())) >= SOME:
+    told = _best([(_of_frame(away), _told_apart(recording, boxes_of, away)) for away in near], LEAST, own)
+    if not told and sum(map(len, boxes_of.values())) >= SOME:
         tried = [
             *((_of_frame(away), _told_apart(recording, boxes_of, away)) for away in FRAMES_AWAY if away not in near),
             *((_of_size(size), _told_apart(recording, _sized(boxes_of, size), 0)) for size in SIZES),
         ]
-        if told := _best(tried, SURE, own):
-            warnings.warn(f"{recording.path}: {told}", PomonaWarning, stacklevel=3)
+        told = _best(tried, SURE, own)
+    if told:
+        warnings.warn(f"{recording.path}: {told}", PomonaWarning, stacklevel=3)
+    return bool(told)
 
 
 def _best(tried: list[tuple[str, NDArray[np.float64]]], least: float, own: NDArray[np.float64]) -> str | None:

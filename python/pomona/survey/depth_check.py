@@ -57,10 +57,14 @@ Share = tuple[float, float]
 """Mean over boxes of the part that is of one surface, and its variance."""
 
 
-def check_depth_pictures(recording: Recording, parts: Sequence[Boxes]) -> None:
-    """Warn where the boxes fit the pictures of depth elsewhere than where they are, or these hold no depths."""
+def check_depth_pictures(recording: Recording, parts: Sequence[Boxes]) -> bool:
+    """Warn where the boxes fit the pictures of depth elsewhere than where they are, or these hold no depths.
+
+    Returns whether something was said.
+    """
     if (found := _fault(recording, sampled_boxes(parts)) or depth_along_rays(recording)) is not None:
         warnings.warn(f"{recording.path}: {found}", PomonaWarning, stacklevel=3)
+    return found is not None
 
 
 def fault_of_depth(recording: Recording) -> str | None:

@@ -85,21 +85,25 @@ class Disagreement:
         return aside_m > ASIDE_M and max(self.off_share, self.turned_rad * AT_M / ASIDE_M) > LEAST_ASIDE
 
 
-def check_poses(recording: Recording) -> None:
-    """Warn where the poses of a recording disagree with its pictures; where too little shows, nothing is said."""
+def check_poses(recording: Recording) -> bool:
+    """Warn where the poses of a recording disagree with its pictures; where too little shows, nothing is said.
+
+    Returns whether something was.
+    """
     known = recording.trajectory
     if known is None:
-        return
+        return False
     try:
         ends, seen = _followed(recording, known)
     except PomonaError:
-        return  # Pictures that cannot be followed are no reason to doubt poses.
-    if seen and np.linalg.norm(np.array(seen)[:, :3, 3], axis=1).sum() >= MOVED_M:
-        told = _in_words(known.session_from_camera, ends, np.array(seen))
-        if told is not None:
-            warnings.warn(
-                f"{recording.path}: the poses disagree with the pictures: {told}", PomonaWarning, stacklevel=3
-            )
+        return False  # Pictures that cannot be followed are no reason to doubt poses.
+    if not seen or np.linalg.norm(np.array(seen)[:, :3, 3], axis=1).sum() < MOVED_M:
+        return False
+    told = _in_words(known.session_from_camera, ends, np.array(seen))
+    if told is not None:
+        message = f"{recording.path}: the poses disagree with the pictures: {told}"
+        warnings.warn(message, PomonaWarning, stacklevel=3)
+    return told is not None
 
 
 def _followed(recording: Recording, known: Trajectory) -> tuple[list[tuple[int, int]], list[Array]]:

@@ -172,8 +172,7 @@ def scan(
     """
     if not (depth == "auto" and "depth" in recording.description()["pictures"]):
         recording = straightened(recording)
-    if not (odometry or slam):
-        check_poses(recording)
+    explained = not (odometry or slam) and check_poses(recording)
     _check_camera(recording)
     seeing = Seeing(recording, detector, depth=depth)
     look_at: Callable[[Frame], Look] = keep.remembering(seeing) if keep is not None else seeing
@@ -204,15 +203,17 @@ def scan(
     check_boxes(recording.path, boxes)
     if (least_px := getattr(detector, "least_px", None)) is not None:
         check_small_boxes(recording.path, boxes, least_px)
-    check_box_times(recording, boxes)
+    explained |= check_box_times(recording, boxes)
     if depth == "auto":
-        check_depth_pictures(recording, boxes)
+        explained |= check_depth_pictures(recording, boxes)
     check_long_boxes(recording.path, recording.calibration, survey.parts)
-    tell_swing(recording.path, [part.swing_m for part in survey.parts])
-    check_places_of_boxes(recording.path, recording.calibration, survey.parts)
+    explained |= check_places_of_boxes(recording.path, recording.calibration, survey.parts)
     _check_sizes(recording, survey)
-    _check_pace(recording, survey)
-    tell_little(recording.path, sum(len(part.trajectory) for part in survey.parts), survey.tally)
+    if not explained:
+        tell_swing(recording.path, [part.swing_m for part in survey.parts])
+        _check_pace(recording, survey)
+    n_frames = sum(len(part.trajectory) for part in survey.parts)
+    tell_little(recording.path, n_frames, survey.tally, explained=explained)
     if not all_rows:
         tell_farther_layer(recording.path, survey.parts)
     return survey

@@ -190,9 +190,12 @@ def often_enough(
     return believing(tracks, colourless, poses, sized=False).is_believed
 
 
-def tell_little(path: Path, n_frames: int, tally: Tally) -> None:
-    """Warn where nothing or little of a recording became fruits, and say what to do."""
-    told = _few_boxes(n_frames, tally.n_looked_at) or _few_depths(tally) or _few_fruits(tally)
+def tell_little(path: Path, n_frames: int, tally: Tally, *, explained: bool = False) -> None:
+    """Warn where nothing or little of a recording became fruits, and say what to do, unless what was told before does.
+
+    Wrong poses, boxes or depth lose fruits, too, and slower filming mends nothing then: `explained`.
+    """
+    told = _few_boxes(n_frames, tally.n_looked_at) or _few_depths(tally) or _few_fruits(tally, explained)
     if told is not None:
         warnings.warn(f"{path}: {told}", PomonaWarning, stacklevel=3)
 
@@ -215,10 +218,11 @@ def _few_depths(tally: Tally) -> str | None:
     return f"{n_refused} of {amount(n_boxes, 'box')} have no depth, most because {reason}: {ADVICE[reason]}"
 
 
-def _few_fruits(tally: Tally) -> str | None:
+def _few_fruits(tally: Tally, explained: bool) -> str | None:
     n_tracks, n_fruits = tally.tracks.total(), tally.tracks[TrackFate.FRUIT]
     if n_tracks < SEVERAL_TRACKS or n_fruits >= SMALL_SHARE * n_tracks:
         return None
     lost = tally.tracks - Counter({TrackFate.FRUIT: n_fruits})
     reason = lost.most_common(1)[0][0]
-    return f"{n_fruits} of {n_tracks} tracks are fruits, most others were {reason}: {ADVICE[reason]}"
+    advice = "mend first what is told above" if explained else ADVICE[reason]
+    return f"{n_fruits} of {n_tracks} tracks are fruits, most others were {reason}: {advice}"
