@@ -9,6 +9,7 @@ from command_line import Pomona
 from pomona import scan as pomona_scan
 from pomona.errors import PomonaError
 from pomona.recording import open_recording
+from pomona.survey.pose_source import Followed
 from recording_maker import make_recording
 
 ROW = Path(__file__).parents[1] / "examples" / "row" / "2024-08-09"
@@ -60,3 +61,14 @@ def test_a_recording_whose_frames_share_nothing_is_told(tmp_path: Path) -> None:
         PomonaError, match="found 3 frames that show no fruits in common, expected 5 or more in each two"
     ):
         pomona_scan(recording, slam=True)
+
+
+def test_links_of_fruits_may_outvote_odometry() -> None:
+    """In a gust corners of leaves agree on motions that never were; what is trusted no link outvotes."""
+    recording = open_recording(ROW / "row.mp4", calibration=ROW / "calibration.json")
+    camera = Followed(recording, None)
+    for frame in recording.frames({0, 1, 2}):
+        camera(frame)
+    motions = camera.motions([0, 1, 2])
+    assert len(motions) >= 2
+    assert motions.which_are_doubtful().all()
