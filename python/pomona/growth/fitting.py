@@ -76,6 +76,14 @@ class _Posterior:
         rate, *spreads = np.exp(self.middle + self.spread * z[1:]).tolist()
         return Shape(rate, onset, *spreads)
 
+    def numbers(self, z: Numbers) -> Numbers:
+        """Give the onset in standard deviations, and the logarithms of the others, (8,)."""
+        return np.concatenate([z[:1], self.middle + self.spread * z[1:]])
+
+    def of_numbers(self, numbers: Numbers) -> Numbers:
+        """Give a shape by what another prior calls its `numbers`."""
+        return np.concatenate([numbers[:1], (numbers[1:] - self.middle) / self.spread])
+
     def __call__(self, z: Numbers) -> float:
         try:
             likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
@@ -166,7 +174,11 @@ class FittedShape:
 def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
     """Fit the shape of one family to a table of at least two visits at different times."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family)
-    mode = _climbed(posterior, None)
+    # To growth that strays as it may two parts of a row whose sizes differ are visits that err by a fifth as well: so
+    # it is begun where visits agree, rounded, so that their order does not tell by what it leaves in the last digits.
+    agreeing = _Posterior(posterior.table, family, _AGREEING)
+    start = posterior.of_numbers(agreeing.numbers(_climbed(agreeing, None)))
+    mode = _climbed(posterior, np.round(start, 1))
     values, axes = np.linalg.eigh(_curvature(posterior, mode))
     # Where the differences see no bend, the prior's own is there. The triangle is one of a kind; axes have any sign.
     root = np.linalg.cholesky((axes / np.maximum(values, 1.0)) @ axes.T)
