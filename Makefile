@@ -39,7 +39,7 @@ test-rust: ## the core's tests
 	cargo test --workspace --locked
 
 test-python: install ## the tests of the Python face and the command line
-	$(RUN) pytest
+	$(RUN) pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 lint: install ## formatting, clippy, the core's pages, ruff, mypy and the stubs of the extension
 	cargo fmt --all --check

@@ -187,7 +187,9 @@ def test_a_twin_stands_two_trees_from_its_original() -> None:
 
 
 def test_an_unknown_cell_is_told_with_the_ones_there_are() -> None:
-    with pytest.raises(PomonaError, match=r"'orange'.*expected one of base"):
+    with pytest.raises(PomonaError, match=rf"'bsae'; expected one of {len(CELLS)}, as base(, \w+){{0,4}}$"):
+        scene_pair("bsae", 0)
+    with pytest.raises(PomonaError, match=rf"'orange'; expected one of {len(CELLS)}, as "):
         scene_pair("orange", 0)
     with pytest.raises(PomonaError, match="negative"):
         scene_pair("base", -1)

@@ -34,6 +34,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -118,7 +119,9 @@ def scene_pair(cell: str | Cell, seed: int) -> ScenePair:
     """
     if isinstance(cell, str):
         if cell not in CELLS:
-            raise PomonaError(f"no cell is called {cell!r}; expected one of {', '.join(CELLS)}")
+            # More than a hundred names would bury the one that was meant.
+            near = get_close_matches(cell, CELLS, n=5, cutoff=0.5) or list(CELLS)
+            raise PomonaError(f"no cell is called {cell!r}; expected one of {len(CELLS)}, as {', '.join(near)}")
         cell = CELLS[cell]
     if seed < 0:
         raise PomonaError(f"seed {seed} is negative; expected 0 or more")
