@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from pomona import _core
 from pomona.errors import PomonaWarning
 from pomona.recording import Recording
-from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
-from pomona.survey.sampled_boxes import frames_in_words, sampled_boxes
+from pomona.survey.sampled_boxes import frames_in_words, pictures_of, sampled_boxes
 
 __all__ = ["check_box_times"]
 
@@ -89,14 +88,5 @@ def _told_apart(recording: Recording, boxes_of: dict[int, Box], away: int) -> ND
     numbers = recording.numbers
     number_at = dict(zip(numbers[max(-away, 0) :], numbers[max(away, 0) :], strict=False))
     boxes_at = {number_at[frame]: boxes for frame, boxes in boxes_of.items() if frame in number_at}
-    found = []
-    for frame in recording.frames(set(boxes_at)):
-        try:
-            left = None if frame.read_left is None else frame.read_left()
-        except UnreadablePictureError:
-            continue
-        if left is not None:
-            _, inside, _, elsewhere = _core.look_of(np.ascontiguousarray(left), boxes_at[frame.number])
-            if len(elsewhere):
-                found.append(float(inside.mean() - elsewhere.mean()))
-    return np.array(found)
+    looks = [_core.look_of(*shown) for shown in pictures_of(recording, boxes_at)]
+    return np.array([inside.mean() - elsewhere.mean() for _, inside, _, elsewhere in looks if len(elsewhere)], float)

@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.recording import Recording
+from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 
-__all__ = ["LOOKED_AT", "frames_in_words", "sampled_boxes"]
+__all__ = ["LOOKED_AT", "frames_in_words", "pictures_of", "sampled_boxes"]
 
 LOOKED_AT = 5
 """Frames."""
 
 
-def sampled_boxes(parts: Sequence[Boxes]) -> dict[int, NDArray[np.float64]]:
-    """Give the boxes, (D, 4) pixels, of a few frames by their numbers."""
+def sampled_boxes(parts: Sequence[Boxes], n_frames: int = LOOKED_AT) -> dict[int, NDArray[np.float64]]:
+    """Give the boxes, (D, 4) pixels, of so many frames at the most by their numbers."""
     frames = [frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())]
-    rows = (2 * np.arange(LOOKED_AT) + 1) * len(frames) // (2 * LOOKED_AT)
+    rows = (2 * np.arange(n_frames) + 1) * len(frames) // (2 * n_frames)
     shown = [frames[row] for row in dict.fromkeys(rows.tolist())] if frames else []
     return {frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames}
+
+
+def pictures_of(
+    recording: Recording, boxes_of: Mapping[int, NDArray[np.float64]]
+) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float64]]]:
+    """Give the left picture of each of these frames that has one which can be read, with its boxes."""
+    for frame in recording.frames(set(boxes_of)):
+        try:
+            left = None if frame.read_left is None else frame.read_left()
+        except UnreadablePictureError:
+            continue
+        if left is not None:
+            yield np.ascontiguousarray(left), boxes_of[frame.number]
 
 
 def frames_in_words(away: int) -> str:

@@ -23,6 +23,7 @@ from pomona.recording.alignment import straightened
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.believing import Believing
 from pomona.survey.box_check import check_boxes, check_long_boxes, check_places_of_boxes, check_small_boxes
+from pomona.survey.box_edges import check_size_of_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.depth_check import check_depth_pictures
@@ -208,6 +209,7 @@ def scan(
         explained |= check_depth_pictures(recording, boxes)
     check_long_boxes(recording.path, recording.calibration, survey.parts)
     explained |= check_places_of_boxes(recording.path, recording.calibration, survey.parts)
+    check_size_of_boxes(recording, boxes)
     _check_sizes(recording, survey)
     if not explained:
         tell_swing(recording.path, [part.swing_m for part in survey.parts])
