@@ -1,6 +1,7 @@
 """What people bring by mistake, through `pomona info --check`: one clear line each, whatever the kind of recording."""
 
 import json
+import re
 import shutil
 
 import cv2
@@ -113,6 +114,18 @@ def test_one_eye_given_twice_is_said_however_it_was_compressed(pomona, tmp_path,
     code, printed, errors = pomona("info", write_folder(tmp_path / "twice", twice), "--check")
     assert (code, printed) == (2, "")
     assert "found the same picture in 5 of 5 frames that were compared, expected those of two cameras" in errors
+
+
+@pytest.mark.parametrize("quarters", [1, 3])
+def test_pictures_turned_by_a_quarter_are_said(pomona, tmp_path, quarters):
+    """The eyes lie above each other then, and nothing that is seen has a depth."""
+    turned = [[np.ascontiguousarray(np.rot90(side, quarters)) for side in both] for both in pairs()]
+    folder = write_folder(tmp_path / "turned", turned)
+    write_calibration(folder, width=SIZE[1], height=SIZE[0], fx=300.0, fy=300.0, cx=120.0, cy=160.0)
+    code, printed, errors = pomona("info", folder, "--check")
+    assert (code, printed) == (2, "")
+    assert re.search(r"turned by a quarter: found \d+ corners above or below each other in both, \d+ beside", errors)
+    assert errors.count("\n") == 1
 
 
 def test_sides_of_the_rendered_rows_and_of_a_car(shared_data, tmp_path):

@@ -1,4 +1,4 @@
-"""Whether left and right are what they are called, and are two: a few frames tell."""
+"""Whether left and right are what they are called, are two, and lie beside each other: a few frames tell."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ ENOUGH = 40
 
 SWAPPED_SHARE = 0.8
 """Of corners that are not at infinity. Chance goes both ways: 32 of 40 by chance happens once in 10,000 recordings."""
+
+ON_END_TIMES = 4
+"""As many corners above each other as beside each other, where pictures are turned: of a frame of a drawn row 41 to 105
+and up to 2; in six good recordings up to 9 and 30 to 204."""
 
 CORNERS, PATCH_PX = 300, 15
 
@@ -46,9 +50,9 @@ def check_sides(recording: Recording) -> None:
     Raises
     ------
     PomonaError
-        One line that says to swap them, or that both are the same.
+        One line that says to swap them, to turn them back, or that both are the same.
     """
-    found, same = np.zeros(0), []
+    found, on_end, same = np.zeros(0), np.zeros(0), []
     middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
     looked_at = {recording.numbers[min(row, len(recording) - 1)] for row in middles.tolist()}
     for frame in recording.frames(looked_at):
@@ -63,9 +67,15 @@ def check_sides(recording: Recording) -> None:
         found = np.concatenate([found, disparities_px(left, right)])
         if len(found) >= ENOUGH:
             break
+        turned = [np.ascontiguousarray(np.rot90(picture)) for picture in (left, right)]
+        on_end = np.concatenate([on_end, disparities_px(*turned)])
     if same and all(same):
         seen = f"the same picture in {len(same)} of {len(same)} frames that were compared"
         raise PomonaError(f"{recording.path}: left and right: found {seen}, expected those of two cameras")
+    if len(on_end) >= max(ENOUGH, ON_END_TIMES * len(found)):
+        seen = f"{len(on_end)} corners above or below each other in both, {len(found)} beside each other"
+        turned_by = "left and right are turned by a quarter"
+        raise PomonaError(f"{recording.path}: {turned_by}: found {seen}, expected pictures as they were taken")
     negative = int((found < 0).sum())
     if len(found) >= ENOUGH and negative >= SWAPPED_SHARE * len(found):
         seen = f"{negative} of {len(found)} corners farther right in the right picture than in the left one"
