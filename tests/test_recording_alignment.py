@@ -16,7 +16,6 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Recording, open_recording
 from pomona.recording.alignment import alignment_of, straightened
 
-HALVES = (slice(CALIBRATION.width // 2), slice(CALIBRATION.width // 2, None))
 """Columns; in an upright pair of two depths."""
 
 
@@ -177,21 +176,6 @@ def test_info_fails_where_a_scan_would(pomona, tmp_path: Path) -> None:
     code, printed, _ = pomona("info", tmp_path / "far", "--check")
     assert code == 1
     assert "px lower" in next(line for line in printed.splitlines() if line.startswith("misaligned"))
-
-
-def test_a_pair_on_its_side_is_told(pomona, tmp_path: Path) -> None:
-    row = recording(tmp_path / "row").path
-    for file in row.glob("left/*"):
-        left = cv2.imread(str(file))
-        right = np.hstack([np.roll(left, -px, axis=1)[:, part] for px, part in zip((12, 30), HALVES, strict=True)])
-        for side, picture in (("left", left), ("right", right)):
-            cv2.imwrite(str(row / side / file.name), cv2.rotate(picture, cv2.ROTATE_90_CLOCKWISE))
-    numbers = json.loads((row / "calibration.json").read_text())
-    turned = {"width": "height", "height": "width", "cx": "cy", "cy": "cx", "fx": "fy", "fy": "fx"}
-    (row / "calibration.json").write_text(json.dumps(numbers | {new: numbers[old] for new, old in turned.items()}))
-    code, printed, _ = pomona("info", row, "--check")
-    assert code == 1
-    assert "turned on its side" in printed
 
 
 def test_one_camera_twice_is_refused(pomona, tmp_path: Path) -> None:

@@ -55,9 +55,6 @@ AT_ONCE_WIDTHS, LEAST_AT_ONCE_PX, SURE = 1 / 1280, 0.5, 40
 """Of corners that are sought in their rows: how near they agree where both were taken at once, which is no nearer
 than a row is found to, and how many of them, so that nothing else is asked."""
 
-ON_SIDE = 1.5
-"""Times as many corners that keep their column as corners that keep their row."""
-
 
 @dataclass(frozen=True)
 class Alignment:
@@ -75,8 +72,6 @@ class Alignment:
         Whether it is to be told.
     is_correctable : bool
         Whether it is small enough to be taken out.
-    is_on_side : bool
-        Whether the pair lies on its side: corners keep their column, not their row.
     frames_late : int
         By how many frames the right pictures are late; below 0, early.
     bend : Bend or None
@@ -88,15 +83,12 @@ class Alignment:
     stretch: float
     is_off: bool
     is_correctable: bool
-    is_on_side: bool = False
     frames_late: int = 0
     bend: Bend | None = None
 
     def __str__(self) -> str:
         if self.bend is not None:
             return str(self.bend)
-        if self.is_on_side:
-            return "corners keep their column in the right picture and not their row, the pair is turned on its side"
         if self.frames_late:
             when, moved = ("late", "up") if self.frames_late > 0 else ("early", "down")
             return f"the right pictures are a frame {when}, corners agree when they are moved {moved} by one"
@@ -112,8 +104,6 @@ class Alignment:
             return (
                 "rectify the pictures with the cameras' own calibration, or calibrate again; places and sizes are off"
             )
-        if self.is_on_side:
-            return "give the pictures as the cameras took them, side by side"
         if self.frames_late:
             return "pair the pictures that were taken at once; all lengths are wrong else"
         most_px, most_rad = _core.MOST_MISALIGNED
@@ -203,13 +193,10 @@ def _fitted(corners: Array, centre_px: tuple[float, float]) -> Alignment | None:
 
 def _beyond(places: Array, centre_px: tuple[float, float]) -> Alignment | None:
     """Give the alignment where it is farther off than what is taken out; places as `far_corners` gives them."""
-    x_left, y_left, x_right, y_right = places.T
-    rows, columns = (np.stack([x_right, y_left, off], axis=1) for off in (y_right - y_left, x_right - x_left))
-    found, least = _fitted(rows, centre_px), AGREEING_SHARE * len(places)
-    in_rows, in_columns = (_agreeing(corners, centre_px) for corners in (rows, columns))
-    if in_columns > max(least, ON_SIDE * in_rows):
-        return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, is_on_side=True)
-    if found is None or in_rows < least:
+    _, y_left, x_right, y_right = places.T
+    rows = np.stack([x_right, y_left, y_right - y_left], axis=1)
+    found = _fitted(rows, centre_px)
+    if found is None or _agreeing(rows, centre_px) < AGREEING_SHARE * len(places):
         return None
     most = (*_core.MOST_MISALIGNED, MOST_STRETCH)
     off = np.abs([found.lower_px, found.turned_rad, found.stretch])
