@@ -1,6 +1,6 @@
 """Growth of the fruits of a map against curves that are known: sizes, rates, forecasts and how far each is trusted."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -70,6 +70,15 @@ def test_the_likelihood_is_that_of_one_large_gaussian(name: str) -> None:
     # The expectations are those of the same Gaussian: the fruit's size given all measurements.
     gain = SHAPE.fruit_spread**2 * (fruits[:, None] == np.arange(5)).T
     np.testing.assert_allclose(model.expected().sizes, gain @ np.linalg.solve(covariance, away), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_shapes_at_once_are_as_likely_as_one_by_one(name: str) -> None:
+    numbers = np.array(astuple(SHAPE)) * np.random.default_rng(2).uniform(0.8, 1.25, (7, 8))
+    table, family = small_table(), FAMILIES[name]
+    at_once = Hierarchy(table, family, Shape(*numbers.T)).log_likelihood()
+    one_by_one = [Hierarchy(table, family, Shape(*each.tolist())).log_likelihood() for each in numbers]
+    np.testing.assert_allclose(at_once, one_by_one, rtol=0, atol=1e-9)
 
 
 N_DRAWS = 4096

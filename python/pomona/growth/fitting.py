@@ -32,6 +32,9 @@ _GRADIENT = 0.05
 _STEP, _FINE_STEP = 0.05, 1e-3
 """Of the differences that tell the curvature and the slope, in standard deviations of the prior."""
 
+_MOST_AT_ONCE = 1 << 16
+"""Sizes, of all shapes: what is worked on stays in the caches of a processor."""
+
 _IMPOSSIBLE = -1e9
 """Logarithm of a likelihood below any that is met."""
 
@@ -71,10 +74,15 @@ class _Posterior:
         self.middle = np.log(medians)
         self.spread = np.array([_RATE_SPREAD, *(spread for _, spread in spreads)])
 
-    def shape(self, z: Numbers) -> Shape:
-        onset = float(self.table.times[0] + _ONSET_DAYS[0] + _ONSET_DAYS[1] * z[0])
-        rate, *spreads = np.exp(self.middle + self.spread * z[1:]).tolist()
-        return Shape(rate, onset, *spreads)
+    def shape(self, z: Numbers) -> Shape[float]:
+        return Shape(*(float(number) for number in self._columns(z)))
+
+    def _columns(self, z: Numbers) -> list[Numbers]:
+        """Give the numbers of a shape, or of each of several, as they stand there."""
+        onset = self.table.times[0] + _ONSET_DAYS[0] + _ONSET_DAYS[1] * z[..., 0]
+        numbers = np.exp(self.middle + self.spread * z[..., 1:])
+        rate, *spreads = (numbers[..., column] for column in range(numbers.shape[-1]))
+        return [rate, onset, *spreads]
 
     def numbers(self, z: Numbers) -> Numbers:
         """Give the onset in standard deviations, and the logarithms of the others, (8,)."""
@@ -84,20 +92,25 @@ class _Posterior:
         """Give a shape by what another prior calls its `numbers`."""
         return np.concatenate([numbers[:1], (numbers[1:] - self.middle) / self.spread])
 
-    def __call__(self, z: Numbers) -> float:
+    def __call__(self, z: Numbers) -> Numbers:
+        """Tell it of (8,) numbers, or of (K, 8): many at once take a fraction of the time of one after the other."""
+        if z.ndim > 1:
+            at_once = max(_MOST_AT_ONCE // self.table.logs.size, 1)
+            if len(z) > at_once:
+                return np.concatenate([self(z[start : start + at_once]) for start in range(0, len(z), at_once)])
         try:
-            likelihood = Hierarchy(self.table, self.family, self.shape(z)).log_likelihood()
+            likelihood = Hierarchy(self.table, self.family, Shape(*self._columns(z))).log_likelihood()
         except np.linalg.LinAlgError:  # so far out that rounding eats what the measurements say
-            likelihood = _IMPOSSIBLE
-        return likelihood - 0.5 * float(z @ z) - 0.5 * len(z) * float(np.log(2.0 * np.pi))
+            if z.ndim > 1:
+                return np.array([self(one) for one in z])
+            likelihood = np.array(_IMPOSSIBLE)
+        return np.asarray(likelihood - 0.5 * (z**2).sum(axis=-1) - 0.5 * z.shape[-1] * np.log(2.0 * np.pi))
 
-    def cost(self, z: Numbers) -> float:
-        return -self(z)
-
-    def slope_of_cost(self, z: Numbers) -> Numbers:
+    def cost_and_slope(self, z: Numbers) -> tuple[float, Numbers]:
         """By central differences: one-sided ones of 1e-8 drown in rounding, and the climb ends on the way."""
         steps = _FINE_STEP * np.eye(len(z))
-        return np.array([self.cost(z + step) - self.cost(z - step) for step in steps]) / (2.0 * _FINE_STEP)
+        here, above, below = np.split(-self(np.concatenate([z[None], z + steps, z - steps])), [1, 1 + len(z)])
+        return float(here[0]), (above - below) / (2.0 * _FINE_STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +127,13 @@ class FittedShape:
     """
 
     family: CurveFamily
-    likeliest: Shape
+    likeliest: Shape[float]
     log_evidence: float
     _posterior: _Posterior
     _mode: Numbers
     _root: Numbers
 
-    def weighed(self, first: Numbers, even: Numbers) -> tuple[tuple[Shape, ...], Numbers]:
+    def weighed(self, first: Numbers, even: Numbers) -> tuple[tuple[Shape[float], ...], Numbers]:
         """Spread shapes over the posterior, and weigh them by the exact one and not by its curvature.
 
         They are spread as wide as a first round of others finds the posterior (adaptive importance sampling, Oh and
@@ -159,12 +172,12 @@ class FittedShape:
         """
         posterior = _Posterior(self._posterior.table.doubting(visit, variance), self.family)
         mode = _climbed(posterior, self._mode)
-        gain = posterior(mode) - self._posterior(self._mode)
+        gain = float(posterior(mode) - self._posterior(self._mode))
         return Hierarchy(posterior.table, self.family, posterior.shape(mode)), gain
 
     def _round(self, even: Numbers, middle: Numbers, root: Numbers) -> tuple[Numbers, Numbers]:
         drawn = student_points(even, middle, root)
-        log_weights = np.array([self._posterior(z) for z in drawn]) - student_density(drawn, middle, root)
+        log_weights = self._posterior(drawn) - student_density(drawn, middle, root)
         weights = np.exp(log_weights - log_weights.max())
         # One shape in a corner that few reach must not speak for all (truncated importance sampling, Ionides 2008).
         weights = np.minimum(weights, np.sqrt(len(weights)) * weights.mean())
@@ -183,10 +196,12 @@ def fit_shape(table: SizeTable, family: CurveFamily) -> FittedShape:
     # Where the differences see no bend, the prior's own is there. The triangle is one of a kind; axes have any sign.
     root = np.linalg.cholesky((axes / np.maximum(values, 1.0)) @ axes.T)
     volume = 0.5 * len(mode) * np.log(2.0 * np.pi) + np.linalg.slogdet(root)[1]
-    return FittedShape(family, posterior.shape(mode), posterior(mode) + float(volume), posterior, mode, root)
+    return FittedShape(family, posterior.shape(mode), float(posterior(mode) + volume), posterior, mode, root)
 
 
-def likeliest_shape(table: SizeTable, family: CurveFamily, start: Numbers | None = None) -> tuple[Shape, Numbers]:
+def likeliest_shape(
+    table: SizeTable, family: CurveFamily, start: Numbers | None = None
+) -> tuple[Shape[float], Numbers]:
     """Find the mode alone, where visits agree; also as the start of a next search, (8,)."""
     posterior = _Posterior(table.some_fruits(_MOST_FRUITS), family, _AGREEING)
     mode = _climbed(posterior, start)
@@ -196,17 +211,19 @@ def likeliest_shape(table: SizeTable, family: CurveFamily, start: Numbers | None
 def _climbed(posterior: _Posterior, start: Numbers | None) -> Numbers:
     """Climb to the mode, from the middle of the prior or from a start."""
     start = np.zeros(N_NUMBERS) if start is None else start
-    found = minimize(posterior.cost, start, method="BFGS", jac=posterior.slope_of_cost, tol=_GRADIENT)
+    found = minimize(posterior.cost_and_slope, start, method="BFGS", jac=True, tol=_GRADIENT)
     return np.asarray(found.x)
 
 
 def _curvature(posterior: _Posterior, mode: Numbers) -> Numbers:
     """Minus the second derivatives at the mode, by differences."""
-    steps = _STEP * np.eye(len(mode))
-    middle = posterior(mode)
-    ends = [(posterior(mode + step), posterior(mode - step)) for step in steps]
-    curvature = np.diag([2.0 * middle - above - below for above, below in ends])
-    for i, j in combinations(range(len(mode)), 2):
-        both = posterior(mode + steps[i] + steps[j]) + posterior(mode - steps[i] - steps[j])
-        curvature[i, j] = curvature[j, i] = 0.5 * (sum(ends[i]) + sum(ends[j]) - 2.0 * middle - both)
+    steps, pairs = _STEP * np.eye(len(mode)), np.array(list(combinations(range(len(mode)), 2)))
+    both_ways = np.concatenate([steps, steps[pairs].sum(axis=1)])
+    tried = np.concatenate([mode[None], mode + both_ways, mode - both_ways])
+    middle, above, below = np.split(posterior(tried), [1, 1 + len(both_ways)])
+    bent = 2.0 * middle - above - below
+    of_each, of_pairs = bent[: len(mode)], bent[len(mode) :]
+    curvature = np.diag(of_each)
+    rows, columns = pairs.T
+    curvature[rows, columns] = curvature[columns, rows] = 0.5 * (of_pairs - of_each[rows] - of_each[columns])
     return np.asarray(curvature / _STEP**2)

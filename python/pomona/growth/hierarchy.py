@@ -14,10 +14,11 @@ the visits' and the mean together. docs/growth.md has the derivation.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
 
 from pomona.growth.chance import Chance
 from pomona.growth.curve_families import CurveFamily
@@ -28,6 +29,7 @@ from pomona.growth.straying import straying, straying_root
 __all__ = ["Effects", "Hierarchy", "Shape"]
 
 Numbers = NDArray[np.float64]
+Number = TypeVar("Number", float, Numbers)
 
 _FINEST_MM = 0.01
 """Nothing measures a fruit to less; sizes that agree to the last digit were copied, and say no more than that."""
@@ -37,8 +39,8 @@ _SIZE_AT_ONSET_MM, _SIZE_AT_ONSET_SPREAD = 30.0, 0.2
 
 
 @dataclass(frozen=True)
-class Shape:
-    """What is not linear: the block's curve and the spreads.
+class Shape(Generic[Number]):
+    """What is not linear: the block's curve and the spreads; numbers, or arrays, (K,), of several at once.
 
     Attributes
     ----------
@@ -52,14 +54,14 @@ class Shape:
         Standard deviation of the block's relative growth a day against the curve's.
     """
 
-    rate_per_day: float
-    onset_day: float
-    fruit_spread: float
-    onset_spread_days: float
-    tree_spread: float
-    visit_spread: float
-    noise_mm: float
-    stray_per_day: float
+    rate_per_day: Number
+    onset_day: Number
+    fruit_spread: Number
+    onset_spread_days: Number
+    tree_spread: Number
+    visit_spread: Number
+    noise_mm: Number
+    stray_per_day: Number
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,8 @@ class Effects:
 class Hierarchy:
     """The model of a table, given a family and a shape.
 
+    Of several shapes at once the likelihoods are told, and nothing is drawn.
+
     Parameters
     ----------
     table : SizeTable
@@ -95,76 +99,83 @@ class Hierarchy:
     shape : Shape
     """
 
-    def __init__(self, table: SizeTable, family: CurveFamily, shape: Shape) -> None:
+    def __init__(self, table: SizeTable, family: CurveFamily, shape: Shape[float] | Shape[Numbers]) -> None:
         self.table, self.family, self.shape = table, family, shape
         self._starts = table.tree_starts
         self.curve = self.log_size(table.times)
-        self.slopes = -shape.rate_per_day * family.slope(self._x(table.times))
-        self._residuals = np.where(table.seen, table.logs - self.curve, 0.0)
-        self.whole = table.seen * (table.typical_mm / max(shape.noise_mm, _FINEST_MM)) ** 2
-        self._own = OwnNumbers.of(table.trust * self.whole, self.slopes, (shape.fruit_spread, shape.onset_spread_days))
+        self.slopes = -_column(shape.rate_per_day) * family.slope(self._x(table.times))
+        self._residuals = np.where(table.seen, table.logs - self.curve[..., None, :], 0.0)
+        noise_mm = np.maximum(_column(shape.noise_mm), _FINEST_MM)
+        self.whole = table.seen * ((table.typical_mm / noise_mm) ** 2)[..., None, :]
+        spreads = _column(shape.fruit_spread), _column(shape.onset_spread_days)
+        self._own = OwnNumbers.of(table.trust * self.whole, self.slopes, spreads)
         self._of_trees()
         self._of_visits()
 
     def log_size(self, times: Numbers) -> Numbers:
         """Return the block's curve against the middle of the visits, logarithms."""
-        middle = np.array(self.table.times.mean())
+        middle = self.table.times.mean(keepdims=True)
         return np.asarray(self.family.log_size(self._x(times)) - self.family.log_size(self._x(middle)))
 
     def _x(self, times: Numbers) -> Numbers:
-        return np.asarray(self.shape.rate_per_day * (times - self.shape.onset_day))
+        return np.asarray(_column(self.shape.rate_per_day) * (times - _column(self.shape.onset_day)))
 
     def _of_trees(self) -> None:
-        """Sum over the fruits of each tree: precision (T, S, S) and information (T, S) about its visits."""
+        """Sum over the fruits of each tree: precision (..., T, S, S) and information (..., T, S) about its visits."""
         own = self._own
         information, fits = own.said_by(self._residuals)
-        self._fit = float(fits.sum())
-        shared = own.rows.transpose(0, 2, 1) @ own.rows
-        self._precision = -np.add.reduceat(shared, self._starts)
-        diagonal = np.einsum("tss->ts", self._precision)
-        diagonal += np.add.reduceat(own.weights, self._starts)
-        self._information = np.add.reduceat(information, self._starts)
-        self._to_tree = self._precision.sum(axis=2)
-        self._tree_precision = self._to_tree.sum(axis=1) + self.shape.tree_spread**-2
-        self._tree_information = self._information.sum(axis=1)
+        self._fit = fits.sum(axis=-1)
+        shared = own.rows.swapaxes(-1, -2) @ own.rows
+        self._precision = -np.add.reduceat(shared, self._starts, axis=-3)
+        diagonal = np.einsum("...ss->...s", self._precision)
+        diagonal += np.add.reduceat(own.weights, self._starts, axis=-2)
+        self._information = np.add.reduceat(information, self._starts, axis=-2)
+        self._to_tree = self._precision.sum(axis=-1)
+        self._tree_precision = self._to_tree.sum(axis=-1) + _column(self.shape.tree_spread) ** -2
+        self._tree_information = self._information.sum(axis=-1)
 
     def _of_visits(self) -> None:
-        """Put the visits' errors and the mean together, (S + 1,), the trees integrated out."""
-        shrunk = self._tree_information / self._tree_precision
-        information = self._information.sum(axis=0) - shrunk @ self._to_tree
-        precision = self._precision.sum(axis=0) - self._to_tree.T @ (self._to_tree / self._tree_precision[:, None])
-        n = len(information)
+        """Put the visits' errors and the mean together, (..., S + 1), the trees integrated out."""
+        shape, table = self.shape, self.table
+        shrunk = self._to_tree / self._tree_precision[..., None]
+        information = self._information.sum(axis=-2) - (self._tree_information[..., None] * shrunk).sum(axis=-2)
+        precision = self._precision.sum(axis=-3) - self._to_tree.swapaxes(-1, -2) @ shrunk
+        n = len(table.times)
         self._prior_mean = self._mean_from_onset()
-        together = np.zeros((n + 1, n + 1))
-        scales = np.diag(self.shape.visit_spread**2 + self.table.doubt)
-        self._shared = scales + self.shape.stray_per_day**2 * self.table.straying
-        together[:n, :n] = precision + np.linalg.inv(self._shared)
-        together[:n, n] = together[n, :n] = precision.sum(axis=0)
-        together[n, n] = precision.sum() + _SIZE_AT_ONSET_SPREAD**-2
-        said = np.append(information, information.sum() + self._prior_mean * _SIZE_AT_ONSET_SPREAD**-2)
-        self._factor = cho_factor(together, lower=True)
-        self._said = said
-        self._expected = cho_solve(self._factor, said)
+        scales = (_column(shape.visit_spread) ** 2 + table.doubt)[..., None] * np.eye(n)
+        self._shared = scales + _column(shape.stray_per_day)[..., None] ** 2 * table.straying
+        together = np.zeros((*information.shape[:-1], n + 1, n + 1))
+        together[..., :n, :n] = precision + np.linalg.inv(self._shared)
+        together[..., :n, n] = together[..., n, :n] = precision.sum(axis=-2)
+        together[..., n, n] = precision.sum(axis=(-1, -2)) + _SIZE_AT_ONSET_SPREAD**-2
+        of_mean = information.sum(axis=-1) + self._prior_mean * _SIZE_AT_ONSET_SPREAD**-2
+        self._said = np.concatenate([information, of_mean[..., None]], axis=-1)
+        self._root = np.linalg.cholesky(together)
+        halfway = np.linalg.solve(self._root, self._said[..., None])
+        self._expected = np.asarray(np.linalg.solve(self._root.swapaxes(-1, -2), halfway)[..., 0], np.float64)
 
-    def _mean_from_onset(self) -> float:
-        onset = self.log_size(np.array(self.shape.onset_day))
-        return float(np.log(_SIZE_AT_ONSET_MM) - onset)
+    def _mean_from_onset(self) -> Numbers:
+        onset = self.log_size(_column(self.shape.onset_day))[..., 0]
+        return np.asarray(np.log(_SIZE_AT_ONSET_MM) - onset)
 
-    def log_likelihood(self) -> float:
+    def log_likelihood(self) -> Numbers:
         """Logarithm of the density of all measurements, everything linear integrated out.
 
         A density that is trusted by a share counts to the power of it, so what is not trusted says nothing.
         """
         shape, table, n_fruits = self.shape, self.table, len(self.table.logs)
-        of_noise = -(table.trust[table.seen] * np.log(self.whole[table.seen] / (2.0 * np.pi))).sum() + self._fit
-        of_fruits = np.log(self._own.determinants).sum()
+        # What was not measured has a precision of 0: of none there is nothing to take the logarithm of.
+        of_each = np.log(np.where(table.seen, self.whole, 1.0)) - np.log(2.0 * np.pi)
+        of_noise = -(table.trust * table.seen * of_each).sum(axis=(-1, -2)) + self._fit
+        of_fruits = np.log(self._own.determinants).sum(axis=-1)
         of_fruits += 2.0 * n_fruits * np.log(shape.fruit_spread * shape.onset_spread_days)
-        of_trees = np.log(self._tree_precision * shape.tree_spread**2).sum()
-        of_trees -= (self._tree_information**2 / self._tree_precision).sum()
-        of_visits = 2.0 * np.log(np.diag(self._factor[0])).sum() - float(self._said @ self._expected)
-        of_visits += float(np.linalg.slogdet(self._shared)[1]) + 2.0 * np.log(_SIZE_AT_ONSET_SPREAD)
+        of_trees = np.log(self._tree_precision * _column(shape.tree_spread) ** 2).sum(axis=-1)
+        of_trees -= (self._tree_information**2 / self._tree_precision).sum(axis=-1)
+        of_visits = 2.0 * np.log(np.einsum("...ss->...s", self._root)).sum(axis=-1)
+        of_visits -= (self._said * self._expected).sum(axis=-1)
+        of_visits += np.linalg.slogdet(self._shared)[1] + 2.0 * np.log(_SIZE_AT_ONSET_SPREAD)
         of_visits += (self._prior_mean / _SIZE_AT_ONSET_SPREAD) ** 2
-        return float(-0.5 * (of_noise + of_fruits + of_trees + of_visits))
+        return np.asarray(-0.5 * (of_noise + of_fruits + of_trees + of_visits))
 
     def log_prior(self, effects: Effects) -> float:
         """Logarithm of the density of what fruits share, before any measurement: the mean, the visits, the trees."""
@@ -186,7 +197,7 @@ class Hierarchy:
 
     def draw(self, chance: Chance) -> Effects:
         """Draw all effects together, given the measurements."""
-        noise = solve_triangular(self._factor[0], chance.shared("visits"), lower=True, trans=1)
+        noise = solve_triangular(self._root, chance.shared("visits"), lower=True, trans=1)
         return self._effects(self._expected + noise, chance)
 
     def draw_stray(self, effects: Effects, times: Numbers, chance: Chance) -> Numbers:
@@ -237,3 +248,8 @@ class Hierarchy:
         return np.asarray(
             self.shape.stray_per_day**2 * self.table.straying @ np.linalg.solve(self._shared, effects.visits)
         )
+
+
+def _column(number: float | Numbers) -> Numbers:
+    """Give a number, or each of several, an axis of its own."""
+    return np.asarray(number, np.float64)[..., None]

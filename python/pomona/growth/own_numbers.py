@@ -22,17 +22,17 @@ _LEAST_WEIGHT = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class OwnNumbers:
-    """Of N fruits on S visits.
+    """Of N fruits on S visits, for one shape or for any number of them at once.
 
     Attributes
     ----------
-    weights : (N, S)
+    weights : (..., N, S)
         W, the precisions of the measurements, 0 for none.
-    p11, p12 : (N,)
+    p11, p12 : (..., N)
         Of P.
-    determinants : (N,)
+    determinants : (..., N)
         Of P.
-    rows : (N, 2, S)
+    rows : (..., N, 2, S)
         With P = L L', rows of L^-1 X' W.
     """
 
@@ -43,21 +43,23 @@ class OwnNumbers:
     rows: Numbers
 
     @classmethod
-    def of(cls, weights: Numbers, slopes: Numbers, spreads: tuple[float, float]) -> OwnNumbers:
-        """Take (N, S) weights, (S,) slopes g of the curve, and the standard deviations of sizes and of onsets."""
-        of_size, of_onset = spreads[0] ** -2, spreads[1] ** -2
-        whole, p12 = weights.sum(axis=1), weights @ slopes
+    def of(cls, weights: Numbers, slopes: Numbers, spreads: tuple[Numbers, Numbers]) -> OwnNumbers:
+        """Take weights, slopes g of the curve, (..., S), and the deviations of sizes and of onsets, (..., 1) each."""
+        of_size, of_onset = (spread**-2 for spread in spreads)
+        slopes = slopes[..., None, :]
+        whole, p12 = weights.sum(axis=-1), (weights * slopes).sum(axis=-1)
         p11 = of_size + whole
         # p11 p22 - p12^2 in parts that are none below 0: where the prior says next to nothing, rounding eats the rest.
-        apart = slopes - (p12 / np.maximum(whole, _LEAST_WEIGHT))[:, None]
-        determinants = of_onset * p11 + of_size * (weights @ slopes**2) + whole * (weights * apart**2).sum(axis=1)
-        first = weights / np.sqrt(p11)[:, None]
-        left = np.sqrt(determinants / p11)[:, None]
-        second = weights * (slopes - (p12 / p11)[:, None]) / left
-        return cls(weights, p11, p12, determinants, np.stack([first, second], axis=1))
+        apart = slopes - (p12 / np.maximum(whole, _LEAST_WEIGHT))[..., None]
+        of_slopes, of_apart = ((weights * part**2).sum(axis=-1) for part in (slopes, apart))
+        determinants = of_onset * p11 + of_size * of_slopes + whole * of_apart
+        first = weights / np.sqrt(p11)[..., None]
+        left = np.sqrt(determinants / p11)[..., None]
+        second = weights * (slopes - (p12 / p11)[..., None]) / left
+        return cls(weights, p11, p12, determinants, np.stack([first, second], axis=-2))
 
     def said_by(self, residuals: Numbers) -> tuple[Numbers, Numbers]:
-        """Return M r, (N, S), and r' M r, (N,), of residuals r."""
-        told = np.einsum("nks,ns->nk", self.rows, residuals)
-        said = self.weights * residuals - np.einsum("nks,nk->ns", self.rows, told)
-        return said, (self.weights * residuals**2).sum(axis=1) - (told**2).sum(axis=1)
+        """Return M r, (..., N, S), and r' M r, (..., N), of residuals r."""
+        told = (self.rows * residuals[..., None, :]).sum(axis=-1)
+        said = self.weights * residuals - (self.rows * told[..., None]).sum(axis=-2)
+        return said, (self.weights * residuals**2).sum(axis=-1) - (told**2).sum(axis=-1)
