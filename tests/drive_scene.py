@@ -79,10 +79,10 @@ def drive(poses: NDArray[np.float64], seed: int = 0) -> Drive:
     return Drive(tuple(walls), poses)
 
 
-def sideways(n: int, step_m: float = 0.05) -> NDArray[np.float64]:
-    """A drive along the walls that bumps a little."""
+def sideways(n: int, step_m: float = 0.05, pace: float = 1.0) -> NDArray[np.float64]:
+    """A drive along the walls that bumps a little; at a lower pace more pictures are taken of the same."""
     poses = []
-    for row in range(n):
+    for row in pace * np.arange(n):
         turn, _ = cv2.Rodrigues(np.array([0.01 * np.sin(row), 0.02 * np.sin(0.5 * row), 0.01 * np.cos(0.8 * row)]))
         pose = _translation((step_m * row, 0.01 * np.sin(row), 0.02 * np.sin(0.3 * row)))
         pose[:3, :3] = turn

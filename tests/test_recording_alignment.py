@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -15,15 +16,16 @@ from tests.drive_scene import CALIBRATION, drive, sideways
 from pomona.errors import PomonaWarning
 from pomona.recording import Recording, open_recording
 from pomona.recording.alignment import alignment_of, straightened
+from pomona.recording.eye_lag import lag_of
 
 """Columns; in an upright pair of two depths."""
 
 
 def recording(
-    folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0, frames: int = 3
+    folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0, frames: int = 3, pace: float = 1.0
 ) -> Recording:
     """Pairs whose right pictures are lower, turned clockwise, and larger."""
-    scene, change = drive(sideways(frames)), misaligned(lower_px, -turned_deg)
+    scene, change = drive(sideways(frames, pace=pace)), misaligned(lower_px, -turned_deg)
     for side in ("left", "right"):
         (folder / side).mkdir(parents=True)
     for row in range(frames):
@@ -207,14 +209,41 @@ def late(source: Path, folder: Path, frames: int) -> Recording:
     return open_recording(folder)
 
 
-@pytest.mark.parametrize(("frames", "when"), [(1, "late"), (-1, "early")])
+@pytest.mark.parametrize(
+    ("frames", "when"), [(1, "are a frame late"), (-1, r"were taken (0\.9|1\.0)\d of a frame after")]
+)
 def test_right_pictures_of_other_frames_are_told(pomona, tmp_path: Path, frames: int, when: str) -> None:
-    row = late(recording(tmp_path / "row", frames=8).path, tmp_path / when, frames)
-    with pytest.warns(PomonaWarning, match=f"the right pictures are a frame {when}, .*: pair the pictures"):
+    row = late(recording(tmp_path / "row", frames=8).path, tmp_path / "late", frames)
+    with pytest.warns(PomonaWarning, match=rf"the right pictures {when}.*: trigger the cameras at once"):
         assert straightened(row) is row
     code, printed, _ = pomona("info", row.path, "--check")
     assert code == 1
-    assert f"a frame {when}" in printed
+    assert re.search(when, printed)
+
+
+@pytest.mark.parametrize(("date", "frames", "when"), [("08-09", -1, "early"), ("08-28", 1, "late")])
+def test_they_are_told_of_a_fast_camera_too(
+    shared_data: Path, tmp_path: Path, date: str, frames: int, when: str
+) -> None:
+    """Its pictures of two moments have too few corners in common to tell by what part of a frame."""
+    found = alignment_of(late(shared_data / f"rendered_row/2024-{date}", tmp_path / "row", frames))
+    assert found is not None
+    assert f"a frame {when}" in str(found)
+
+
+@pytest.mark.parametrize("late_by", [-1, 0, 1, 2])
+def test_eyes_that_are_not_triggered_at_once_are_told_with_by_how_much(tmp_path: Path, late_by: int) -> None:
+    """Of every fourth picture the right one is of others between."""
+    fine, row = recording(tmp_path / "fine", frames=40, pace=0.1).path, tmp_path / "row"
+    for side, first in (("left", 1), ("right", 1 + late_by)):
+        (row / side).mkdir(parents=True)
+        for frame, file in enumerate(sorted((fine / side).iterdir())[first::4]):
+            shutil.copy(file, row / side / f"{frame:04d}.png")
+    shutil.copy(fine / "calibration.json", row)
+    found = lag_of(open_recording(row))
+    assert found is not None
+    assert found.frames == pytest.approx(late_by / 4, abs=0.05)
+    assert found.is_told == (late_by != 0)
 
 
 def along_the_baseline(folder: Path, n_alike: int) -> Recording:

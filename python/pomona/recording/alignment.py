@@ -3,8 +3,8 @@
 A rectified pair shows a point in the same row of both pictures. Where one camera was knocked since it was calibrated,
 the right picture lies lower and is turned: corners that are found in both pictures tell, whatever their depth. The core
 fits and decides (`stereo/alignment.rs`); small errors are taken out of the right picture. What is farther off than
-corners are sought in their rows, corners that are sought everywhere tell. Where few corners agree on
-anything, the pictures may be of different moments (`late_eye.py`).
+corners are sought in their rows, corners that are sought everywhere tell. Pictures may be of different moments
+(`eye_lag.py`; `late_eye.py` where few corners agree on anything).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from pomona import _core
 from pomona.errors import PomonaWarning
+from pomona.recording.eye_lag import Lag, lag_of
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
 from pomona.recording.late_eye import FEWEST, SURE_SHARE, frames_late
@@ -74,6 +75,8 @@ class Alignment:
         Whether it is small enough to be taken out.
     frames_late : int
         By how many frames the right pictures are late; below 0, early.
+    lag : Lag or None
+        By what part of a frame they were taken after their left ones, where it is to be told.
     bend : Bend or None
         What parts the rows towards the corners, where something does.
     """
@@ -84,9 +87,12 @@ class Alignment:
     is_off: bool
     is_correctable: bool
     frames_late: int = 0
+    lag: Lag | None = None
     bend: Bend | None = None
 
     def __str__(self) -> str:
+        if self.lag is not None:
+            return str(self.lag)
         if self.bend is not None:
             return str(self.bend)
         if self.frames_late:
@@ -104,8 +110,8 @@ class Alignment:
             return (
                 "rectify the pictures with the cameras' own calibration, or calibrate again; places and sizes are off"
             )
-        if self.frames_late:
-            return "pair the pictures that were taken at once; all lengths are wrong else"
+        if self.lag is not None or self.frames_late:
+            return "trigger the cameras at once, or pair the pictures that were; all lengths are wrong else"
         most_px, most_rad = _core.MOST_MISALIGNED
         most = f"{most_px:g} px, {np.degrees(most_rad):.2f} degrees and {MOST_STRETCH:.0%}"
         return f"more than the {most} that are taken out, calibrate the cameras again"
@@ -125,6 +131,9 @@ def straightened(recording: Recording) -> Recording:
 
 def alignment_of(recording: Recording) -> Alignment | None:
     """Measure how right pictures lie to left ones; None where too little shows in both, or one is not there."""
+    lag = lag_of(recording)
+    if lag is not None and lag.is_told:
+        return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, lag=lag)
     rows = _evenly(len(recording), LOOKED_AT)
     centre_px = (recording.calibration.cx, recording.calibration.cy)
     found = _corners(recording, rows, row_errors)
