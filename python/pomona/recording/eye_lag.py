@@ -35,6 +35,9 @@ ENOUGH = 50
 TOLD, SIGMAS = 0.1, 6.0
 """Lag from which on it is told, and how sure it must be: good recordings, 15 of them, are measured within 0.03."""
 
+MOST = 1.2
+"""Lag beyond which it is not told how long: the picture does not go on as it went for one frame."""
+
 SUSPECTED, SUSPECTED_SIGMAS = 0.05, 1.5
 """From which on many frames are looked at."""
 
@@ -74,12 +77,13 @@ class Lag:
 
     def __str__(self) -> str:
         when = "after" if self.frames > 0 else "before"
+        if abs(self.frames) > MOST:
+            return f"the right pictures were taken more than a frame {when} the left ones"
         lasting = "" if self.frame_s is None else f" ({1000 * abs(self.frames) * self.frame_s:.0f} ms)"
         off_px = abs(self.frames * self.passing_px)
         spoiled = f"disparities of {self.disparity_px:.0f} px are off by {off_px:.1f} px"
-        return (
-            f"the right pictures were taken {abs(self.frames):.2f} of a frame{lasting} {when} the left ones, {spoiled}"
-        )
+        lag = f"{abs(self.frames):.2f} of a frame{lasting} {when} the left ones"
+        return f"the right pictures were taken {lag}, {spoiled}"
 
 
 def lag_of(recording: Recording) -> Lag | None:
