@@ -33,7 +33,7 @@ ENOUGH = 50
 """Corners that are found in the right picture and in the next left one, without which nothing is said."""
 
 TOLD, SIGMAS = 0.1, 6.0
-"""Lag from which on it is told, and how sure it must be: good recordings, 15 of them, are measured within 0.03."""
+"""Lag from which on it is told, and how sure it must be: eleven good recordings are measured within 0.03."""
 
 MOST = 1.2
 """Lag beyond which it is not told how long: the picture does not go on as it went for one frame."""
