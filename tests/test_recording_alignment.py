@@ -18,8 +18,6 @@ from pomona.recording import Recording, open_recording
 from pomona.recording.alignment import alignment_of, straightened
 from pomona.recording.eye_lag import lag_of
 
-"""Columns; in an upright pair of two depths."""
-
 
 def recording(
     folder: Path, lower_px: float = 0.0, turned_deg: float = 0.0, size: float = 1.0, frames: int = 3, pace: float = 1.0
@@ -186,7 +184,7 @@ def test_one_camera_twice_is_refused(pomona, tmp_path: Path) -> None:
         (row / "right" / picture.name).write_bytes(picture.read_bytes())
     code, _, told = pomona("info", row, "--check")
     assert code == 2
-    assert "found the same picture in 2 of 2 frames" in told
+    assert "found the same picture in 3 of 3 frames" in told
 
 
 def test_info_tells(pomona, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from pomona import _core
 from pomona.errors import PomonaWarning
+from pomona.recording.evenly import evenly
 from pomona.recording.eye_lag import Lag, lag_of
 from pomona.recording.far_corners import far_corners
 from pomona.recording.frame import Frame, Recording
@@ -134,7 +135,7 @@ def alignment_of(recording: Recording) -> Alignment | None:
     lag = lag_of(recording)
     if lag is not None and lag.is_told:
         return Alignment(0.0, 0.0, 0.0, is_off=True, is_correctable=False, lag=lag)
-    rows = _evenly(len(recording), LOOKED_AT)
+    rows = evenly(len(recording), LOOKED_AT)
     centre_px = (recording.calibration.cx, recording.calibration.cy)
     found = _corners(recording, rows, row_errors)
     if found is None:
@@ -156,12 +157,6 @@ def alignment_of(recording: Recording) -> Alignment | None:
     return (None if anywhere is None else _beyond(anywhere, centre_px)) or fitted
 
 
-def _evenly(n_frames: int, most: int) -> list[int]:
-    """Give the rows of the frames in the middles of so many equal parts of a recording."""
-    middles = (2 * np.arange(min(most, n_frames)) + 1) * n_frames // (2 * most)
-    return list(dict.fromkeys(min(row, n_frames - 1) for row in middles.tolist()))
-
-
 def _looked_at_longer(recording: Recording, found: Array) -> tuple[Array, Bend | None]:
     """Fit a bend to the corners of a few frames, and of more where those may show one; give the last ones."""
     calibration = recording.calibration
@@ -169,7 +164,7 @@ def _looked_at_longer(recording: Recording, found: Array) -> tuple[Array, Bend |
     bend = bend_of(found, centre_px, calibration.fx)
     if bend is None or not bend.is_suspected:
         return found, bend
-    many = _corners(recording, _evenly(len(recording), LOOKED_AT_LONGER), row_errors)
+    many = _corners(recording, evenly(len(recording), LOOKED_AT_LONGER), row_errors)
     longer = distinct(found if many is None else many)
     return longer, bend_of(longer, centre_px, calibration.fx)
 

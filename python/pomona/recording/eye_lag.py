@@ -5,8 +5,8 @@ A point that the picture moves by v rows from one frame to the next lies, in a r
     y_right - y_left = a + t (x_right - c_x) + s (y_left - c_y) + l v
 
 with the shift a, turn t and size s of a pair that is only misaligned. Those are the same in every frame and v is not: a
-camera that is carried or driven rises, sinks, rolls and nods. So l is told to a hundredth of a frame, though it is what
-moves along the rows that spoils the disparities, by l times as many pixels.
+camera that is carried or driven rises, sinks, rolls and nods. So l is told to a few hundredths of a frame, though it is
+what moves along the rows that spoils the disparities, by l times as many pixels.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.recording.evenly import evenly
 from pomona.recording.frame import Recording
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.recording.row_corners import row_errors
+from pomona.recording.row_fit import row_fit
 
 __all__ = ["Lag", "lag_of"]
 
@@ -40,9 +42,6 @@ MOST = 1.2
 
 SUSPECTED, SUSPECTED_SIGMAS = 0.05, 1.5
 """From which on many frames are looked at."""
-
-SPREAD_PX, FIRST_SPREAD, ROUNDS = 0.5, 8.0, 30
-"""Deviations beyond four of this count nothing (Tukey's weights); it begins as many times as wide, and narrows."""
 
 THERE_AND_BACK_PX = 0.5
 """How near a corner comes to where it was when it is followed to the next picture and back."""
@@ -101,18 +100,18 @@ def _measured(recording: Recording, n_frames: int) -> Lag | None:
     if len(corners) < ENOUGH:
         return None
     frames = np.repeat(np.arange(len(found)), [len(each) for each in found])
-    lag, sigma = _fitted(corners, frames, recording)
-    times_s = recording.times_s
+    fitted, times_s = _fitted(corners, frames, recording), recording.times_s
+    if fitted is None:
+        return None
     frame_s = None if times_s is None or len(times_s) < 2 else float(np.median(np.diff(times_s)))
-    return Lag(
-        lag, sigma, frame_s, float(np.median(corners[:, 3] - corners[:, 0])), float(np.median(np.abs(corners[:, 4])))
-    )
+    disparity_px, passing_px = np.median(corners[:, 3] - corners[:, 0]), np.median(np.abs(corners[:, 4]))
+    return Lag(*fitted, frame_s, float(disparity_px), float(passing_px))
 
 
 def _followed(recording: Recording, n_frames: int) -> Iterator[Array]:
     """Give the corners of each pair as `row_errors` does, with their way to the next left picture, (N, 6)."""
     numbers, n_steps = recording.numbers, len(recording) - 1
-    rows = dict.fromkeys(((2 * np.arange(n_frames) + 1) * n_steps // (2 * n_frames)).tolist()) if n_steps > 0 else {}
+    rows = evenly(n_steps, n_frames)
     following = {numbers[row + 1]: numbers[row] for row in rows}
     firsts = {numbers[row] for row in rows}
     pairs: dict[int, tuple[Picture, Picture]] = {}
@@ -144,20 +143,23 @@ def _corners(left: Picture, right: Picture, following: Picture) -> Array:
     return np.hstack([corners, there - here])[is_sure].astype(np.float64)
 
 
-def _fitted(corners: Array, frames: NDArray[np.int64], recording: Recording) -> tuple[float, float]:
-    """Fit shift, turn, size and lag; what the corners of a frame err by together widens what is told of the lag."""
-    x_right, y, apart = corners[:, :3].T
+def _fitted(corners: Array, frames: NDArray[np.int64], recording: Recording) -> tuple[float, float] | None:
+    """Fit the lag beside shift, turn and size, and tell how sure it is; None where the corners do not fix it."""
     camera = recording.calibration
-    terms = np.stack([np.ones(len(corners)), (x_right - camera.cx) / camera.fx, (y - camera.cy) / camera.fy], axis=1)
-    terms = np.hstack([terms, corners[:, 5:]])
-    weights = np.ones(len(corners))
-    for spread in SPREAD_PX * np.geomspace(FIRST_SPREAD, 1.0, ROUNDS):
-        root = np.sqrt(weights)
-        fit = np.linalg.lstsq(terms * root[:, None], apart * root, rcond=None)[0]
-        left_over = apart - terms @ fit
-        weights = np.clip(1.0 - (left_over / (4.0 * spread)) ** 2, 0.0, None) ** 2
-    inverse = np.linalg.pinv(terms.T @ (weights[:, None] * terms))
+    terms = np.stack(
+        [
+            np.ones(len(corners)),
+            (corners[:, 0] - camera.cx) / camera.fx,
+            (corners[:, 1] - camera.cy) / camera.fy,
+            corners[:, 5],
+        ],
+        axis=1,
+    )
+    fit = row_fit(terms, corners[:, 2])
+    if fit is None:
+        return None
+    # The corners of a frame err together, so each frame is one that errs.
     of_frames = np.zeros((frames[-1] + 1, terms.shape[1]))
-    np.add.at(of_frames, frames, (weights * left_over)[:, None] * terms)
-    covariance = inverse @ (of_frames.T @ of_frames) @ inverse
-    return float(fit[-1]), float(np.sqrt(covariance[-1, -1]))
+    np.add.at(of_frames, frames, (fit.weights * fit.left_over)[:, None] * terms)
+    covariance = fit.inverse @ (of_frames.T @ of_frames) @ fit.inverse
+    return float(fit.factors[3]), float(np.sqrt(covariance[3, 3]))

@@ -17,15 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.recording.row_fit import row_fit
+
 __all__ = ["Bend", "bend_of", "distinct"]
 
 Array = NDArray[np.float64]
 
 ENOUGH = 60
 """Corners found in both pictures without which nothing is said."""
-
-SPREAD_PX, FIRST_SPREAD, ROUNDS = 0.5, 8.0, 30
-"""Deviations beyond four of this count nothing (Tukey's weights); it begins as many times as wide, and narrows."""
 
 TOLD_RAD, SIGMAS = np.radians(0.15), 5.0
 """Turn from which on it is told, lengths are 3 % off then at 1.5 m with a baseline of 12 cm, and how sure it must be:
@@ -133,16 +132,8 @@ def distinct(corners: Array) -> Array:
 
 def _fitted(terms: Array, bent: Array, off: Array) -> tuple[float, float, Array] | None:
     """Give the factor of the last term, its standard deviation and what it says of each; None where it is not fixed."""
-    terms = np.column_stack([terms, bent])
-    solution = np.array([np.median(off), 0.0, 0.0, 0.0])
-    inverse = np.eye(4)
-    for spread_px in SPREAD_PX * FIRST_SPREAD ** np.linspace(1.0, 0.0, ROUNDS):
-        weights = np.clip(1.0 - ((off - terms @ solution) / (4.0 * spread_px)) ** 2, 0.0, None) ** 2
-        matrix = (weights[:, None] * terms).T @ terms
-        scale = np.sqrt(np.diag(matrix))
-        if not (scale > 0).all() or np.linalg.matrix_rank(matrix / np.outer(scale, scale)) < len(matrix):
-            return None
-        inverse = np.linalg.inv(matrix)
-        solution = inverse @ (terms.T @ (weights * off))
-    variance = float((weights * (off - terms @ solution) ** 2).sum() / weights.sum())
-    return float(solution[3]), float(np.sqrt(variance * inverse[3, 3])), solution[3] * bent
+    fit = row_fit(np.column_stack([terms, bent]), off)
+    if fit is None:
+        return None
+    variance = float((fit.weights * fit.left_over**2).sum() / fit.weights.sum())
+    return float(fit.factors[3]), float(np.sqrt(variance * fit.inverse[3, 3])), fit.factors[3] * bent

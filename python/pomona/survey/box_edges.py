@@ -32,7 +32,7 @@ BESIDE = 0.06
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
 
 LEAST_RADIUS_PX = 5.0
-"""Of a box; the outline of a smaller fruit is as wide as the steps between ellipses."""
+"""Of a box; what lies inside and outside of the outline of a smaller fruit shares its pixels."""
 
 LOOKED_AT = 20
 """Frames."""
@@ -41,10 +41,10 @@ OF_A_FRAME = 50
 """Boxes of a frame that are looked at, at the most."""
 
 MANY = 200
-"""Boxes below which their size is not told: of so many the peak is known to within 1.5 %."""
+"""Boxes below which their size is not told: of so many the peak is known to within 3 %."""
 
 CLEAR = 1.2
-"""Times the median over all ellipses that the peak is high: 1.3 to 3.2 in eleven sets of pictures."""
+"""Times the median over all ellipses that the peak is high: 1.3 to 3.2 in eight sets of pictures."""
 
 FITTING = (0.89, 1.06)
 """Outlines over boxes that fit, with a margin. Of 200 boxes each they were 0.92 to 1.00, by hand in four kinds of

@@ -18,6 +18,7 @@ from pomona.errors import PomonaWarning
 from pomona.recording import Calibration, Recording
 from pomona.recording.boxes_beside import boxes_beside
 from pomona.recording.checks.along_rays import depth_along_rays
+from pomona.recording.evenly import evenly
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 from pomona.survey.sampled_boxes import LOOKED_AT, frames_in_words, sampled_boxes
@@ -76,8 +77,7 @@ def _by_boxes_beside(recording: Recording) -> str | None:
     if boxes_beside(recording.path) is None:
         return None
     boxes_of = open_detector(None, None, recording)
-    rows = np.unique((2 * np.arange(LOOKED_AT) + 1) * len(recording) // (2 * LOOKED_AT))
-    frames = recording.frames({recording.numbers[row] for row in rows})
+    frames = recording.frames({recording.numbers[row] for row in evenly(len(recording), LOOKED_AT)})
     return _fault(recording, {frame.number: boxes_of(frame).boxes_px for frame in frames})
 
 

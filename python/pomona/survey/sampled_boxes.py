@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.recording import Recording
+from pomona.recording.evenly import evenly
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 
@@ -20,8 +21,7 @@ LOOKED_AT = 5
 def sampled_boxes(parts: Sequence[Boxes], n_frames: int = LOOKED_AT) -> dict[int, NDArray[np.float64]]:
     """Give the boxes, (D, 4) pixels, of so many frames at the most by their numbers."""
     frames = [frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())]
-    rows = (2 * np.arange(n_frames) + 1) * len(frames) // (2 * n_frames)
-    shown = [frames[row] for row in dict.fromkeys(rows.tolist())] if frames else []
+    shown = [frames[row] for row in evenly(len(frames), n_frames)]
     return {frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames}
 
 

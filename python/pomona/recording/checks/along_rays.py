@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.recording.calibration import Calibration
+from pomona.recording.evenly import evenly
 from pomona.recording.frame import Frame, Recording
 from pomona.recording.pictures import UnreadablePictureError
 
@@ -43,7 +44,9 @@ def depth_along_rays(recording: Recording) -> str | None:
     if not {"left", "depth"} <= set(recording.description()["pictures"]):
         return None
     gap = _gap(recording)
-    pairs = [seen for row in _evenly(len(recording) - gap) if (seen := _seen(recording, row, row + gap)) is not None]
+    pairs = [
+        seen for row in evenly(len(recording) - gap, PAIRS) if (seen := _seen(recording, row, row + gap)) is not None
+    ]
     if len(pairs) < FEWEST_PAIRS:
         return None
     gains = np.array([_loss(seen, along_rays=False) - _loss(seen, along_rays=True) for seen in pairs])
@@ -51,11 +54,6 @@ def depth_along_rays(recording: Recording) -> str | None:
         return None
     found = "the depth pictures hold distances along the rays, expected depths along the optical axis"
     return f"{found}: divide by sqrt(1 + x^2 + y^2), x and y from the principal point in focal lengths"
-
-
-def _evenly(n_rows: int) -> list[int]:
-    middles = (2 * np.arange(PAIRS) + 1) * max(n_rows, 0) // (2 * PAIRS)
-    return list(dict.fromkeys(middles.tolist())) if n_rows > 0 else []
 
 
 def _gap(recording: Recording) -> int:

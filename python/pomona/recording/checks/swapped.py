@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pomona.errors import PomonaError
 from pomona.recording.checks.readable import is_blank
+from pomona.recording.evenly import evenly
 from pomona.recording.frame import Recording
 from pomona.recording.pictures import UnreadablePictureError
 
@@ -23,7 +24,7 @@ SWAPPED_SHARE = 0.8
 
 ON_END_TIMES = 4
 """As many corners above each other as beside each other, where pictures are turned: of a frame of a drawn row 41 to 105
-and up to 2; in six good recordings up to 9 and 30 to 204."""
+and up to 2; in five good recordings up to 9 and 30 to 204."""
 
 CORNERS, PATCH_PX = 300, 15
 
@@ -53,8 +54,7 @@ def check_sides(recording: Recording) -> None:
         One line that says to swap them, to turn them back, or that both are the same.
     """
     found, on_end, same = np.zeros(0), np.zeros(0), []
-    middles = (2 * np.arange(min(LOOKED_AT, len(recording))) + 1) * len(recording) // (2 * LOOKED_AT)
-    looked_at = {recording.numbers[min(row, len(recording) - 1)] for row in middles.tolist()}
+    looked_at = {recording.numbers[row] for row in evenly(len(recording), LOOKED_AT)}
     for frame in recording.frames(looked_at):
         if frame.read_left is None or frame.read_right is None:
             return
