@@ -45,10 +45,12 @@ def grow_row(
     labels: str = "apple {}",
     name: str = "{}",
     dated: Sequence[int] = (),
+    numbered_anew: bool = False,
 ) -> GrownRow:
     """Make a map of visits so many days after bloom; fruits that drop grow at a quarter of their rate from a day on.
 
-    `dated` are days that were noted instead of the true ones.
+    `dated` are days that were noted instead of the true ones. Where visits are `numbered_anew` each begins with another
+    fruit.
     """
     rng = np.random.default_rng(seed)
     n = n_trees * FRUITS_OF_TREE
@@ -62,7 +64,7 @@ def grow_row(
         true_mm = 1000.0 * curves.diameters_m(after_bloom)
         measured_m = (true_mm * scale + rng.normal(0.0, noise_mm, n)) / 1000.0
         day = (BLOOM + timedelta(days=noted)).isoformat()
-        ids = tuple(labels.format(row) for row in range(n))
+        ids = tuple(labels.format((row + numbered_anew * after_bloom) % n) for row in range(n))
         cloud = FruitCloud(places + rng.normal(0.0, 0.003, places.shape), ids=ids, diameters_m=measured_m)
         added = add_session(path, Session(name.format(day), day, "drawn", cloud))
         assert added.is_added

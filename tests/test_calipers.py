@@ -151,6 +151,13 @@ def test_calipers_that_are_none_are_one_line(
     assert not (tmp_path / "pairs.csv").exists()
 
 
+def test_names_that_each_session_gives_anew_are_refused(pomona: Pomona, tmp_path: Path) -> None:
+    row = grow_row(tmp_path / "anew.gpkg", days=(50, 65), n_trees=1, numbered_anew=True)
+    code, _, told = pomona("validate", row.path, "--calipers", long_table(row, tmp_path / "c.csv"))
+    assert (code, told.count("\n")) == (2, 1)
+    assert "c.csv: found names of which 30 of 30 are different fruits in different sessions" in told
+
+
 def test_one_day_needs_no_date(pomona: Pomona, tmp_path: Path) -> None:
     row = grow_row(tmp_path / "once.gpkg", days=(50,), n_trees=1)
     (tmp_path / "c.csv").write_text("id,diameter_mm,weight_g\napple 0,30.1,20\napple 1,29.5,\n")

@@ -23,6 +23,13 @@ NEAREST_DAYS = 3
 BETWEEN_DAYS = 21
 """Between two days by hand that are no further apart, growth is a line."""
 
+ANEW = 0.5
+"""Names that stand for different fruits in different sessions, of those in several, from which on sessions number anew:
+of names that stay, as many do as identities are wrong, some in a hundred."""
+
+FEWEST_ANEW = 3
+"""Such names below which they are fruits that the map split."""
+
 Series = dict[int, float]
 """Diameters in mm by day."""
 
@@ -65,7 +72,8 @@ def pair_with_calipers(
     Raises
     ------
     PomonaError
-        When a number is none of the map's fruits, no name is one of its sessions', or days are missing that are needed.
+        When a number is none of the map's fruits, no name is one of its sessions', sessions call different fruits by one
+        name, or days are missing that are needed.
     """
     if any(one.day is None for one in measurements) and len(set(fruits.days)) > 1:
         raise PomonaError(f"{path}: found no column date, expected one: {fruits.path} has visits on several days")
@@ -110,7 +118,21 @@ def _cells_by_label(fruits: MeasuredFruits, names: set[str], path: Path) -> list
             f"{path}: found the fruits {some}, expected names that sessions of {fruits.path} have, or a column "
             "fruit_id with the map's numbers"
         )
+    _require_names_that_stay(fruits, cells, path)
     return cells
+
+
+def _require_names_that_stay(fruits: MeasuredFruits, cells: Sequence[tuple[str, int, int]], path: Path) -> None:
+    rows: dict[str, list[int]] = defaultdict(list)
+    for label, row, _ in cells:
+        rows[label].append(row)
+    several = [set(of_label) for of_label in rows.values() if len(of_label) > 1]
+    n_anew = sum(len(of_label) > 1 for of_label in several)
+    if n_anew >= max(FEWEST_ANEW, ANEW * len(several)):
+        raise PomonaError(
+            f"{path}: found names of which {n_anew} of {len(several)} are different fruits in different sessions of "
+            f"{fruits.path}, expected one name for each fruit, or a column fruit_id with the map's numbers"
+        )
 
 
 def _on_day(series: Series, day: int) -> float | None:
