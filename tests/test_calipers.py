@@ -136,7 +136,7 @@ def test_fruits_that_no_visit_saw_are_told(pomona: Pomona, row: GrownRow, tmp_pa
         ("label,date,diameter_mm\nnobody,2024-06-14,30\n", "found the fruits 'nobody', expected names that sessions"),
         ("fruit_id,date,diameter_mm\n999,2024-06-14,30\n", "line 2: fruit_id: found '999', expected the number of a"),
         ("label,diameter_mm\napple 3,30\n", "found no column date, expected one"),
-        ("label,date,diameter_mm\napple 3,2023-06-14,30\n", "found no day near the visits"),
+        ("label,date,diameter_mm\napple 3,2023-06-14,30\n", "found no diameter within 3 days of a visit of"),
     ],
 )
 def test_calipers_that_are_none_are_one_line(

@@ -43,7 +43,6 @@ def validate(
     """
     from statistics import median
 
-    from pomona.errors import PomonaError
     from pomona.growth.agreement import agreement_by_date, agreement_of, draw_agreement
     from pomona.growth.caliper_file import read_calipers
     from pomona.growth.caliper_pairs import pair_with_calipers
@@ -54,8 +53,6 @@ def validate(
         require_picture_name(plot)
     fruits = measured_fruits(orchard)
     pairs, unseen = pair_with_calipers(fruits, read_calipers(calipers), calipers)
-    if not pairs:
-        raise PomonaError(f"{calipers}: found no day near the visits of {orchard}, expected one within 3 days of one")
     if unseen:
         names = ", ".join(unseen[:5]) + (", ..." if len(unseen) > 5 else "")
         tell(f"pomona: warning: {calipers}: {amount(len(unseen), 'fruit')} measured by no visit near: {names}")

@@ -72,8 +72,8 @@ def pair_with_calipers(
     Raises
     ------
     PomonaError
-        When a number is none of the map's fruits, no name is one of its sessions', sessions call different fruits by one
-        name, or days are missing that are needed.
+        When a number is none of the map's fruits, no name is one of its sessions', sessions call different fruits by
+        one name, days are missing that are needed, or no visit near measured any.
     """
     if any(one.day is None for one in measurements) and len(set(fruits.days)) > 1:
         raise PomonaError(f"{path}: found no column date, expected one: {fruits.path} has visits on several days")
@@ -91,6 +91,9 @@ def pair_with_calipers(
         if caliper_mm is not None and not np.isnan(measured_mm):
             about = int(fruits.ids[row]), name, fruits.sessions[column], fruits.days[column]
             pairs.append(CaliperPair(*about, measured_mm, caliper_mm))
+    if not pairs:
+        near = f"within {NEAREST_DAYS} days of a visit of {fruits.path} that measured the fruit"
+        raise PomonaError(f"{path}: found no diameter {near}, expected one")
     unseen = sorted(set(by_name) - {pair.name for pair in pairs})
     return pairs, unseen
 
