@@ -209,6 +209,20 @@ def test_dates_that_fruits_deny_are_doubted(pomona: Pomona, tmp_path: Path) -> N
     assert f"than on {row.day(50)}" not in told
 
 
+def test_fruits_beyond_the_last_visit_are_told_of(pomona: Pomona, tmp_path: Path) -> None:
+    """A half that was picked and one that was not visited look alike."""
+    path = grow_row(tmp_path / "o.gpkg", days=(50, 65, 80), n_trees=4).path
+    known_m = OrchardMap(path).cloud.positions
+    half_m = known_m[known_m[:, 0] < np.median(known_m[:, 0])]
+    half_m = half_m + np.random.default_rng(1).normal(0.0, 0.005, half_m.shape)
+    half = FruitCloud(half_m, diameters_m=np.full(len(half_m), 0.06))
+    assert add_session(path, Session("late", "2024-07-29", "drawn", half)).is_added
+    told = pomona("growth", path, "-o", tmp_path / "g")[2]
+    assert re.search(r"6\d of 12\d fruits hang beyond what was seen on 2024-07-29: they count as on 2024-07-14", told)
+    told = pomona("growth", grow_row(tmp_path / "all.gpkg", days=(50, 65), n_trees=1).path, "-o", tmp_path / "h")[2]
+    assert "beyond" not in told
+
+
 def test_what_visits_share_has_an_interval(
     pomona: Pomona, grown_row: GrownRow, row_growth: SeasonGrowth, tmp_path: Path
 ) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from datetime import date
 from itertools import pairwise
 
 import numpy as np
 
 from pomona.growth.measured import MeasuredFruits
 from pomona.growth.season_growth import SeasonGrowth
+from pomona.growth.whole_fruits import whole_fruits
 
 __all__ = ["called", "of_late_visits", "of_visits"]
 
@@ -22,6 +25,11 @@ logarithm at least: two visits of which each is off by 2 % seldom hide as much."
 
 _OFF_CURVE = 0.3
 """Logarithm of the scale of a visit from which on it is the curve that is wrong: no camera is off by a third."""
+
+
+_BEYOND, _HELD_DAYS = 0.05, 3
+"""Share of what hangs that lies beyond the last visit from which on it is told, and days for which it holds: a row may
+be recorded on two."""
 
 
 def of_visits(growth: SeasonGrowth) -> list[str]:
@@ -39,7 +47,8 @@ def of_visits(growth: SeasonGrowth) -> list[str]:
         f"part {part} of the map was visited on {day} last, in a season before: what is told is of the others"
         for part, day in fruits.left_out.items()
     ]
-    return [*left_out, *late, *(off or _of_curve(growth)), *_of_still(growth), *_of_shrunk(fruits, likely)]
+    of_sizes = [*(off or _of_curve(growth)), *_of_still(growth), *_of_shrunk(fruits, likely)]
+    return [*left_out, *late, *of_sizes, *_of_unseen(fruits)]
 
 
 def _of_curve(growth: SeasonGrowth) -> list[str]:
@@ -98,6 +107,29 @@ def _of_shrunk(fruits: MeasuredFruits, off: Sequence[int]) -> list[str]:
                 f"{called(fruits, before)} ({len(ratios)} in both), and none shrinks; are both dates right?"
             )
     return lines
+
+
+def _of_unseen(fruits: MeasuredFruits) -> Iterator[str]:
+    """Say how many of a part count as they did, for its last visit ended before: nobody knows whether they were picked.
+
+    Those were seen whenever somebody looked, and not on the last day of the part.
+    """
+    columns = fruits.cloud.extras
+    days = np.array([date.fromisoformat(day[:10]).toordinal() for day in columns["last_seen"]])
+    is_seen = np.isin(columns["state"], ("seen", "new"))
+    parts = fruits.parts if len(fruits.parts) else np.ones_like(days)
+    for part in np.unique(parts):
+        chances = np.where(parts == part, fruits.hang_chances, 0.0)
+        last = days[parts == part].max()
+        beyond = is_seen & (chances > 0.0) & (days < last - _HELD_DAYS)
+        n_hang, n_beyond = whole_fruits(chances.sum()), whole_fruits(chances[beyond].sum())
+        if n_beyond >= max(_LEAST, _BEYOND * n_hang):
+            before, _ = Counter(days[beyond].tolist()).most_common(1)[0]
+            seen_on, as_on = map(date.fromordinal, (last, before))
+            yield (
+                f"{n_beyond} of {n_hang} fruits hang beyond what was seen on {seen_on}: they count as on {as_on}, "
+                "picked or not"
+            )
 
 
 def called(fruits: MeasuredFruits, visit: int) -> str:
