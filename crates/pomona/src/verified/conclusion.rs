@@ -56,7 +56,7 @@ impl<'a> Search<'a> {
         }
         let mut rivals: Vec<Registration> = rivals.iter().map(|finding| self.registration(&finding.overlap)).collect();
         if rivals.is_empty() {
-            rivals.extend(found.unseen_rival(&log).map(|rival| self.registration(&rival)));
+            rivals.extend(self.unseen_rival(best, found, &log).map(|rival| self.registration(&rival)));
         }
         // What was measured does not tell the poses apart: the pairs are those of one of them.
         let poses = (1 + rivals.len()) as f64;

@@ -4,7 +4,7 @@ use super::acceptance::{SURE, outlying};
 use super::case::{Finding, Findings, Log, Search};
 use super::contender::{Contender, SAME};
 use super::growth::grow;
-use super::hypothesis::{Model, refined};
+use super::hypothesis::{Hypothesis, Model, refined};
 use super::landscape::Landscape;
 use super::overlap::Overlap;
 use super::patches::Landing;
@@ -26,6 +26,9 @@ pub(super) const BENT: f64 = 0.05;
 
 /// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
 const MIRRORED: f64 = 1.3;
+
+/// Places that an answer has most evidence at when it is moved and that a rival is looked for at.
+const MOVED: usize = 3;
 
 /// Turn about each axis that a polish tries either way, radians: 7 degrees.
 const POLISH_TURN_RAD: f64 = 0.13;
@@ -184,16 +187,30 @@ impl<'a> Search<'a> {
         };
         share(best.predictions.iter().zip(places).filter_map(apart))
     }
-}
 
-impl Finding<'_> {
-    /// A second tree that looks the same and that no seed proposed: where what is not sure has nearly as much evidence once it is moved.
-    pub(super) fn unseen_rival(&self, log: &Log) -> Option<Overlap> {
-        let settled = self.settled.as_ref().filter(|_| self.overlap.log_odds < SURE * log.threshold)?;
-        let most = self.most_moved().filter(|moved| moved.evidence > RIVAL * settled.evidence)?;
-        let mut overlap = settled.overlap.clone();
-        overlap.pose.translation += most.by;
-        Some(Overlap { log_odds: most.evidence, ..overlap })
+    /// A second tree that looks the same and that no seed proposed: where what is not sure has most evidence once it is moved, a pose
+    /// is grown and settled as every other is, and is a rival where it then has what an answer needs, too.
+    ///
+    /// What was only moved fits worse than what was fitted there: on copies of one tree it keeps half of what is found once it is.
+    pub(super) fn unseen_rival(&self, best: Rated, found: &Finding<'a>, log: &Log) -> Option<Overlap> {
+        if found.overlap.log_odds >= SURE * log.threshold {
+            return None;
+        }
+        let enough = self.threshold(log.effort.stands.share_left());
+        let Overlap { pose, middle, sigma, .. } = *found.as_it_stands();
+        let fitted = |by: &Vector3<f64>| {
+            let pose = Similarity { translation: pose.translation + by, ..pose };
+            let seed = Hypothesis { pose, log_odds: f64::NAN, place: middle, sigma };
+            let mut rival = Finding::new(grow(self.query, self.map, &seed, &found.growth.patches.model), seed);
+            self.settle(&mut rival);
+            rival
+        };
+        let mut rivals = found.most_moved(MOVED).into_iter().map(|moved| fitted(&moved.by));
+        let is_rival = |rival: &Finding| {
+            let rated = Rated { overlap: &rival.overlap, nats: rival.evidence() };
+            self.is_pose(rival) && self.excludes(best, rated, enough)
+        };
+        rivals.find(is_rival).map(|rival| rival.overlap)
     }
 }
 

@@ -4,6 +4,7 @@
 //! as the best one, and so it does when it is moved by as much again. Where a pose is right, nothing is left of its evidence there.
 
 use super::case::Finding;
+use super::contender::first_of_each;
 use super::doubts::is_most;
 use super::evidence::evidence_within;
 use super::layers::BEYOND_A_CLUSTER;
@@ -49,9 +50,12 @@ impl Finding<'_> {
         deviations(settled.evidence, self.moved(settled), self.growth.patches.map.spacing)
     }
 
-    /// Where a settled finding has most evidence when it is moved.
-    pub(super) fn most_moved(&self) -> Option<&MovedPose> {
-        most(self.moved(self.settled.as_ref()?))
+    /// Where a settled finding has most evidence when it is moved, so many places farther apart than a cluster is wide.
+    pub(super) fn most_moved(&self, count: usize) -> Vec<MovedPose> {
+        let mut moved = self.settled.as_ref().map_or(Vec::new(), |settled| self.moved(settled).to_vec());
+        moved.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let apart = BEYOND_A_CLUSTER * self.growth.patches.map.spacing;
+        first_of_each(moved.into_iter(), count, |one, other| (one.by - other.by).norm() < apart)
     }
 
     /// What it has where it is moved by what lays its pairs on other fruits of the map, and along the row.
