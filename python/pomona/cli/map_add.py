@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from pomona.orchard import Added, Session
+    from pomona.settings import Settings
 
 
 def map_add(
@@ -98,6 +99,7 @@ def map_add(
     for visit, added in told:
         if added.length_in_map is not None:
             tell(f"pomona: warning: {orchard}: {length_told(added.length_in_map, visit.name, 'the map')}")
+        _doubt_metres(orchard, visit, added, settings)
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
         say_json(objects[0] if len(objects) == 1 else objects)
@@ -105,6 +107,19 @@ def map_add(
         say(*(line for visit, added in told for line in _added_as_lines(visit, added)))
     if not all(added.is_added for added in answers):
         raise typer.Exit(1)
+
+
+def _doubt_metres(orchard: Path, visit: Session, added: Added, settings: Settings | None) -> None:
+    from pomona.cli.progress import working
+    from pomona.other_metres import other_size, size_told
+    from pomona.settings import Settings
+
+    if added.is_added or added.match is None or added.known is None:
+        return
+    with working(f"looking at other sizes of {visit.name}"):
+        size = other_size(visit.cloud, added.known, added.match, settings or Settings.load(None, {}))
+    if size is not None:
+        tell(f"pomona: {orchard}: {size_told(size, visit.name, 'the map')}")
 
 
 def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:

@@ -111,6 +111,7 @@ def match(
     if length is not None:
         tell(f"pomona: {length_told(length, 'QUERY', 'MAP')}")
     _doubt_hands(in_query, in_map, answer, settings)
+    _doubt_metres(in_query, in_map, answer, settings)
     if answer.status != "Found":
         raise typer.Exit(1)
 
@@ -145,6 +146,16 @@ def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Se
     if pairs:
         left_handed = "the axes of one of them are left-handed, and the sign of one axis has to be changed"
         tell(f"pomona: the mirror image of QUERY fits MAP, with {amount(pairs, 'pair')}: {left_handed}")
+
+
+def _doubt_metres(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> None:
+    from pomona.cli.progress import working
+    from pomona.other_metres import other_size, size_told
+
+    with working("looking at other sizes of QUERY"):
+        size = other_size(query, map, answer, settings)
+    if size is not None:
+        tell(f"pomona: {size_told(size, 'QUERY', 'MAP')} --scale free matches them so")
 
 
 def _vertical(path: Path) -> ArrayLike | None:
