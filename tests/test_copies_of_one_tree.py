@@ -31,7 +31,7 @@ class Copies:
         return turned, which[is_seen]
 
 
-@pytest.mark.parametrize(("seed", "scatter_m"), [(6, 0.05), (22, 0.05), (47, 0.05), (7, 0.08), (58, 0.08)])
+@pytest.mark.parametrize(("seed", "scatter_m"), [(6, 0.05), (7, 0.05), (22, 0.05), (7, 0.08), (58, 0.08)])
 def test_trees_are_not_found_in_their_copies(seed: int, scatter_m: float) -> None:
     """Of which no fruit is in both; one way round or the other they were answered."""
     row = Copies(seed, scatter_m)

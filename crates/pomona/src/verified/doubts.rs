@@ -27,8 +27,9 @@ pub(super) const BENT: f64 = 0.05;
 /// How much more a mirror image must explain to rule a pose out; on a plane both explain the same.
 const MIRRORED: f64 = 1.3;
 
-/// Places that an answer has most evidence at when it is moved and that a rival is looked for at.
-const MOVED: usize = 3;
+/// Places that an answer has most evidence at when it is moved and that a rival is looked for at; and the share of what a rival needs that
+/// it has to have there, for on copies of one tree it keeps half, and more, of what is found once it is fitted.
+const MOVED: (usize, f64) = (3, 0.4);
 
 /// Turn about each axis that a polish tries either way, radians: 7 degrees.
 const POLISH_TURN_RAD: f64 = 0.13;
@@ -190,8 +191,6 @@ impl<'a> Search<'a> {
 
     /// A second tree that looks the same and that no seed proposed: where what is not sure has most evidence once it is moved, a pose
     /// is grown and settled as every other is, and is a rival where it then has what an answer needs, too.
-    ///
-    /// What was only moved fits worse than what was fitted there: on copies of one tree it keeps half of what is found once it is.
     pub(super) fn unseen_rival(&self, best: Rated, found: &Finding<'a>, log: &Log) -> Option<Overlap> {
         if found.overlap.log_odds >= SURE * log.threshold {
             return None;
@@ -205,7 +204,10 @@ impl<'a> Search<'a> {
             self.settle(&mut rival);
             rival
         };
-        let mut rivals = found.most_moved(MOVED).into_iter().map(|moved| fitted(&moved.by));
+        let (places, share) = MOVED;
+        let least = share * enough.max(RIVAL * best.nats);
+        let most = found.most_moved(places).into_iter().filter(|moved| moved.evidence > least);
+        let mut rivals = most.map(|moved| fitted(&moved.by));
         let is_rival = |rival: &Finding| {
             let rated = Rated { overlap: &rival.overlap, nats: rival.evidence() };
             self.is_pose(rival) && self.excludes(best, rated, enough)
