@@ -109,9 +109,20 @@ def test_the_first_visit_of_a_year_is_found_and_says_so(
     assert (first.is_added, first.n_matched, first.n_missed) == (True, 0, 0)
     assert first.n_new == len(years[1][0].cloud)
     assert first.season_before == LAST_YEAR[-1]
+    assert not first.is_year_doubted
     second = add_session(path, years[1][1])
     assert second.season_before is None
+    assert not second.is_year_doubted
     assert second.n_matched > 0.7 * len(years[1][1].cloud)
+
+
+@pytest.mark.parametrize("date", ["2023-07-20", "2025-07-20"])
+def test_a_slip_of_the_year_is_told(years: tuple[list[Session], list[Session]], tmp_path: Path, date: str) -> None:
+    """Fruits a year apart do not hang where they hung to a centimetre."""
+    path, csv = grow_map(tmp_path / "orchard.gpkg", years[0][:1]), tmp_path / "late.csv"
+    years[0][1].cloud.write(csv)
+    told = CliRunner().invoke(app, ["map", "add", str(path), str(csv), "--date", date]).stderr
+    assert re.search(rf"2\d\d of 3\d\d fruits of late lie where .* to [6-9] mm along each axis.*: is {date} right", told)
 
 
 def test_the_order_of_years_changes_nothing(

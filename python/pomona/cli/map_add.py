@@ -100,6 +100,7 @@ def map_add(
         if added.length_in_map is not None:
             tell(f"pomona: warning: {orchard}: {length_told(added.length_in_map, visit.name, 'the map')}")
         _doubt_metres(orchard, visit, added, settings)
+        _doubt_year(orchard, visit, added)
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
         say_json(objects[0] if len(objects) == 1 else objects)
@@ -122,6 +123,15 @@ def _doubt_metres(orchard: Path, visit: Session, added: Added, settings: Setting
         tell(f"pomona: {orchard}: {size_told(size, visit.name, 'the map')}")
 
 
+def _doubt_year(orchard: Path, visit: Session, added: Added) -> None:
+    if added.match is not None and added.is_year_doubted:
+        of_all = f"{len(added.match.pairs)} of {amount(added.match.n_query, 'fruit')}"
+        tell(
+            f"pomona: warning: {orchard}: {of_all} of {visit.name} lie where fruits of another season do, to "
+            f"{1000 * added.match.noise_m:.0f} mm along each axis, as those of one season: is {visit.date[:10]} right?"
+        )
+
+
 def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
     from dataclasses import asdict
 
@@ -138,6 +148,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "torn_near": list(added.torn_near),
         "torn_like": added.torn_like,
         "season_before": added.season_before,
+        "is_year_doubted": added.is_year_doubted,
         "length_in_map": added.length_in_map,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),
