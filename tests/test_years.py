@@ -122,7 +122,9 @@ def test_a_slip_of_the_year_is_told(years: tuple[list[Session], list[Session]], 
     path, csv = grow_map(tmp_path / "orchard.gpkg", years[0][:1]), tmp_path / "late.csv"
     years[0][1].cloud.write(csv)
     told = CliRunner().invoke(app, ["map", "add", str(path), str(csv), "--date", date]).stderr
-    assert re.search(rf"2\d\d of 3\d\d fruits of late lie where .* to [6-9] mm along each axis.*: is {date} right", told)
+    assert re.search(
+        rf"2\d\d of 3\d\d fruits of late lie where .* to [6-9] mm along each axis.*: is {date} right", told
+    )
 
 
 def test_the_order_of_years_changes_nothing(
