@@ -158,3 +158,21 @@ def test_the_motion_past_a_picture_that_cannot_be_read_is_not_lost(tmp_path):
     way = following.localize(recording, open_detector(folder / "detections.csv", None, recording), localizer)
     assert sorted(way.skipped) == [1, 2]
     assert localizer.moved_m == [None, 0.12, 0.08]
+
+
+def test_a_map_in_millimetres_is_named_and_read_as_it_says(tmp_path, drive):
+    header, *lines = MAP.read_text().splitlines()
+    columns = header.split(",")
+    places = [[line.split(",")[columns.index(axis)] for axis in "xyz"] for line in lines]
+    in_mm, poses = tmp_path / "mm.csv", tmp_path / "poses.tum"
+    in_mm.write_text("x,y,z\n" + "".join(",".join(str(1000 * float(at)) for at in place) + "\n" for place in places))
+    done = localize(in_mm, *drive, "--single", "-o", poses)
+    assert done.returncode == 1
+    assert "say so: --unit mm" in done.stderr
+    done = localize(in_mm, *drive, "--single", "-o", poses, "--unit", "mm", "--json")
+    assert json.loads(done.stdout)["statuses"] == {"Found": 4}
+    session = ROW / "2024-08-09" / "row.gpkg"
+    for unit, wrong in (("free", in_mm), ("mm", session)):
+        done = localize(wrong, *drive, "-o", tmp_path / "other.tum", "--unit", unit)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert done.stderr.startswith("pomona: --unit: found ")

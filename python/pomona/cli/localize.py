@@ -10,13 +10,15 @@ import typer
 from pomona.cli.localize_options import (
     depth_option,
     detections_option,
+    fruits_of_map,
     index_option,
     min_score_option,
     model_option,
     odometry_option,
     single_option,
+    unit_option,
 )
-from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
+from pomona.cli.match_options import Unit, config_option, parsed_up, threads_option, up_option
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Writes
 from pomona.likes import INDEX, POSES
@@ -47,6 +49,7 @@ def localize(
     depth: str = depth_option,
     odometry: bool = odometry_option,
     index: Annotated[Path | None, Writes(INDEX)] = index_option,
+    unit: Unit | None = unit_option,
     config: Path | None = config_option,
     every: int = typer.Option(1, min=1, metavar="N", help="Take every Nth frame."),
     first: int | None = typer.Option(None, "--from", metavar="FRAME", help="First frame to take, by its number."),
@@ -77,7 +80,7 @@ def localize(
     detector = open_detector(detections, model, whole, min_score=min_score)
     refuse_inputs([output], [*whole.inputs(), *detector.inputs])
     taken = selected(whole, every=every, first=first, last=last)
-    localizer = Localizer(orchard, config=overrides, threads=threads, index=index)
+    localizer = Localizer(fruits_of_map(orchard, unit), config=overrides, threads=threads, index=index)
     with localize_output.localizing(taken) as progress:
         way = localized(
             taken, detector, localizer, single=single, depth=depth, odometry=odometry, up=vertical, progress=progress

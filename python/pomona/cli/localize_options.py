@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import typer
+
+from pomona.cli.match_options import Unit
+from pomona.errors import PomonaError
+
+if TYPE_CHECKING:
+    from pomona.cloud import FruitCloud
 
 single_option = typer.Option(False, "--single", help="Find each frame from nothing, not from the one before.")
 detections_option = typer.Option(
@@ -17,3 +26,23 @@ index_option = typer.Option(
     None, "--index", metavar="FILE", help="Index of a large ORCHARD, which opens at once; made where there is none."
 )
 odometry_option = typer.Option(False, "--odometry", help="Motion from the pictures, even where poses were recorded.")
+unit_option = typer.Option(None, "--unit", metavar="m|cm|mm", help="Unit of ORCHARD, where it is a .csv or .ply.")
+
+
+def fruits_of_map(orchard: Path, unit: Unit | None) -> Path | FruitCloud:
+    """Read a cloud in its unit; whatever else holds a map stays a file.
+
+    Raises
+    ------
+    PomonaError
+        The file has metres of its own, a frame shows none, or the cloud cannot be read.
+    """
+    from pomona.cloud import FruitCloud
+
+    if unit is None:
+        return orchard
+    if unit.value == "free":
+        raise PomonaError("--unit: found free, expected m, cm or mm: a frame is in metres")
+    if orchard.suffix.lower() == ".gpkg":
+        raise PomonaError(f"--unit: found it with {orchard}, expected it with a .csv or .ply alone")
+    return FruitCloud.read(orchard, unit=unit.value)

@@ -10,13 +10,15 @@ import typer
 from pomona.cli.localize_options import (
     depth_option,
     detections_option,
+    fruits_of_map,
     index_option,
     min_score_option,
     model_option,
     odometry_option,
     single_option,
+    unit_option,
 )
-from pomona.cli.match_options import config_option, parsed_up, threads_option, up_option
+from pomona.cli.match_options import Unit, config_option, parsed_up, threads_option, up_option
 from pomona.cli.terminal import say, say_json
 from pomona.cli.verbs import Verbs, Writes
 from pomona.likes import INDEX, REPLAYED
@@ -54,6 +56,7 @@ def ros_replay(
     depth: str = depth_option,
     odometry: bool = odometry_option,
     index: Annotated[Path | None, Writes(INDEX)] = index_option,
+    unit: Unit | None = unit_option,
     config: Path | None = config_option,
     threads: int | None = threads_option,
     json: bool = typer.Option(False, "--json", help="Print JSON."),
@@ -80,7 +83,7 @@ def ros_replay(
         done = replay(
             bag,
             detector,
-            orchard,
+            fruits_of_map(orchard, unit),
             output,
             map_frame=map_frame,
             single=single,
