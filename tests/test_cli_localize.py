@@ -1,6 +1,7 @@
 """`pomona localize` as a user meets it: processes, poses, exit codes."""
 
 import json
+import re
 import shutil
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 from benchmarks.row_drive import step_to
 
 from command_line import run
-from pomona import Localizer
+from pomona import FruitCloud, Localizer
 from pomona.detect.opening import open_detector
 from pomona.localize import following
 from pomona.recording import open_recording
@@ -176,3 +177,19 @@ def test_a_map_in_millimetres_is_named_and_read_as_it_says(tmp_path, drive):
         done = localize(wrong, *drive, "-o", tmp_path / "other.tum", "--unit", unit)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1)
         assert done.stderr.startswith("pomona: --unit: found ")
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, None), (1.06, "shorter"), (0.94, "longer")])
+def test_metres_that_are_not_the_maps_are_told(tmp_path, factor, said):
+    """Frames are found all the same, and every pose is off by as much."""
+    known = FruitCloud.read(MAP)
+    FruitCloud(factor * known.positions).write(tmp_path / "map.csv")
+    video = (DRIVE / "row.mp4", "--detections", DRIVE / "boxes.csv")
+    done = localize(tmp_path / "map.csv", *video, "-o", tmp_path / "poses.tum", "--json")
+    told = json.loads(done.stdout)
+    assert told["n_found"] > 40
+    if said is None:
+        assert (told["length_in_map"], done.stderr) == (None, "")
+    else:
+        assert told["length_in_map"] == pytest.approx(factor, abs=0.03)
+        assert re.search(rf"row.mp4: fruits lie [4567]% {said} apart in the frames than in the map", done.stderr)

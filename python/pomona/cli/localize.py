@@ -87,6 +87,7 @@ def localize(
         )
     write_way(output, way)
     found = localize_output.summary(output, taken, localizer, way)
+    localize_output.doubt_metres(found)
     if json:
         say_json({**found, "frames": localize_output.as_rows(way)})
     else:

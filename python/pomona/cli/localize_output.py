@@ -38,6 +38,8 @@ def summary(output: Path, recording: Recording, localizer: Localizer, way: Way) 
     """Put in numbers what was found and where it was written."""
     import numpy as np
 
+    from pomona.localize.metres import length_in_map
+
     sigmas_m = [step.found.sigma_m for step in way.found]
     return {
         "output": str(output),
@@ -49,7 +51,17 @@ def summary(output: Path, recording: Recording, localizer: Localizer, way: Way) 
         "n_skipped_frames": len(way.skipped),
         "statuses": dict(sorted(way.statuses.items())),
         "median_sigma_m": float(np.median(sigmas_m)) if sigmas_m else None,
+        "length_in_map": length_in_map(way.steps, localizer.map_m),
     }
+
+
+def doubt_metres(found: dict[str, Any]) -> None:
+    """Warn of metres that are not the map's."""
+    from pomona.cli.terminal import tell
+    from pomona.localize.metres import length_told
+
+    if found["length_in_map"] is not None:
+        tell(f"pomona: warning: {found['recording']}: {length_told(found['length_in_map'])}")
 
 
 def as_rows(way: Way) -> list[dict[str, Any]]:

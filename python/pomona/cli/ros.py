@@ -96,6 +96,7 @@ def ros_replay(
             progress=progress,
         )
     found = localize_output.summary(output, bag, done.localizer, done.way) | _told(done)
+    localize_output.doubt_metres(found)
     if json:
         say_json(found)
     else:

@@ -114,7 +114,7 @@ class Localizer:
         if index is not None and not isinstance(index, str | Path):
             raise PomonaError(f"index: found {type(index).__name__}, expected the path of a file")
         cloud = as_cloud(map)
-        self._rows = hanging_rows(cloud)
+        self._rows, self._map_m = hanging_rows(cloud), cloud.positions
         hanging, settings, most = cloud.select(self._rows), core_settings(config), core_threads(threads)
         arrays = core_arrays(hanging)
 
@@ -139,6 +139,11 @@ class Localizer:
 
     def __repr__(self) -> str:
         return f"Localizer({len(self)} fruits)"
+
+    @property
+    def map_m(self) -> NDArray[np.float64]:
+        """Places of the fruits of the map, (N, 3) metres, in the rows that pairs name."""
+        return self._map_m
 
     def __reduce__(self) -> NoReturn:
         # A copy would share what `update` knows with the first.
