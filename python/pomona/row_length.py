@@ -13,11 +13,11 @@ STRETCHES = 10
 """Into so many stretches of equally many pairs a row is cut: fruits of one are off by the same bend, and count once."""
 
 LEAST_PAIRS = 5 * STRETCHES
-LEAST_LENGTH_M = 4.0
-"""Pairs and length of a row that are asked: within a tree or two branches that sag change it as much."""
+"""Pairs that are asked."""
 
-LEAST_OFF = 0.02
-"""Of a length, what is told: cameras that find their own way drift by as much as 1.5 %."""
+LEAST_OFF, LEAST_M = 0.02, 0.08
+"""Of a length, what is told: cameras that find their own way drift by as much as 1.5 %, and within a tree or two
+branches that sag change it by some centimetres."""
 
 LEAST_SIGMAS = 5.0
 """Standard errors that it must be off by, so that a bend is not taken for it."""
@@ -34,8 +34,8 @@ def length_in_map(match: Match, query: FruitCloud, map: FruitCloud) -> float | N
     Returns
     -------
     float or None
-        None where the row is as long in both as far as its bends let tell; where it is too short or too few pairs
-        say so; where the query is torn apart, or was found with a scale of its own.
+        None where the row is as long in both as far as its bends let tell; where too few pairs say so; where the query
+        is torn apart, or was found with a scale of its own.
     """
     pairs = match.pairs[match.probabilities >= SURE]
     if match.n_parts != 1 or match.scale is None or abs(match.scale - 1.0) > 1e-9 or len(pairs) < LEAST_PAIRS:
@@ -45,15 +45,13 @@ def length_in_map(match: Match, query: FruitCloud, map: FruitCloud) -> float | N
     assert match.map_from_query is not None
     along = (seen - seen.mean(axis=0)) @ extent
     along_there = (there - there.mean(axis=0)) @ (match.map_from_query[:3, :3] @ extent)
-    if np.ptp(along) < LEAST_LENGTH_M:
-        return None
     stretches = np.array_split(np.argsort(along, kind="stable"), STRETCHES)
     x, y = (np.array([np.median(values[rows]) for rows in stretches]) for values in (along, along_there))
     x, y = x - x.mean(), y - y.mean()
     length = float(x @ y / (x @ x))
     error = float(np.sqrt(np.sum((y - length * x) ** 2) / (STRETCHES - 2) / (x @ x)))
     off = abs(length - 1.0)
-    return length if off > LEAST_OFF and off > LEAST_SIGMAS * error else None
+    return length if off > max(LEAST_OFF, LEAST_M / np.ptp(along), LEAST_SIGMAS * error) else None
 
 
 def length_told(length: float, query: str, map: str) -> str:
