@@ -82,6 +82,24 @@ def test_centimetres_that_are_called_millimetres_are_doubted(pomona: Pomona, row
     assert "all" in printed
 
 
+@pytest.mark.parametrize(
+    ("times", "said"), [(0.5, "by hand radii?"), (math.pi, "by hand girths?"), (2.0, "radii, or is a day wrong?")]
+)
+def test_another_measure_is_named(pomona: Pomona, row: GrownRow, tmp_path: Path, times: float, said: str) -> None:
+    told = pomona("validate", row.path, "--calipers", long_table(row, tmp_path / "c.csv", per_mm=times))[2]
+    assert told.count("\n") == 1
+    assert said in told
+
+
+def test_sizes_of_other_fruits_are_doubted(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
+    sizes_mm = np.random.default_rng(2).permutation(row.sizes_mm(65))
+    lines = [f"apple {fruit},{row.day(65)},{size_mm}" for fruit, size_mm in enumerate(sizes_mm)]
+    (tmp_path / "c.csv").write_text("\n".join(["label,date,diameter_mm", *lines]))
+    told = pomona("validate", row.path, "--calipers", tmp_path / "c.csv")[2]
+    assert told.count("\n") == 1
+    assert "do not go together" in told
+
+
 def test_a_column_a_day_is_read_between_its_days(pomona: Pomona, row: GrownRow, tmp_path: Path) -> None:
     """By hand on days 46, 54 and 67: between two of them a line, near one its own, further away none."""
     days = (46, 54, 67)

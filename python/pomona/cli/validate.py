@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from pomona.growth.caliper_pairs import CaliperPair
 
 
-_LIKE = 3.0
-"""No camera errs by so much: centimetres, inches and metres are 10, 25 and 1000 times millimetres."""
-
-
 def validate(
     orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg)."),
     calipers: Path = typer.Option(
@@ -41,9 +37,8 @@ def validate(
     A column `label` or `id` has the names that the sessions gave, `fruit_id` the map's numbers. Between two days by
     hand, at most 21 apart, the diameter is a line; else the nearest within 3 days is taken.
     """
-    from statistics import median
-
     from pomona.growth.agreement import agreement_by_date, agreement_of, draw_agreement
+    from pomona.growth.caliper_doubts import doubts_of
     from pomona.growth.caliper_file import read_calipers
     from pomona.growth.caliper_pairs import pair_with_calipers
     from pomona.growth.measured import measured_fruits
@@ -56,12 +51,8 @@ def validate(
     if unseen:
         names = ", ".join(unseen[:5]) + (", ..." if len(unseen) > 5 else "")
         tell(f"pomona: warning: {calipers}: {amount(len(unseen), 'fruit')} measured by no visit near: {names}")
-    times = median(pair.measured_mm / pair.caliper_mm for pair in pairs)
-    if not 1.0 / _LIKE < times < _LIKE:
-        tell(
-            f"pomona: warning: {calipers}: diameters of {orchard} are {times:.3g} times those by hand: is a unit "
-            "wrong? Say it in the name of the column, diameter_mm, diameter_cm or diameter_m"
-        )
+    for doubt in doubts_of(pairs):
+        tell(f"pomona: warning: {calipers}: {doubt}")
     if output is not None:
         _write_pairs(output, pairs)
     if plot is not None:
