@@ -216,7 +216,9 @@ def test_fruits_beyond_the_last_visit_are_told_of(pomona: Pomona, tmp_path: Path
     half_m = known_m[known_m[:, 0] < np.median(known_m[:, 0])]
     half_m = half_m + np.random.default_rng(1).normal(0.0, 0.005, half_m.shape)
     half = FruitCloud(half_m, diameters_m=np.full(len(half_m), 0.06))
-    assert add_session(path, Session("late", "2024-07-29", "drawn", half)).is_added
+    added = add_session(path, Session("late", "2024-07-29", "drawn", half))
+    assert added.is_added
+    assert 50 < added.n_beyond < 70
     told = pomona("growth", path, "-o", tmp_path / "g")[2]
     assert re.search(r"6\d of 12\d fruits hang beyond what was seen on 2024-07-29: they count as on 2024-07-14", told)
     told = pomona("growth", grow_row(tmp_path / "all.gpkg", days=(50, 65), n_trees=1).path, "-o", tmp_path / "h")[2]

@@ -144,6 +144,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "n_matched": added.n_matched,
         "n_new": added.n_new,
         "n_missed": added.n_missed,
+        "n_beyond": added.n_beyond,
         "n_parts": 0 if match is None else match.n_parts,
         "torn_near": list(added.torn_near),
         "torn_like": added.torn_like,
@@ -177,9 +178,10 @@ def _added_as_text(visit: Session, added: Added) -> str:
             f"{visit.name}: first visit of its season, found by where fruits hung until {added.season_before[:10]}: "
             f"{amount(added.n_new, 'new fruit')}, for none outlives the winter{_torn_as_text(added)}"
         )
+    beyond = f", {added.n_beyond} beyond its view" if added.n_beyond else ""
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
-        f"{added.n_missed} in view and not seen{_torn_as_text(added)}"
+        f"{added.n_missed} in view and not seen{beyond}{_torn_as_text(added)}"
     )
 
 
