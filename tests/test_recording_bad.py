@@ -213,3 +213,15 @@ def test_folders_that_share_no_frame(pomona, tmp_path):
     code, _, errors = pomona("info", row)
     assert code == 2
     assert "expected the same numbers in each folder" in errors
+
+
+def test_depth_in_floating_point_is_named(pomona, tmp_path):
+    for name in ("left", "depth"):
+        (tmp_path / name).mkdir()
+    for row in range(3):
+        cv2.imwrite(str(tmp_path / f"left/{row:04d}.png"), leaves(row))
+        cv2.imwrite(str(tmp_path / f"depth/{row:04d}.tiff"), np.full(SIZE[::-1], 1.5, np.float32))
+    write_calibration(tmp_path)
+    code, _, told = pomona("info", tmp_path, "--check")
+    assert (code, told.count("\n")) == (2, 1)
+    assert "depth: found '0000.tiff', expected 16-bit PNG: depth/0000.png" in told

@@ -33,6 +33,9 @@ __all__ = ["FolderRecording"]
 
 ABOUT = "an object with name and date"
 
+NOT_READ = (".tif", ".tiff", ".exr", ".npy", ".npz", ".pgm", ".pfm", ".raw", ".bin")
+"""Suffixes of pictures, of depth most often, that are not read: they are named, and not passed over."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FolderRecording(RecordingCard):
@@ -77,7 +80,7 @@ class FolderRecording(RecordingCard):
             When the calibration, the pictures or the poses are missing or do not fit together.
         """
         kinds = (kind for kind in ("left", "right", "depth") if (folder / kind).is_dir())
-        pictures = {kind: numbered_pictures(folder / kind) for kind in kinds}
+        pictures = {kind: _pictures(folder / kind) for kind in kinds}
         numbers = _numbers(folder, pictures)
         optics = _optics(folder, pictures, calibration)
         about = _about(folder)
@@ -150,6 +153,16 @@ class FolderRecording(RecordingCard):
             suffix = next(iter(files.values())).suffix
             return functools.partial(_not_there, self.path / kind / f"{number:04d}{suffix}")
         return functools.partial(read_rectified, kind, files[number], self.optics)
+
+
+def _pictures(folder: Path) -> dict[int, Path]:
+    """Map frame numbers to picture files; raise where all that is there are pictures of a kind that is not read."""
+    pictures = numbered_pictures(folder)
+    other = next((file for file in sorted(folder.iterdir()) if file.suffix.lower() in NOT_READ), None)
+    if not pictures and other is not None:
+        kind = "16-bit PNG" if folder.name == "depth" else "PNG or JPEG"
+        raise PomonaError(f"{folder}: found {shown(other.name)}, expected {kind}: {folder.name}/0000.png ...")
+    return pictures
 
 
 def _not_there(file: Path) -> NoReturn:
