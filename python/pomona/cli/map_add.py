@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from pomona.orchard import Added, Session
     from pomona.settings import Settings
 
+BEYOND = 0.1
+"""Share of the fruits of a part that a session did not look at from which on it is told."""
+
 
 def map_add(
     orchard: Path = typer.Argument(metavar="ORCHARD", help="The map (.gpkg); made when it is not there."),
@@ -178,7 +181,8 @@ def _added_as_text(visit: Session, added: Added) -> str:
             f"{visit.name}: first visit of its season, found by where fruits hung until {added.season_before[:10]}: "
             f"{amount(added.n_new, 'new fruit')}, for none outlives the winter{_torn_as_text(added)}"
         )
-    beyond = f", {added.n_beyond} beyond its view" if added.n_beyond else ""
+    is_part = added.n_beyond > BEYOND * (added.n_matched + added.n_missed + added.n_beyond)
+    beyond = f", {added.n_beyond} beyond its view" if is_part else ""
     return (
         f"{visit.name}: {added.n_matched} of {amount(len(visit.cloud), 'fruit')} recognised, {added.n_new} new, "
         f"{added.n_missed} in view and not seen{beyond}{_torn_as_text(added)}"

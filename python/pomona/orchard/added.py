@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Added"]
 
-BEYOND = 0.1
-"""Share of the fruits of a map that a session did not look at from which on it is told."""
-
 SAME_SHARE, SAME_M = 0.5, 0.025
 """Share of the fruits of two seasons that hang at one place, and how near along each axis, from which on it is one
 season: where wood bears again it does 5 to 10 cm beside, four times in five, and a fruit is 1 to 2 cm off."""
@@ -35,6 +32,8 @@ class Added:
     n_matched, n_new, n_missed : int
         Fruits known before, fruits of which the session is the first sight, fruits of the map that hang where the
         session looked and were not seen.
+    n_beyond : int
+        Fruits of its part of the map that hang, for all that the last visit to look there knew, where it did not look.
     match : Match, optional
         How the session was found in the map, or not; None for the first session.
     is_added : bool
@@ -71,17 +70,7 @@ class Added:
     was_there: bool = False
     season_before: str | None = None
     length_in_map: float | None = None
-
-    @property
-    def n_beyond(self) -> int:
-        """Fruits that may hang, in the part of the map where the session lies, and that it did not look at.
-
-        They count on as they did. Fewer than a tenth are 0: who is known and who was missed is told anew of all visits.
-        """
-        if self.known is None or not self.is_added or not self.n_matched:
-            return 0
-        n_beyond = len(self.known) - self.n_matched - self.n_missed
-        return n_beyond if n_beyond > BEYOND * len(self.known) else 0
+    n_beyond: int = 0
 
     @property
     def is_year_doubted(self) -> bool:

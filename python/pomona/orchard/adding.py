@@ -286,6 +286,7 @@ def _told(settlement: Settlement, session_id: int) -> Added:
     is_elsewhere = looks.seen.sum(axis=1) > looks.seen[:, own]
     n_matched = int((looks.seen[:, own] & is_elsewhere).sum())
     n_seen = int(looks.seen[:, own].sum())
+    is_beyond = np.isin(part.conclusion.states, ("seen", "new")) & ~looks.in_view[:, own] & ~looks.seen[:, own]
     return Added(
         fruit_ids=part.fruit_ids_of(own),
         n_matched=n_matched,
@@ -295,6 +296,7 @@ def _told(settlement: Settlement, session_id: int) -> Added:
         is_added=True,
         changes=tuple(settlement.changes),
         season_before=_season_before(part, own),
+        n_beyond=int(is_beyond.sum()),
     )
 
 
