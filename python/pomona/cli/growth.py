@@ -111,7 +111,7 @@ def _as_lines(output: Path, grown: SeasonGrowth) -> list[str]:
     if found["n_outliers"]:
         lines.append(f"  outliers: {amount(found['n_outliers'], 'fruit')}, see fruits.csv")
     forecast = f"  on {grown.harvest} (90 %)" if grown.harvest else ""
-    lines.append(f"  {'':>18} {'fruits':>7} {'mm now':>7} {'mm a day':>9}{forecast}")
+    lines.append(f"  {'':>18} {'fruits':>7} {'(90 %)':>14} {'mm now':>7} {'mm a day':>9}{forecast}")
     titles = [block.title for block in grown.blocks]
     lines += [_line_of_block(*each) for each in zip(titles, found["blocks"], strict=True)]
     unmeasured = grown.fruits.n_unmeasured
@@ -132,7 +132,8 @@ def _most_off(grown: SeasonGrowth) -> str:
 
 
 def _line_of_block(title: str, block: dict[str, Any]) -> str:
-    line = f"  {title[:18]:>18} {block['n_fruits']:>7} {block['mean_mm']:>7.1f} "
+    between = f"({block['n_fruits_low']} to {block['n_fruits_high']})"
+    line = f"  {title[:18]:>18} {block['n_fruits']:>7} {between:>14} {block['mean_mm']:>7.1f} "
     line += f"{block['rate_mm_per_day']:>9.2f}"
     if block["forecast_mm"] is None:
         return line
