@@ -7,7 +7,7 @@ import numpy as np
 from pomona.answer import Match
 from pomona.cloud import FruitCloud
 
-__all__ = ["length_in_map", "length_told"]
+__all__ = ["WRONG_METRES", "length_in_map", "length_told", "off_told"]
 
 STRETCHES = 10
 """Into so many stretches of equally many pairs a row is cut: fruits of one are off by the same bend, and count once."""
@@ -24,6 +24,10 @@ LEAST_SIGMAS = 5.0
 
 SURE = 0.5
 """Probability of the pairs that are asked."""
+
+WRONG_METRES = (
+    "one of both has wrong metres, as of a baseline, a focal length or a unit of depth that is not the camera's"
+)
 
 
 def length_in_map(match: Match, query: FruitCloud, map: FruitCloud) -> float | None:
@@ -56,8 +60,9 @@ def length_in_map(match: Match, query: FruitCloud, map: FruitCloud) -> float | N
 
 def length_told(length: float, query: str, map: str) -> str:
     """Say it of two visits with these names; which of both has wrong metres they cannot tell."""
-    off, how = (1.0 / length - 1.0, "longer") if length < 1.0 else (1.0 - 1.0 / length, "shorter")
-    return (
-        f"the row is {off:.0%} {how} in {query} than in {map}: one of both has wrong metres, as of a baseline, a "
-        "focal length or a unit of depth that is not the camera's"
-    )
+    return f"the row is {off_told(length)} in {query} than in {map}: {WRONG_METRES}"
+
+
+def off_told(length: float) -> str:
+    """Say by how much what is so long in the map for each metre is longer or shorter where it was seen."""
+    return f"{1.0 / length - 1.0:.0%} longer" if length < 1.0 else f"{1.0 - 1.0 / length:.0%} shorter"

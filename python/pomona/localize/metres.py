@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pomona.localize.course import Step
+from pomona.row_length import WRONG_METRES, off_told
 
 __all__ = ["length_in_map", "length_told"]
 
@@ -56,8 +57,5 @@ def _products(step: Step, map_m: NDArray[np.float64]) -> tuple[float, float] | N
 
 def length_told(length: float) -> str:
     """Say it of a recording and a map; which of both has wrong metres they cannot tell."""
-    off, how = (1.0 / length - 1.0, "longer") if length < 1.0 else (1.0 - 1.0 / length, "shorter")
-    return (
-        f"fruits lie {off:.0%} {how} apart in the frames than in the map, and poses are off by as much: one of both "
-        "has wrong metres, as of a baseline, a focal length or a unit of depth that is not the camera's"
-    )
+    apart = f"fruits lie {off_told(length)} apart in the frames than in the map"
+    return f"{apart}, and poses are off by as much: {WRONG_METRES}"
