@@ -219,6 +219,7 @@ RNG = np.random.default_rng(7)
 COPIES: dict[str, Callable[[FruitCloud], FruitCloud]] = {
     "in another order, without names": nameless_and_backwards,
     "rounded to millimetres": lambda cloud: replace(cloud, positions=np.round(cloud.positions, 3)),
+    "rounded to centimetres": lambda cloud: replace(cloud, positions=np.round(cloud.positions, 2)),
     "five fruits fewer": lambda cloud: cloud.select(np.arange(5, len(cloud))),
     "with numbers of views": lambda cloud: replace(cloud, n_views=np.full(len(cloud), 5)),
     "in another frame": lambda cloud: cloud.transformed(frame_of_its_own(np.random.default_rng(2))),
@@ -234,6 +235,15 @@ def test_a_copy_of_a_visit_is_refused(grown: Path, scenes: list[FruitCloud], how
     with pytest.raises(PomonaError, match=r"session copy is in the map already, as 2024-09-01: .*\d of \d+ fruits lie"):
         add_session(grown, visit(COPIES[how](scenes[1]), "2024-10-01", name="copy"))
     assert grown.read_bytes() == before
+
+
+def test_what_may_be_a_copy_is_told_in_the_frame_of_the_other(tmp_path: Path, scenes: list[FruitCloud]) -> None:
+    rng = np.random.default_rng(8)
+    fewer = scattered(scenes[1].select(np.flatnonzero(rng.random(len(scenes[1])) < 0.8)), rng, 0.003)
+    for number, (cloud, copied) in enumerate([(fewer, "2024-09-01"), (turned(fewer, 4), None)]):
+        path = tmp_path / f"{number}.gpkg"
+        add_session(path, visit(scenes[1], "2024-09-01"))
+        assert add_session(path, visit(cloud, "2024-10-01")).copy_of == copied
 
 
 def test_the_same_fruits_in_another_order_are_the_same_session(grown: Path, scenes: list[FruitCloud]) -> None:

@@ -104,6 +104,11 @@ def map_add(
             tell(f"pomona: warning: {orchard}: {length_told(added.length_in_map, visit.name, 'the map')}")
         _doubt_metres(orchard, visit, added, settings)
         _doubt_year(orchard, visit, added)
+        if added.copy_of is not None:
+            tell(
+                f"pomona: warning: {orchard}: fruits of {visit.name} lie where those of {added.copy_of} do, in "
+                "its frame and nearer than two visits are to each other: is it a copy? It counts as a visit of its own"
+            )
     if json:
         objects = [_added_as_json(visit, added) for visit, added in told]
         say_json(objects[0] if len(objects) == 1 else objects)
@@ -153,6 +158,7 @@ def _added_as_json(visit: Session, added: Added) -> dict[str, Any]:
         "torn_like": added.torn_like,
         "season_before": added.season_before,
         "is_year_doubted": added.is_year_doubted,
+        "copy_of": added.copy_of,
         "length_in_map": added.length_in_map,
         "changes": [asdict(change) for change in added.changes],
         "map_from_session": None if match is None or match.map_from_query is None else match.map_from_query.tolist(),

@@ -53,6 +53,9 @@ class Added:
     length_in_map : float, optional
         How long the row is in the map for each metre in the session, where metres of one of the two are wrong; None
         where it is as long, as far as its bends let tell.
+    copy_of : str, optional
+        A session of the map, in the same frame, that it is as like as hardly any visit is: rounded, perhaps, or moved
+        by millimetres.
     was_there : bool
         Whether the map held the very session before, and stays as it was.
     """
@@ -71,6 +74,7 @@ class Added:
     season_before: str | None = None
     length_in_map: float | None = None
     n_beyond: int = 0
+    copy_of: str | None = None
 
     @property
     def is_year_doubted(self) -> bool:

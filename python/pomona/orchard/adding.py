@@ -17,7 +17,7 @@ from pomona.orchard.added import Added
 from pomona.orchard.evidence import Evidence, new_visit
 from pomona.orchard.joining import Newcomer, join
 from pomona.orchard.mending import mended
-from pomona.orchard.near_copies import require_no_near_copy
+from pomona.orchard.near_copies import doubted_copy
 from pomona.orchard.recognising import recognised
 from pomona.orchard.removing import take_out
 from pomona.orchard.replacing import NotFoundError, holds, there_already
@@ -228,9 +228,10 @@ def _add_where_found(
         session, parts = _in_one_piece(connection, session, parts[0], settings)
     visit = new_visit(session, content)
     evidence, matches = matches_with_parts(parts, visit, settings)
-    require_no_near_copy(connection, session.name, visit, evidence, matches)
+    doubted = doubted_copy(connection, session.name, visit, evidence, matches)
     first = parts[0].found.match
-    return _join(connection, session, evidence, matches, Placement(settings, first.log_odds, first.noise_m), content)
+    placement = Placement(settings, first.log_odds, first.noise_m)
+    return replace(_join(connection, session, evidence, matches, placement, content), copy_of=doubted)
 
 
 def _in_one_piece(
