@@ -20,8 +20,9 @@ from pomona.recording.boxes_beside import boxes_beside
 from pomona.recording.checks.along_rays import depth_along_rays
 from pomona.recording.evenly import evenly
 from pomona.recording.pictures import UnreadablePictureError
+from pomona.survey.depth_metres import fault_of_metres
 from pomona.survey.part import Boxes
-from pomona.survey.sampled_boxes import LOOKED_AT, frames_in_words, sampled_boxes
+from pomona.survey.sampled_boxes import LOOKED_AT, Pixels, frames_in_words, sampled_boxes
 
 __all__ = ["check_depth_pictures", "fault_of_depth"]
 
@@ -52,14 +53,13 @@ of 15 mm, steps of 40 mm and flying pixels it is nowhere better; moved, larger, 
 SURE = 3.0
 """Standard deviations by which it must be better, too: of few boxes, some of the many places fit by chance."""
 
-Box = NDArray[np.float64]
 Depth = NDArray[np.float32]
 Share = tuple[float, float]
 """Mean over boxes of the part that is of one surface, and its variance."""
 
 
 def check_depth_pictures(recording: Recording, parts: Sequence[Boxes]) -> bool:
-    """Warn where the boxes fit the pictures of depth elsewhere than where they are, or these hold no depths.
+    """Warn where the boxes fit the pictures of depth elsewhere than where they are, or these hold no metres or depths.
 
     Returns whether something was said.
     """
@@ -81,13 +81,15 @@ def _by_boxes_beside(recording: Recording) -> str | None:
     return _fault(recording, {frame.number: boxes_of(frame).boxes_px for frame in frames})
 
 
-def _fault(recording: Recording, boxes_of: dict[int, Box]) -> str | None:
-    """Say where the boxes of some frames fit the pictures of depth, and what to do, where it is not where they are."""
+def _fault(recording: Recording, boxes_of: dict[int, Pixels]) -> str | None:
+    """Say why the boxes of some frames and the pictures of depth are not of the same fruits, and what to do."""
     if "depth" not in recording.description()["pictures"]:
         return None
     step = max(sum(map(len, boxes_of.values())) // MOST_BOXES, 1)
     boxes_of = {frame: boxes_px[::step] for frame, boxes_px in boxes_of.items()}
     depths = _depths(recording, {frame: frame for frame in boxes_of})
+    if (found := fault_of_metres(depths, boxes_of, recording.calibration)) is not None:
+        return found
     own = _of_one_surface(depths, boxes_of, recording.calibration)
     if own is None:
         return None
@@ -103,7 +105,7 @@ def _fault(recording: Recording, boxes_of: dict[int, Box]) -> str | None:
 
 
 def _tried_moved(
-    depths: dict[int, Depth], boxes_of: dict[int, Box], calibration: Calibration
+    depths: dict[int, Depth], boxes_of: dict[int, Pixels], calibration: Calibration
 ) -> list[tuple[Share, str]]:
     """Size and move the boxes; give the share that is of one surface then, and what is said of it."""
     centre = np.tile([calibration.cx, calibration.cy], 2)
@@ -123,11 +125,11 @@ def _steps(most_px: int, step_px: int) -> list[int]:
     return list(range(-most_px, most_px + 1, step_px))
 
 
-def _sized(centre: Box, size: float, boxes_px: Box) -> Box:
+def _sized(centre: Pixels, size: float, boxes_px: Pixels) -> Pixels:
     return np.asarray(centre + size * (boxes_px - centre), np.float64)
 
 
-def _tried_in_time(recording: Recording, boxes_of: dict[int, Box]) -> list[tuple[Share, str]]:
+def _tried_in_time(recording: Recording, boxes_of: dict[int, Pixels]) -> list[tuple[Share, str]]:
     """Look at the depth of frames before and after instead."""
     row_of = {number: row for row, number in enumerate(recording.numbers)}
     found = []
@@ -163,7 +165,7 @@ def _depths(recording: Recording, taken_for: dict[int, int]) -> dict[int, Depth]
     return depths
 
 
-def _of_one_surface(depths: dict[int, Depth], boxes_of: dict[int, Box], calibration: Calibration) -> Share | None:
+def _of_one_surface(depths: dict[int, Depth], boxes_of: dict[int, Pixels], calibration: Calibration) -> Share | None:
     """Give the mean share of a box that is as deep as a fruit of its size, and its variance; None of too few boxes."""
     shares = np.concatenate(
         [np.empty(0), *(_shares(depth_m, boxes_of[frame], calibration.fx) for frame, depth_m in depths.items())]
@@ -171,7 +173,7 @@ def _of_one_surface(depths: dict[int, Depth], boxes_of: dict[int, Box], calibrat
     return (float(shares.mean()), float(shares.var() / len(shares))) if len(shares) >= SOME else None
 
 
-def _shares(depth_m: Depth, boxes_px: Box, focal_px: float) -> NDArray[np.float64]:
+def _shares(depth_m: Depth, boxes_px: Pixels, focal_px: float) -> NDArray[np.float64]:
     """Give the share of the middle of each box in the picture that lies within its radius of the median."""
     middles, halves = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2, (boxes_px[:, 2:] - boxes_px[:, :2]) / 2
     low, high = np.floor(middles - INNER * halves), np.floor(middles + INNER * halves)

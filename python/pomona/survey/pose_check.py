@@ -163,7 +163,8 @@ def _in_words(poses: Array, ends: list[tuple[int, int]], seen: Array) -> str | N
 
 def _of_scale(scale: float) -> str:
     unit = next((name for times, name in UNITS.items() if 1 / ALIKE < scale / times < ALIKE), None)
-    cause = "check their unit and the baseline" if unit is None else f"are they in {unit}? expected metres"
+    check = "check their unit and that of depth, or the baseline"
+    cause = check if unit is None else f"are they in {unit}? expected metres"
     return f"their way is {scale:.4g} times as long: {cause}"
 
 

@@ -12,22 +12,22 @@ from pomona.recording.evenly import evenly
 from pomona.recording.pictures import UnreadablePictureError
 from pomona.survey.part import Boxes
 
-__all__ = ["LOOKED_AT", "frames_in_words", "pictures_of", "sampled_boxes"]
+__all__ = ["LOOKED_AT", "Pixels", "frames_in_words", "pictures_of", "sampled_boxes"]
+
+Pixels = NDArray[np.float64]
 
 LOOKED_AT = 5
 """Frames."""
 
 
-def sampled_boxes(parts: Sequence[Boxes], n_frames: int = LOOKED_AT) -> dict[int, NDArray[np.float64]]:
+def sampled_boxes(parts: Sequence[Boxes], n_frames: int = LOOKED_AT) -> dict[int, Pixels]:
     """Give the boxes, (D, 4) pixels, of so many frames at the most by their numbers."""
     frames = [frame for boxes in parts for frame in dict.fromkeys(boxes.frames.tolist())]
     shown = [frames[row] for row in evenly(len(frames), n_frames)]
     return {frame: boxes.boxes_px[boxes.frames == frame] for boxes in parts for frame in shown if frame in boxes.frames}
 
 
-def pictures_of(
-    recording: Recording, boxes_of: Mapping[int, NDArray[np.float64]]
-) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float64]]]:
+def pictures_of(recording: Recording, boxes_of: Mapping[int, Pixels]) -> Iterator[tuple[NDArray[np.uint8], Pixels]]:
     """Give the left picture of each of these frames that has one which can be read, with its boxes."""
     for frame in recording.frames(set(boxes_of)):
         try:

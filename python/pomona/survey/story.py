@@ -27,6 +27,7 @@ from pomona.survey.box_edges import check_size_of_boxes
 from pomona.survey.box_times import check_box_times
 from pomona.survey.depth import Refusal
 from pomona.survey.depth_check import check_depth_pictures
+from pomona.survey.depth_metres import MEDIAN_M
 from pomona.survey.kept import Kept
 from pomona.survey.mapped_way import mapped_way
 from pomona.survey.part import OpenPart, Part
@@ -46,10 +47,6 @@ __all__ = ["Progress", "Survey", "scan"]
 
 Progress = Callable[[int, int, int], None]
 """Called after each frame with frames done, frames in all, fruits so far."""
-
-MEDIAN_M = (0.01, 0.25)
-"""Of the fruits of a row; apples in a depth unit of a tenth are 6 to 9 mm, in one of five times as much 30 cm. Single
-fruits may be smaller, or larger."""
 
 UNSQUARE = 0.1
 """Part by which fx and fy may differ: pixels are square, and rectified pictures are as wide as high."""
@@ -205,12 +202,13 @@ def scan(
     if (least_px := getattr(detector, "least_px", None)) is not None:
         check_small_boxes(recording.path, boxes, least_px)
     explained |= check_box_times(recording, boxes)
-    if depth == "auto":
-        explained |= check_depth_pictures(recording, boxes)
+    depth_told = depth == "auto" and check_depth_pictures(recording, boxes)
+    explained |= depth_told
     check_long_boxes(recording.path, recording.calibration, survey.parts)
     explained |= check_places_of_boxes(recording.path, recording.calibration, survey.parts)
     check_size_of_boxes(recording, boxes)
-    _check_sizes(recording, survey)
+    if not depth_told:
+        _check_sizes(recording, survey)
     if not explained:
         tell_swing(recording.path, [part.swing_m for part in survey.parts])
         _check_pace(recording, survey)
@@ -286,7 +284,7 @@ def _tell_skipped(recording: Recording, skipped: Mapping[int, str]) -> None:
         return
     first = next(iter(skipped.values()))
     if len(skipped) == len(recording):
-        raise PomonaError(first)
+        raise PomonaError(f"{recording.path}: none of {amount(len(recording), 'frame')} can be used, first {first}")
     message = f"{recording.path}: skipped {len(skipped)} of {amount(len(recording), 'frame')}, first {first}"
     warnings.warn(message, PomonaWarning, stacklevel=3)
 
