@@ -63,7 +63,8 @@ const MIN_PROBABILITY: f64 = 0.25;
 const FITTED_NATS: f64 = 11.2;
 
 /// False-alarm rate at which the matcher is asked, at the least: each of its answers is looked at once more, with the
-/// covariances that it does not use, and has to have [`SEARCHED_NATS`].
+/// covariances that it does not use, and has to have [`SEARCHED_NATS`]. Of strangers one frame in so many bears out a pose that those
+/// before it are for: the newest one of a pose that several have found together says more for itself.
 const SEARCH_RATE: f64 = 0.02;
 
 /// Evidence that the best of a search has by chance, nats: of e^12 = 160,000 poses. Strangers had at most 27 of the 32 that
@@ -325,7 +326,8 @@ impl Localizer {
     fn settled(&self, sightings: &[Sighting], start: &Belief, up: Option<[Vector3<f64>; 2]>) -> Option<Localization> {
         let from = |start: &Belief| {
             let aligned = align(sightings, &self.map, start, &Slip::none());
-            let joint = self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= 0.0)?;
+            let joint =
+                self.believed(&aligned, up, SEARCHED_NATS).filter(|_| aligned.own_nats() >= -SEARCH_RATE.ln())?;
             let covariance = joint.fixed_view::<6, 6>(0, 0).into_owned();
             Some((aligned, Belief { covariance, ..*start }))
         };
