@@ -49,7 +49,7 @@ impl<'a> Search<'a> {
         let alone = Rated { nats: found.overlap.log_odds.max(settled.evidence), ..best };
         let is_as_good =
             |other: &Finding| !self.may_be_torn_off(other, found) && is_new(other) && self.equals(alone, other.rated());
-        let outdone = outdone || accepted.iter().any(is_as_good);
+        let outdone = outdone || accepted.iter().any(is_as_good) || self.stems_lie_elsewhere(found, &log);
         stages.extend([("rivals", f64::from(outdone)), ("pairs", pairs.len() as f64)]);
         if outdone {
             return Match::without_answer(Verdict::NoMatch, stages);

@@ -62,6 +62,7 @@ mod shares;
 mod sight;
 mod size;
 mod soft;
+mod stems;
 mod support;
 mod translations;
 mod vertical;
