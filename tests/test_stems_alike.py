@@ -71,7 +71,7 @@ def test_the_row_is_found_and_no_stem_on_another() -> None:
 
 
 def test_two_bunches_that_stand_to_each_other_as_two_others_are_no_answer() -> None:
-    """Each of them lies on others with more evidence: 12 of these 80 pairs were found, by the hands of a few bunches; now 4."""
+    """Each lies on others with more evidence: 12 of these 80 pairs were found, by the hands of a few bunches; now 4."""
     assert sum(bool(match(seed, same=False, of=bunches)[0]) for seed in range(300, 380)) <= 5
 
 
