@@ -105,6 +105,16 @@ def test_a_session_that_is_elsewhere_is_a_result(orchard: Path, visits: Path) ->
     assert orchard.read_bytes() == before
 
 
+def test_two_columns_that_were_exchanged_are_told(visits: Path, tmp_path: Path) -> None:
+    run("add", tmp_path / "orchard.gpkg", visits / "august.csv", "--date", "2024-08-01")
+    cloud = FruitCloud.read(visits / "september.csv")
+    FruitCloud(cloud.positions[:, [1, 0, 2]], ids=cloud.ids).write(tmp_path / "exchanged.csv")
+    done = run("add", tmp_path / "orchard.gpkg", tmp_path / "exchanged.csv", "--date", "2024-09-01")
+    assert done.returncode == 1
+    assert "the mirror image of exchanged fits the map, with " in done.stderr
+    assert "two columns are exchanged" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

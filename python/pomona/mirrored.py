@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pomona.amounts import amount
 from pomona.cloud import FruitCloud
 from pomona.matching import Match
 from pomona.settings import Settings
 
-__all__ = ["mirror_image", "pairs_of_mirror_image"]
+__all__ = ["mirror_image", "mirror_told", "pairs_of_mirror_image"]
 
 WHOLE = 0.5
 """An answer that finds so much of the smaller cloud is not doubted."""
@@ -52,6 +53,12 @@ def pairs_of_mirror_image(query: FruitCloud, map: FruitCloud, answer: Match, set
         if image.status == "Found" and len(image.pairs) >= LEAST_PAIRS and image.log_odds > least
     ]
     return max(better, default=0)
+
+
+def mirror_told(pairs: int, query: str, map: str) -> str:
+    """Say so, and what to do; `query` and `map` name the clouds."""
+    left_handed = "the axes of one of them are left-handed: two columns are exchanged, or one has the wrong sign"
+    return f"the mirror image of {query} fits {map}, with {amount(pairs, 'pair')}: {left_handed}"
 
 
 def mirror_image(cloud: FruitCloud, normal: NDArray[np.float64]) -> FruitCloud:

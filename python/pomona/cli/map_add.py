@@ -102,7 +102,7 @@ def map_add(
     for visit, added in told:
         if added.length_in_map is not None:
             tell(f"pomona: warning: {orchard}: {length_told(added.length_in_map, visit.name, 'the map')}")
-        _doubt_metres(orchard, visit, added, settings)
+        _say_why_not_found(orchard, visit, added, settings)
         _doubt_year(orchard, visit, added)
         if added.copy_of is not None:
             tell(
@@ -118,16 +118,22 @@ def map_add(
         raise typer.Exit(1)
 
 
-def _doubt_metres(orchard: Path, visit: Session, added: Added, settings: Settings | None) -> None:
+def _say_why_not_found(orchard: Path, visit: Session, added: Added, settings: Settings | None) -> None:
+    """Say whether its mirror image fits the map, or it does at another size."""
     from pomona.cli.progress import working
+    from pomona.mirrored import mirror_told, pairs_of_mirror_image
     from pomona.other_metres import other_size, size_told
     from pomona.settings import Settings
 
     if added.is_added or added.match is None or added.known is None:
         return
-    with working(f"looking at other sizes of {visit.name}"):
-        size = other_size(visit.cloud, added.known, added.match, settings or Settings.load(None, {}))
-    if size is not None:
+    asked = visit.cloud, added.known, added.match, settings or Settings.load(None, {})
+    with working(f"looking at the mirror image of {visit.name}, and at other sizes"):
+        pairs = pairs_of_mirror_image(*asked)
+        size = None if pairs else other_size(*asked)
+    if pairs:
+        tell(f"pomona: {orchard}: {mirror_told(pairs, visit.name, 'the map')}")
+    elif size is not None:
         tell(f"pomona: {orchard}: {size_told(size, visit.name, 'the map')}")
 
 

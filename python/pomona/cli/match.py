@@ -139,13 +139,12 @@ def _other_unit(side: _ReadCloud) -> str | None:
 
 def _doubt_hands(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> None:
     from pomona.cli.progress import working
-    from pomona.mirrored import pairs_of_mirror_image
+    from pomona.mirrored import mirror_told, pairs_of_mirror_image
 
     with working("looking at the mirror image of QUERY"):
         pairs = pairs_of_mirror_image(query, map, answer, settings)
     if pairs:
-        left_handed = "the axes of one of them are left-handed, and the sign of one axis has to be changed"
-        tell(f"pomona: the mirror image of QUERY fits MAP, with {amount(pairs, 'pair')}: {left_handed}")
+        tell(f"pomona: {mirror_told(pairs, 'QUERY', 'MAP')}")
 
 
 def _doubt_metres(query: FruitCloud, map: FruitCloud, answer: Match, settings: Settings) -> None:
