@@ -24,6 +24,11 @@ def test_a_list_of_points_is_a_cloud() -> None:
         ({"ids": ("a", "a")}, "ids: rows 0 and 1 are both 'a', expected each id once"),
         ({"diameters_m": [0.07, -0.07]}, "diameters_m: row 1 is -0.07, expected positive metres or NaN"),
         ({"diameters_m": ["big", "small"]}, "diameters_m: expected an array of float64"),
+        ({"diameters_m": np.array([True, False])}, "diameters_m: found bool, expected an array of float64"),
+        (
+            {"positions": np.zeros((2, 3), "datetime64[s]")},
+            "positions: found datetime64[s], expected an array of float64",
+        ),
         ({"covariances": np.zeros((2, 3))}, "covariances: found shape (2, 3), expected (2, 3, 3)"),
         ({"covariances": [np.eye(3), -np.eye(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),
         ({"covariances": [np.eye(3), np.tri(3)]}, "covariances: row 1 is not symmetric positive semi-definite"),

@@ -234,7 +234,7 @@ def test_a_frame_is_kept_in_some_kilobytes() -> None:
         (np.eye(4), None, "found one of them, expected both or none"),
         (NAN, np.eye(6), "moved: found a matrix that does not turn and move"),
         (MIRROR, np.eye(6), "moved: found a matrix that does not turn and move"),
-        (np.eye(4) + 1j, np.eye(6), "moved: expected an array of float64"),
+        (np.eye(4) + 1j, np.eye(6), "moved: found complex128, expected an array of float64"),
         (np.eye(3), np.eye(6), r"moved: found shape \(3, 3\), expected \(4, 4\)"),
         (facing(1e9), np.eye(6), "moved: found one beyond 1,000 km, expected metres between two frames"),
         (np.eye(4), np.zeros((6, 6)), "information: found a matrix that is not symmetric positive definite"),

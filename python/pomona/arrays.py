@@ -17,6 +17,9 @@ RIGID = 1e-3
 FARTHEST_M = 1e6
 """No two frames of a recording are farther apart, metres; the core has the same bound."""
 
+NO_NUMBERS = "bcmM"
+"""Kinds of arrays that NumPy makes numbers of: truths, times, complex ones without their imaginary part."""
+
 SYMMETRIC = 1e-6
 """The same of a symmetric matrix, relative to its largest number."""
 
@@ -24,8 +27,8 @@ SYMMETRIC = 1e-6
 def checked_array(name: str, values: Any, dtype: Any, shape: tuple[int | None, ...]) -> NDArray[Any]:
     """Return `values` as a contiguous array of `dtype`; None in `shape` takes any length."""
     try:
-        if isinstance(values, np.ndarray) and np.iscomplexobj(values):
-            raise TypeError  # NumPy leaves the imaginary part out, with a warning
+        if isinstance(values, np.ndarray) and values.dtype.kind in NO_NUMBERS and np.dtype(dtype).kind in "fi":
+            raise PomonaError(f"{name}: found {values.dtype.name}, expected an array of {np.dtype(dtype).name}")
         if np.ma.is_masked(values):
             raise PomonaError(f"{name}: found a masked array, expected one whose values are all known")
         array = np.ascontiguousarray(values, dtype=dtype)

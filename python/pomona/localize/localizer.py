@@ -240,7 +240,8 @@ def _refusing() -> Iterator[None]:
         # The one that the core raises: it is borrowed by another call.
         raise PomonaError("localizer: another thread uses it, expected one thread at a time") from None
     except (ValueError, TypeError, OverflowError) as error:
-        raise PomonaError(f"frame: {error}") from None
+        is_named = str(error).startswith(("moved:", "up:"))
+        raise PomonaError(str(error) if is_named else f"frame: {error}") from None
 
 
 def _checked_motion(
