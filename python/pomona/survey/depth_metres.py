@@ -73,8 +73,9 @@ def _depths_and_widths(depth_m: NDArray[np.float32], boxes_px: Pixels) -> Array:
     found = []
     for (x, y, to_x, to_y), width_px in zip(corners.tolist(), np.sqrt(sides.prod(axis=1)).tolist(), strict=True):
         inside = depth_m[y:to_y, x:to_x]
-        if (inside > 0).any() and width_px > 0:
-            found.append((float(np.median(inside[inside > 0])), width_px))
+        known = inside[(inside > 0) & np.isfinite(inside)]
+        if len(known) and width_px > 0:
+            found.append((float(np.median(known)), width_px))
     return np.array(found, np.float64).reshape(-1, 2).T
 
 
